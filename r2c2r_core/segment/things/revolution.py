@@ -75,6 +75,7 @@ class Body(NamedTuple):
     grid: Grid
     profile: Profile
     colours: Colours
+    strips: Strips  # of the views it was found in, drawn about that axis
 
     @property
     def radii_m(self) -> np.ndarray:
@@ -137,20 +138,29 @@ def find_body(
         body = _best_axis(some, site, body, colours, step)
         if body.profile.score <= 0:
             return None
-        colours, step = _colours(some, site, body), 2 * coarse.cell_m
+        colours, step = _colours(body), 2 * coarse.cell_m
     body = _at(views, site, body.foot, fine, colours)
-    body = _at(views, site, body.foot, fine, _colours(views, site, body))
+    body = _coloured(body, _colours(body))
     return body if body.profile.score > 0 and _bounded(body) else None
 
 
 def _at(views: Sequence[View], site: Site, foot: Vector3, grid: Grid, colours: Colours) -> Body:
     """The best body on a given axis."""
-    return Body(foot, grid, best_profile(*profile_evidence(draw_strips(views, site, foot, grid), colours)), colours)
+    return _on_strips(draw_strips(views, site, foot, grid), foot, grid, colours)
+
+
+def _coloured(body: Body, colours: Colours) -> Body:
+    """The best body on the same axis by other colours."""
+    return _on_strips(body.strips, body.foot, body.grid, colours)
+
+
+def _on_strips(strips: Strips, foot: Vector3, grid: Grid, colours: Colours) -> Body:
+    return Body(foot, grid, best_profile(*profile_evidence(strips, colours)), colours, strips)
 
 
 def _best_axis(views: Sequence[View], site: Site, start: Body, colours: Colours, step_m: float) -> Body:
     """Compass search: the best body about another, in ever smaller steps, its surface where the click is."""
-    best = _at(views, site, start.foot, start.grid, colours)
+    best = _coloured(start, colours)
     around = [np.array([np.cos(angle), np.sin(angle), 0.0]) for angle in np.arange(8) * np.pi / 4]
     while step_m >= tuned(Params).last_m:
         places = [best.foot + step_m * offset for offset in around]
@@ -173,9 +183,9 @@ def _colours_by_depth(strips: Strips, grid: Grid, reach_m: float) -> Colours:
     return learn_behind(strips, (strips.depth_odds > 0) & near, strips.depth_odds < 0)
 
 
-def _colours(views: Sequence[View], site: Site, body: Body) -> Colours:
+def _colours(body: Body) -> Colours:
     """Colours on the body against those around it where depth does not show something standing, as a cap it lacks."""
-    strips, margin = draw_strips(views, site, body.foot, body.grid), tuned(Params).margin_m
+    strips, margin = body.strips, tuned(Params).margin_m
     on, about = (body.grid.within(body.profile.cells, by) for by in (-margin, margin))
     return learn_behind(strips, on & (strips.depth_odds >= 0), ~about & (strips.depth_odds < 0))
 

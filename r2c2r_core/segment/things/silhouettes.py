@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from r2c2r_core.arrays import Image, Mask, Pixels
+from r2c2r_core.arrays import Image, Mask, Pixels, Vector3
 from r2c2r_core.geometry.camera import Intrinsics, project, unproject
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.occlusion import colour_gradient, refine_border
@@ -191,18 +191,23 @@ def _depth_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndar
     points = frame.world_from_camera.apply(seen.reshape(-1, 3)).reshape(seen.shape)
     low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
     slack = 0.015 + 0.5 * thing.pose_error_m
-    near = ((points[..., :2] > low[:2] - slack) & (points[..., :2] < high[:2] + slack)).all(axis=-1)
-    near &= (points[..., 2] > low[2] - slack) & (points[..., 2] < high[2] + slack)
+    near = _within(points, low - slack, high + slack)
     verdict = np.where(near, 1.0, -1.0)
     if thing.support_z_m is not None:
         offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
-        standing = ((points[..., :2] > low[:2]) & (points[..., :2] < high[:2])).all(axis=-1)
+        standing = _within(points[..., :2], low, high)
         on_support = points[..., 2] < thing.support_z_m + offset + tuned(Params).on_support_m
         verdict = np.where(on_support, np.where(standing & near, 0.0, -1.0), verdict)  # the foot of it is as low
     coarse = max(frame.rgb_camera.width / camera.width / crop.shrink, 1.0)
     odds = np.where(patch > 0, verdict, 0.0) * (2.0 / np.sqrt(coarse))
     at = np.ix_(rows - first_row, columns - first_column)
     return np.asarray(cv2.blur(odds[at].astype(np.float32), (2 * round(coarse) + 1,) * 2))
+
+
+def _within(points: np.ndarray, low: Vector3, high: Vector3) -> np.ndarray:
+    """Which points (..., axes) lie between two corners along each of their axes."""
+    axes = range(points.shape[-1])  # one after another: numpy is slow along an axis of three
+    return np.logical_and.reduce([(points[..., k] > low[k]) & (points[..., k] < high[k]) for k in axes])
 
 
 def _depth_index(span: slice, cells: int, colour_size: int, depth_size: int) -> np.ndarray:

@@ -113,8 +113,9 @@ def cast_rays(solids: Sequence[Solid], world_from_camera: Rigid3) -> np.ndarray:
         turned = seen.turn(rays)
         with np.errstate(divide="ignore", invalid="ignore"):
             first, second = ((np.array(edge) - seen.translation) / turned for edge in (low, high))
-        enter = np.minimum(first, second).max(axis=1)
-        leave = np.maximum(first, second).min(axis=1)
+        near, far = np.minimum(first, second), np.maximum(first, second)
+        enter = np.maximum(np.maximum(near[:, 0], near[:, 1]), near[:, 2])  # numpy is slow along an axis of three
+        leave = np.minimum(np.minimum(far[:, 0], far[:, 1]), far[:, 2])
         nearest = np.where((enter < leave) & (enter > 0), np.minimum(nearest, enter), nearest)
     return np.where(np.isfinite(nearest), nearest, 0.0).reshape(CAMERA.height, CAMERA.width)
 
