@@ -1,10 +1,12 @@
 """The command line as a person meets it: exit codes, one-line errors."""
 
+import io
 import json
 import os
 import re
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,19 @@ from .ingest.tiny import TinyRoom, write_r3d
 
 
 def r2c2r(*arguments: object, code: int) -> tuple[str, str]:
+    """What the command says when it is called here, which spares the start of a process."""
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        try:
+            ended = main(list(map(str, arguments)))
+        except SystemExit as left:
+            ended = left.code
+    assert ended == code, err.getvalue()
+    return out.getvalue(), err.getvalue()
+
+
+def started(*arguments: object, code: int) -> tuple[str, str]:
+    """What the command says when it is started as a person does."""
     done = subprocess.run(
         [sys.executable, "-m", "r2c2r_core.cli", *map(str, arguments)], capture_output=True, text=True, check=False
     )
@@ -41,12 +56,12 @@ def prompts(tmp_path: Path) -> Path:
 
 
 def test_help_and_version() -> None:
-    assert "COMMAND" in r2c2r("--help", code=0)[0]
+    assert "COMMAND" in started("--help", code=0)[0]
     assert r2c2r("--version", code=0)[0].startswith("r2c2r ")
 
 
 def test_wrong_usage_is_two() -> None:
-    r2c2r("fly", code=2)
+    started("fly", code=2)
     r2c2r("sample", "x", "--size", "big", code=2)
 
 
@@ -60,7 +75,7 @@ def test_a_sample_explains_its_choices_and_names_them_where_one_is_unknown(optio
 
 
 def test_a_missing_recording_is_named(tmp_path: Path, prompts: Path) -> None:
-    _, said = r2c2r("run", tmp_path / "no.r3d", "--prompts", prompts, "-o", tmp_path / "b.zip", code=2)
+    _, said = started("run", tmp_path / "no.r3d", "--prompts", prompts, "-o", tmp_path / "b.zip", code=2)
     assert "no.r3d" in one_line(said)
 
 

@@ -9,10 +9,11 @@ from tests.waiting import FACTOR
 BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
 
 
-def test_every_command_ends_in_one_line_whatever_it_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("count", [60, pytest.param(250, marks=pytest.mark.slow)])
+def test_every_command_ends_in_one_line_whatever_it_is_given(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(BENCHMARKS)
     from fuzz_inputs import fuzz
 
-    found = fuzz(seed=0, count=250, patience=4 * FACTOR)
+    found = fuzz(seed=0, count=count, patience=4 * FACTOR)
     assert found["faults"] == [], "to see one: python benchmarks/fuzz_inputs.py --only CASE"
-    assert (found["cases"], found["tracebacks"], found["hangs"], found["crashes"]) == (250, 0, 0, 0)
+    assert (found["cases"], found["tracebacks"], found["hangs"], found["crashes"]) == (count, 0, 0, 0)

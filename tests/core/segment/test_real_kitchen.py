@@ -81,7 +81,13 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> GeometricSession:
     return opened
 
 
-@pytest.mark.parametrize("drawn", OUTLINES, ids=[drawn["name"] for drawn in OUTLINES])
+QUICK = ("door_3", "controller")  # a front and the thing that takes the least; benchmarks/segment_outlines.py measures all
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [pytest.param(d, id=d["name"], marks=() if d["name"] in QUICK else pytest.mark.slow) for d in OUTLINES],
+)
 def test_one_click_gives_the_outlines_drawn_by_hand(session: GeometricSession, drawn: dict[str, Any]) -> None:
     frame, x, y = drawn["click"]
     click = PromptPoint(frame=frame, x=float(x), y=float(y), label=1)
@@ -106,6 +112,9 @@ def test_doors_have_catalogue_widths(session: GeometricSession, name: str, width
     assert panel.handle.centre[1] > 0.2
 
 
-def test_nothing_is_said_to_move_where_everything_is_closed(session: GeometricSession) -> None:
-    for prompt in read_prompts(PROMPTS).objects:
+@pytest.mark.parametrize("names", [("door_4", "door_5"), pytest.param(None, marks=pytest.mark.slow, id="all")])
+def test_nothing_is_said_to_move_where_everything_is_closed(session: GeometricSession, names: tuple[str, ...] | None) -> None:
+    asked = [prompt for prompt in read_prompts(PROMPTS).objects if names is None or prompt.name in names]
+    assert asked
+    for prompt in asked:
         assert session.find(prompt).motions() == (), prompt.name
