@@ -36,7 +36,7 @@ def two_bottles():
 
 
 def request_for(address: str, overrides: Overrides | None = None) -> Request:
-    quick = AlignConfig(views=4, match_photos=1, match_views=8, settled=8, refined=2, points=400, surface_points=1500)
+    quick = AlignConfig(views=3, match_photos=1, match_views=4, settled=4, refined=1, points=300, surface_points=1000)
     config = ReconstructConfig(generate=GenerateConfig(count=1, pool_frames=6, url=f"{address}/v1/infer"), align=quick)
     return Request(
         source=Path("scan"),
@@ -191,48 +191,60 @@ def contents(path):
     return structure, members
 
 
-def test_any_number_of_workers_stores_the_same_keys_and_bytes(two_bottles, tmp_path):
+def run_by(workers, folder, two_bottles):
+    """A run of both bottles into a folder by so many processes."""
     capture, tracks = two_bottles
     recording = Kept(capture, "c")
     request = replace(request_for("http://nowhere"), tools=Tools())
-    for workers in (1, 2):
-        with Pool(workers) as pool:
-            run = Ledger(Workspace(tmp_path / str(workers)), SILENT, pool=pool)
-            found = generate_objects(request, run, recording, tracks)
-            choices = {name: kept.value for name, kept in found.items()}
-            placed = place_objects(request, run, recording, tracks, found, choices)
-            assert list(found) == list(placed) == list(tracks)
-            assert sorted(run.work.computed) == sorted(f"{stage}/{name}" for stage in ("generate", "align") for name in tracks)
-            assert (workers > 1) == bool(pool._idle)
-    stored = {path.relative_to(tmp_path / "1") for path in (tmp_path / "1").rglob("*.noun")}
+    with Pool(workers) as pool:
+        run = Ledger(Workspace(folder), SILENT, pool=pool)
+        found = generate_objects(request, run, recording, tracks)
+        choices = {name: kept.value for name, kept in found.items()}
+        placed = place_objects(request, run, recording, tracks, found, choices)
+        assert list(found) == list(placed) == list(tracks)
+        assert sorted(run.work.computed) == sorted(f"{stage}/{name}" for stage in ("generate", "align") for name in tracks)
+        assert (workers > 1) == bool(pool._idle)
+
+
+@pytest.fixture(scope="module")
+def one_run(two_bottles, tmp_path_factory):
+    """The folder of a run of both bottles by one process."""
+    folder = tmp_path_factory.mktemp("one_run")
+    run_by(1, folder, two_bottles)
+    return folder
+
+
+def assert_stored_alike(folder, other):
+    stored = {path.relative_to(folder) for path in folder.rglob("*.noun")}
     assert len(stored) == 4
     for path in stored:
-        assert contents(tmp_path / "1" / path) == contents(tmp_path / "2" / path)
+        assert contents(folder / path) == contents(other / path)
 
 
-def test_objects_that_several_runs_computed_are_stored_as_one_run_stores_them(two_bottles, tmp_path):
+def test_any_number_of_workers_stores_the_same_keys_and_bytes(two_bottles, one_run, tmp_path):
+    run_by(2, tmp_path, two_bottles)
+    assert_stored_alike(one_run, tmp_path)
+
+
+def test_objects_that_several_runs_computed_are_stored_as_one_run_stores_them(two_bottles, one_run, tmp_path):
     capture, tracks = two_bottles
     recording = Kept(capture, "c")
     request = replace(request_for("http://nowhere"), tools=Tools())
 
-    def run_of(folder, until, only=None):
-        run = Ledger(Workspace(tmp_path / folder), SILENT, until, only=only)
+    def run_of(until, only=None):
+        run = Ledger(Workspace(tmp_path), SILENT, until, only=only)
         with suppress(Reached):
             found = generate_objects(request, run, recording, tracks)
             choices = {name: kept.value for name, kept in found.items()}
             place_objects(request, run, recording, tracks, found, choices)
         return run
 
-    run_of("one", "align")
     for stage in ("generate", "align"):
-        assert run_of("many", stage, []).left == list(tracks)
+        assert run_of(stage, []).left == list(tracks)
         for name in tracks:
-            assert run_of("many", stage, [name]).work.computed == [f"{stage}/{name}"]
-        assert run_of("many", stage).work.computed == []
-    stored = {path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*.noun")}
-    assert len(stored) == 4
-    for path in stored:
-        assert contents(tmp_path / "one" / path) == contents(tmp_path / "many" / path)
+            assert run_of(stage, [name]).work.computed == [f"{stage}/{name}"]
+        assert run_of(stage).work.computed == []
+    assert_stored_alike(one_run, tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,10 @@
-"""Posed RGB-D frames of one object in a plain room, with known truth: the alignment's test bench."""
+"""Posed RGB-D frames of one object in a plain room, with known truth: the alignment's test bench.
+
+Each scene is filmed once a process; tests only read it.
+"""
 
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -228,6 +232,7 @@ def ring(count: int, radius: float, height: float) -> list[tuple[float, float, f
     ]
 
 
+@cache
 def free_box(*, textured: bool) -> tuple[TexturedMesh, Capture, MaskTrack]:
     """A box of 40 x 30 x 25 cm on the floor."""
     thing = box_mesh((0.4, 0.3, 0.25), (0, 0, 0.125))
@@ -237,6 +242,7 @@ def free_box(*, textured: bool) -> tuple[TexturedMesh, Capture, MaskTrack]:
     return thing, *film(thing, around=floor(), eyes=ring(8, 1.3, 0.8), target=(0.1, 0, 0.12))
 
 
+@cache
 def blank_cabinet(*, handle: bool = True) -> tuple[TexturedMesh, Capture, MaskTrack]:
     """A grey cabinet with a grey handle between grey neighbours below a grey worktop: only depth shows the handle."""
     parts = [box_mesh((0.6, 0.55, 0.7), (0, 0.275, 0.45))]
@@ -264,6 +270,7 @@ def blank_cabinet(*, handle: bool = True) -> tuple[TexturedMesh, Capture, MaskTr
     )
 
 
+@cache
 def bottle(*, label: bool = False) -> tuple[TexturedMesh, Capture, MaskTrack]:
     """A bottle, 25 cm high: plain, or blotched all around, which alone tells its yaw."""
     radius, height = np.array([0.001, 0.035, 0.035, 0.014, 0.014, 0.001]), np.array([0, 0, 0.17, 0.2, 0.25, 0.25])
@@ -281,6 +288,7 @@ def bottle(*, label: bool = False) -> tuple[TexturedMesh, Capture, MaskTrack]:
     return thing, *film(thing, around=floor(), eyes=ring(8, 0.8, 0.5), target=(0, 0, 0.12))
 
 
+@cache
 def chair() -> tuple[TexturedMesh, Capture, MaskTrack]:
     """Seat, four legs and a back."""
     legs = [box_mesh((0.04, 0.04, 0.44), (x, y, 0.22), cells=3) for x in (-0.19, 0.19) for y in (-0.19, 0.19)]
