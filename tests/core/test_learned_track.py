@@ -19,6 +19,8 @@ from tests.core.segment.scenes import DRAWERS, FRONT_Y, click_on, kitchen, promp
 pytest.importorskip("torch")
 from tests.core.segment.learned.test_session import TrueMasks
 
+QUICK = AlignConfig(views=4, match_photos=1, match_views=8, settled=12, refined=2)
+
 
 def test_a_learned_track_goes_through_every_later_stage(tmp_path: Path) -> None:
     capture, truth = kitchen()
@@ -31,7 +33,7 @@ def test_a_learned_track_goes_through_every_later_stage(tmp_path: Path) -> None:
     track = session.track(prompt("drawer_mid", "drawer", click_on(capture, middle, 60)))
     few = replace(GenerateConfig(), count=1, pool_frames=6)
     candidates = generate_candidates(capture, track, GENERATORS.default, few)
-    placement = place_mesh(capture, track, candidates.chosen, MATCHERS.default, AlignConfig())
+    placement = place_mesh(capture, track, candidates.chosen, MATCHERS.default, QUICK)
     scene = build_scene(capture, [track], [placement], [candidates.chosen], NO_OVERRIDES, SynthesizeConfig())
     fitted = fit_meshes(scene, [track], [placement], [candidates.chosen], WarpConfig())
     (drawer,) = fitted.objects

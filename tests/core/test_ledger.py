@@ -153,25 +153,32 @@ def test_a_run_of_no_objects_says_which_are_left(tmp_path: Path) -> None:
 
 HOLDS = """
 import pathlib, sys
+from r2c2r_core.errors import EnvironmentProblem
 from r2c2r_core.workspace import Workspace
-with Workspace(pathlib.Path(sys.argv[1])).locked(sys.argv[2:]):
-    pass
+for parts in sys.argv[2:]:
+    try:
+        with Workspace(pathlib.Path(sys.argv[1])).locked(parts.split()):
+            print("held")
+    except EnvironmentProblem as refused:
+        print(refused)
 """
 
 
-def at_once(root: Path, *parts: str) -> subprocess.CompletedProcess[str]:
-    """Another process that takes the parts, or the whole, and gives them back."""
-    return subprocess.run([sys.executable, "-c", HOLDS, str(root), *parts], capture_output=True, text=True, check=False)
+def at_once(root: Path, *wanted: str) -> list[bool]:
+    """Whether another process may take parts, or the whole (""), and give them back; one after the other."""
+    command = [sys.executable, "-c", HOLDS, str(root), *wanted]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert len(told) == len(wanted)
+    assert all(line == "held" or "another run is at work" in line for line in told)
+    return [line == "held" for line in told]
 
 
 def test_parts_of_a_workspace_are_held_beside_one_another_each_once_and_none_beside_the_whole(tmp_path: Path) -> None:
     with Workspace(tmp_path).locked(["align/a", "align/b"]):
-        assert at_once(tmp_path, "align/c", "generate/a").returncode == 0
-        assert "another run is at work" in at_once(tmp_path, "align/c", "align/b").stderr
-        assert "another run is at work" in at_once(tmp_path).stderr
+        assert at_once(tmp_path, "align/c generate/a", "align/c align/b", "") == [True, False, False]
     with Workspace(tmp_path).locked():
-        assert "another run is at work" in at_once(tmp_path, "align/a").stderr
-    assert at_once(tmp_path).returncode == at_once(tmp_path, "align/a").returncode == 0
+        assert at_once(tmp_path, "align/a") == [False]
+    assert at_once(tmp_path, "", "align/a") == [True, True]
 
 
 def test_a_full_disk_leaves_the_old_file_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

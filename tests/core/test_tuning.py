@@ -44,7 +44,7 @@ def areas(root: Path, numbers: Changes, workers: int = 1) -> tuple[list[int], li
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_number_that_is_set_holds_in_every_process(tmp_path: Path, workers: int) -> None:
-    assert areas(tmp_path / "usual", {}, workers)[0] == [175, 175]
+    assert areas(tmp_path / "usual", {})[0] == [175, 175]
     assert areas(tmp_path / "set", WALLS, workers)[0] == [500, 500]
     assert tuned(Params) == Params()
 

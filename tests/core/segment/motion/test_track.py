@@ -26,7 +26,12 @@ def scene(*args: Any, **more: Any) -> Any:
     return filmed(*args, **more)
 
 
-@pytest.mark.parametrize("way", RAD + M)
+def quick(ways: tuple[str, ...], few: tuple[str, ...]) -> list[Any]:
+    """The few ways that differ in kind; those that mirror them are slow."""
+    return [pytest.param(way, marks=() if way in few else pytest.mark.slow) for way in ways]
+
+
+@pytest.mark.parametrize("way", quick(RAD + M, ("left", "bottom", "out", "slides_left")))
 def test_each_joint_is_told_from_the_others_and_measured(way: str) -> None:
     states = opened_and_held(np.deg2rad(75) if way in RAD else 0.33)
     motion = find_motion(LEAF, scene(way, states))
@@ -54,7 +59,7 @@ def test_a_flap_opens_no_further_than_its_stays_let_it() -> None:
     assert max(joint(way).states.max() for way in ("top", "bottom")) <= np.deg2rad(120) < joint("left").states.max()
 
 
-@pytest.mark.parametrize("way", RAD)
+@pytest.mark.parametrize("way", quick(RAD, ("left", "top")))
 def test_a_hinge_behind_its_edge_is_found_there(way: str) -> None:
     """A concealed hinge turns about a line inside the unit: far from what is usual, and three ranges of angles tell it."""
     off = (0.012, 0.015, 0.0) if way in ("left", "right") else (0.0, 0.015, 0.012)

@@ -38,9 +38,9 @@ def test_it_reaches_the_floor_on_all_its_legs(
     np.testing.assert_allclose(extents, sorted((high - low)[:2]), atol=0.025)  # a voxel
     assert box.support_z_m == pytest.approx(0.0, abs=0.01)
     assert box.dimensions_m[2] == pytest.approx(high[2], abs=0.02)
-    overlap = [mask_iou(session.mask_at(clicked, f.index), truth[name][f.index]) for f in capture.frames]
-    assert np.mean(overlap) > 0.88
     mask = np.stack([session.mask_at(clicked, f.index) for f in capture.frames])
+    overlap = [mask_iou(own, truth[name][f.index]) for own, f in zip(mask, capture.frames, strict=True)]
+    assert np.mean(overlap) > 0.88
     legs = np.stack([truth[name][f.index] & _below(capture, f.index, 0.35) for f in capture.frames])
     assert (mask & legs).sum() > 0.7 * legs.sum()
 
