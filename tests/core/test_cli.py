@@ -25,7 +25,7 @@ def r2c2r(*arguments: object, code: int) -> tuple[str, str]:
     out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
         try:
-            ended = main(list(map(str, arguments)))
+            ended: object = main(list(map(str, arguments)))
         except SystemExit as left:
             ended = left.code
     assert ended == code, err.getvalue()

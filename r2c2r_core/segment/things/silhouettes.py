@@ -207,7 +207,7 @@ def _depth_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndar
 def _within(points: np.ndarray, low: Vector3, high: Vector3) -> np.ndarray:
     """Which points (..., axes) lie between two corners along each of their axes."""
     axes = range(points.shape[-1])  # one after another: numpy is slow along an axis of three
-    return np.logical_and.reduce([(points[..., k] > low[k]) & (points[..., k] < high[k]) for k in axes])
+    return np.asarray(np.logical_and.reduce([(points[..., k] > low[k]) & (points[..., k] < high[k]) for k in axes]))
 
 
 def _depth_index(span: slice, cells: int, colour_size: int, depth_size: int) -> np.ndarray:
