@@ -10,15 +10,19 @@ FACTOR = float(os.environ.get("R2C2R_PATIENCE", "1"))
 PATIENCE_S = 180 * FACTOR
 """Seconds until a test gives up waiting for what should happen: nothing that works comes near it."""
 PATIENCE_MS = 1000 * PATIENCE_S
-LOOK_S = 0.02  # between two looks at a condition
+LOOK_S = 0.02  # between two looks at a condition, at least
+REST = 3  # times as long as a look took: what is waited for needs the processor more than who waits
 
 
 def until(condition: Callable[[], object], said: str = "what was waited for did not happen") -> None:
     """Wait until the condition holds; fails after `PATIENCE_S`."""
-    deadline = time.monotonic() + PATIENCE_S
+    began = time.monotonic()
+    deadline = began + PATIENCE_S
     while not condition():
-        assert time.monotonic() < deadline, said
-        time.sleep(LOOK_S)
+        looked = time.monotonic()
+        assert looked < deadline, said
+        time.sleep(max(LOOK_S, REST * (looked - began)))
+        began = time.monotonic()
 
 
 @contextmanager
