@@ -1,16 +1,53 @@
 """A project as a run leaves it, with the small kitchen as the exporter writes it."""
 
+import atexit
 import shutil
+import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from app.db.engine import writing
+from sqlmodel import select
+
+from app.db.engine import opened, writing
 from app.db.queries import project_row
+from app.db.tables import Job, Project
 from app.jobs.outcomes import adopt_bundle
+from app.settings import DATABASE
 from r2c2r_core.model.report import Certificate
 from r2c2r_core.workspace import Workspace
-from tests.app.conftest import Running
+from tests.app.conftest import Running, running
+from tests.app.nouns import finish
 from tests.core.export.kitchen import reconstruction
+
+
+def copy_finished(data: Path) -> str:
+    """A data folder with a sample that was run and whose drawer_1 is finished; the project."""
+    made, project = _finished_sample()
+    shutil.copytree(made, data)
+    with opened(data / DATABASE) as engine, writing(engine) as session:
+        for row in session.exec(select(Project)):
+            row.source_path = _moved(row.source_path, made, data)
+        for job in session.exec(select(Job)):
+            job.log_path = _moved(job.log_path, made, data)
+    return project
+
+
+@cache
+def _finished_sample() -> tuple[Path, str]:
+    """Made once a process."""
+    folder = Path(tempfile.mkdtemp(prefix="r2c2r-finished-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    with running(folder / "data") as web:
+        project = web.sample()
+        web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "done")
+        finish(web.settings.data_dir / "projects" / project / "work")
+    return folder / "data", project
+
+
+def _moved(path: str | None, made: Path, data: Path) -> str | None:
+    """A path within the folder that was copied, within its copy."""
+    return path and path.replace(str(made), str(data), 1)
 
 
 def finished_kitchen(web: Running, certificate: Certificate, *bundles: Path) -> str:

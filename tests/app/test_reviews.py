@@ -1,5 +1,5 @@
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,18 +9,18 @@ import pytest
 from app.serve import register_finished
 from r2c2r_core.workspace import Workspace
 from tests.app.conftest import Running
+from tests.app.finished import copy_finished
 from tests.app.nouns import finish, scene
 from tests.app.test_jobs import run
 
 
 @pytest.fixture
-def reviewed(web: Running) -> tuple[Running, str, int]:
+def reviewed(start: Callable[..., Any], tmp_path: Path) -> Iterator[tuple[Running, str, int]]:
     """A project whose drawer_1 is finished: the app, the project, the object."""
-    project = web.sample()
-    web.job(run(web, project), "done")
-    finish(web.settings.data_dir / "projects" / project / "work")
-    (drawer,) = [o for o in web.get(f"/api/projects/{project}/objects") if o["name"] == "drawer_1"]
-    return web, project, drawer["id"]
+    project = copy_finished(tmp_path / "data")
+    with start() as web:
+        (drawer,) = [o for o in web.get(f"/api/projects/{project}/objects") if o["name"] == "drawer_1"]
+        yield web, project, drawer["id"]
 
 
 Reviewed = tuple[Running, str, int]
