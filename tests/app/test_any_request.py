@@ -7,21 +7,34 @@ import pytest
 from r2c2r_core.model.report import Certificate
 
 BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
+ROLES = ("reviewer", "nobody")
 
 
-def test_no_operation_ends_in_a_server_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kitchen_bundle: tuple[Path, Certificate]
-) -> None:
+@pytest.fixture(autouse=True)
+def benchmarks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(BENCHMARKS)
-    from any_request import make_template, send_anything, walk_anywhere
 
-    roles = ("reviewer", "nobody")
+
+@pytest.mark.parametrize(("every", "least"), [(8, 10), pytest.param(1, 100, marks=pytest.mark.slow)])
+def test_no_operation_ends_in_a_server_error(
+    tmp_path: Path, kitchen_bundle: tuple[Path, Certificate], every: int, least: int
+) -> None:
+    from any_request import make_template, send_anything
+
     project = make_template(tmp_path, kitchen_bundle[0])
-    figures = send_anything(tmp_path, project, examples=2, seed=0, roles=roles)
-    walked = walk_anywhere(tmp_path, walks=1, seed=0)
-    assert figures["failures"] == walked["failures"] == []
-    assert walked["steps"] > 0
-    assert figures["operations"] > 50
-    assert set(figures["roles"]) == set(roles)
+    figures = send_anything(tmp_path, project, examples=2, seed=0, roles=ROLES, every=every)
+    assert figures["failures"] == []
+    assert figures["operations"] > least
+    assert set(figures["roles"]) == set(ROLES)
     assert all(figure["requests"] >= figures["operations"] for figure in figures["roles"].values())
     assert figures["roles"]["nobody"]["statuses"].keys() <= {"200", "401", "403", "404", "422", "429"}
+
+
+@pytest.mark.slow
+def test_no_walk_from_answer_to_request_meets_a_server_error(tmp_path: Path, kitchen_bundle: tuple[Path, Certificate]) -> None:
+    from any_request import make_template, walk_anywhere
+
+    make_template(tmp_path, kitchen_bundle[0])
+    walked = walk_anywhere(tmp_path, walks=1, seed=0)
+    assert walked["failures"] == []
+    assert walked["steps"] > 0
