@@ -120,9 +120,13 @@ class Server:
         if not self.port:
             with socket.create_server(("127.0.0.1", 0)) as free:
                 self.port = free.getsockname()[1]
-        words = [sys.executable, "-c", SERVER, str(self.data), str(self.port), "real" if self.real else "fake"]
-        self.process = subprocess.Popen([*words, json.dumps(self.settings)], env=self.environment(), cwd=ROOT)
+        self.process = self.begin()
         until(lambda: self._answers(), 120)
+
+    def begin(self) -> subprocess.Popen:
+        """Its process, which will answer."""
+        words = [sys.executable, "-c", SERVER, str(self.data), str(self.port), "real" if self.real else "fake"]
+        return subprocess.Popen([*words, json.dumps(self.settings)], env=self.environment(), cwd=ROOT)
 
     def workers(self, *names: str) -> list[psutil.Process]:
         """Its running workers whose command line holds one of the names."""

@@ -20,10 +20,12 @@ from app.errors import Unavailable
 from app.process import started_at
 from app.settings import Settings
 from tests.app.conftest import Running
+from tests.app.served import serve_fakes
+from tests.forked import Forked
 from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.both_databases
-
+about_workers = pytest.mark.both_databases(quick=False)  # rather than rows: which database it is matters little
 
 STAGES = ["segment", "generate", "align", "synthesize", "warp", "export"]
 
@@ -78,6 +80,7 @@ def test_a_bundle_that_a_restored_database_does_not_know_is_not_written_over(web
     assert unknown.read_bytes() == b"made after the database was copied"
 
 
+@about_workers
 def test_the_worker_is_given_the_clicks_and_corrections_of_the_moment(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
@@ -90,6 +93,7 @@ def test_the_worker_is_given_the_clicks_and_corrections_of_the_moment(web: Runni
     assert [o["name"] for o in json.loads((given / "prompts.json").read_text())["objects"]] == ["drawer_1", "mug_1"]
 
 
+@about_workers
 def test_a_failed_stage_says_why_and_its_log_can_be_read_and_it_can_be_retried(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, align="fail")
@@ -109,6 +113,7 @@ def test_a_failed_stage_says_why_and_its_log_can_be_read_and_it_can_be_retried(w
     web.post(f"/api/jobs/{again['id']}/retry", status=409)
 
 
+@about_workers
 def test_a_worker_that_dies_is_a_failure_in_one_line(web: Running) -> None:
     project = web.sample()
     behave(web, project, generate="crash")
@@ -119,6 +124,7 @@ def test_a_worker_that_dies_is_a_failure_in_one_line(web: Running) -> None:
     assert job["attempts"] == web.settings.job_attempts
 
 
+@about_workers
 def test_a_worker_that_dies_once_is_replaced_by_itself(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, generate="hang")
@@ -133,6 +139,7 @@ def test_a_worker_that_dies_once_is_replaced_by_itself(web: Running) -> None:
     assert "taken up again" in str(web.get(f"/api/jobs/{job}/events"))
 
 
+@about_workers
 def test_a_job_waits_for_memory_and_says_so(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
@@ -142,12 +149,14 @@ def test_a_job_waits_for_memory_and_says_so(start: Callable[..., Any]) -> None:
         assert web.post(f"/api/jobs/{job}/cancel")["state"] == "cancelled"
 
 
+@about_workers
 def test_a_worker_that_is_done_but_does_not_leave_is_done(web: Running) -> None:
     project = web.sample()
     behave(web, project, generate="lingers")
     assert web.job(run(web, project), "done", "failed")["error"] is None
 
 
+@about_workers
 def test_cancelling_answers_before_the_worker_stops_and_stops_a_deaf_one_too(web: Running) -> None:
     for behaviour in ("hang", "deaf"):  # a deaf one ignores SIGTERM
         project = web.sample()
@@ -217,6 +226,7 @@ def test_asking_twice_for_the_same_run_is_asking_once(web: Running) -> None:
     web.post(f"/api/jobs/{job}/cancel")
 
 
+@about_workers
 def test_a_run_needs_a_click_and_known_backends(web: Running) -> None:
     project = web.sample()
     assert web.post(f"/api/projects/{project}/run", {"matcher": "magic"}, 422)["kind"] == "input"
@@ -225,6 +235,7 @@ def test_a_run_needs_a_click_and_known_backends(web: Running) -> None:
     assert web.post(f"/api/projects/{project}/run", {}, 422)["kind"] == "prompt"
 
 
+@about_workers
 def test_deleting_a_project_stops_its_job(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, generate="hang")
@@ -250,6 +261,7 @@ def test_a_job_that_is_deleted_while_it_runs_is_stopped_and_the_queue_goes_on(we
     web.until(lambda: not _alive(worker))
 
 
+@about_workers
 def test_a_job_goes_on_when_nobody_can_be_told_how_far_it_is(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     def busy(*_: object) -> None:
         raise Unavailable("the database does not answer")
@@ -260,6 +272,7 @@ def test_a_job_goes_on_when_nobody_can_be_told_how_far_it_is(web: Running, monke
     assert web.job(run(web, project), "done", "failed")["state"] == "done"
 
 
+@about_workers
 def test_stopping_the_server_in_order_puts_the_job_back_into_the_queue(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
@@ -304,6 +317,7 @@ def test_a_job_that_lost_its_server_too_often_fails_with_the_reason(start: Calla
         assert (job["state"], job["error"]["kind"]) == ("failed", "interrupted")
 
 
+@about_workers
 def test_a_job_that_lost_servers_survives_the_loss_of_a_process_too(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
@@ -322,17 +336,6 @@ def test_a_job_that_lost_servers_survives_the_loss_of_a_process_too(start: Calla
         assert web.job(job.id or 0, "done", "failed")["state"] == "done"
 
 
-SERVER = """
-import sys, uvicorn
-from pathlib import Path
-from app.main import create_app
-from app.settings import Settings
-from tests.app.conftest import FAKE_COMMANDS
-settings = Settings(data_dir=Path(sys.argv[1]), min_free_bytes=0, job_memory_bytes=0, launch_token="t")
-uvicorn.run(create_app(settings, commands=FAKE_COMMANDS), port=0, log_level="error")
-"""
-
-
 def test_a_server_killed_outright_loses_no_click_and_the_next_one_goes_on(start: Callable[..., Any], tmp_path: Path) -> None:
     with start() as web:
         project = web.sample()
@@ -341,8 +344,11 @@ def test_a_server_killed_outright_loses_no_click_and_the_next_one_goes_on(start:
     engine = open_engine(settings.rows)
     with writing(engine) as session:
         session.add(Job(project_id=project, kind="run", state="queued", created=time.time()))
-    with ended([sys.executable, "-c", SERVER, str(settings.data_dir)], cwd=Path(__file__).parents[2]):
+    server = Forked(serve_fakes, settings.data_dir)
+    try:
         Running.until(lambda: (folder / "hanging").exists())
+    finally:
+        server.kill()
     with writing(engine) as session:
         (job,) = session.exec(select(Job).where(Job.kind == "run"))
         was, worker = job.state, job.worker_pid

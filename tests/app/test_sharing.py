@@ -1,9 +1,6 @@
 """The objects of a stage at several seats: each once, together what one seat makes, and what becomes of them when one ends."""
 
 import contextlib
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +15,9 @@ from app.jobs.parts import TRIES, PartRows, fair_share
 from tests.app.conftest import Running, running
 from tests.app.object_server import REQUIRED
 from tests.app.postgres import PostgresServer
+from tests.app.served import take_jobs
 from tests.app.test_jobs import behave, run
+from tests.forked import Forked
 from tests.waiting import FACTOR
 
 SHARED = {"segment": "objects", "generate": "objects"}
@@ -210,34 +209,19 @@ def test_a_server_that_stops_leaves_no_process_and_the_next_goes_on(tmp_path: Pa
         assert web.job(job, "done", "failed")["state"] == "done"
 
 
-SEAT = """
-import sys, threading
-from pathlib import Path
-from app.settings import Settings
-from app.work import run_jobs
-from tests.app.conftest import FAKE_COMMANDS
-from tests.app.test_sharing import FREE, QUICK
-quick = {**FREE, **QUICK, "min_free_bytes": 0, "job_memory_bytes": 0}
-run_jobs(Settings(data_dir=Path(sys.argv[1]), **quick), FAKE_COMMANDS, threading.Event())
-"""
-
-
 @contextmanager
-def seat(web: Running, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+def seat(web: Running, folder: Path) -> Iterator[Forked]:
     """`r2c2r work` in a process and on a data folder of its own, that takes jobs."""
     folder.mkdir()
-    places = {"R2C2R_DATABASE": web.settings.postgres, "R2C2R_STORE": web.settings.store}
-    with subprocess.Popen(
-        [sys.executable, "-c", SEAT, str(folder)], env={**os.environ, **places}, stdout=subprocess.PIPE
-    ) as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        try:
-            yield process
-        finally:
-            with contextlib.suppress(psutil.Error):
-                for each in [*psutil.Process(process.pid).children(recursive=True), process]:
-                    each.kill()
+    process = Forked(take_jobs, folder, {"postgres": web.settings.postgres, "store": web.settings.store, **FREE, **QUICK})
+    try:
+        process.readline()
+        yield process
+    finally:
+        with contextlib.suppress(psutil.Error):
+            for each in psutil.Process(process.pid).children(recursive=True):
+                each.kill()
+        process.kill()
 
 
 @pytest.fixture
@@ -251,7 +235,7 @@ def served(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[Running]
     postgres_server.drop_all()
 
 
-def held_at(web: Running, one: subprocess.Popen[bytes], two: subprocess.Popen[bytes]) -> tuple[int, dict[int, Path]]:
+def held_at(web: Running, one: Forked, two: Forked) -> tuple[int, dict[int, Path]]:
     """A job of which each of both seats holds an object; and the project's folder at each, by its process."""
     project, _ = held(web, *NAMES)
     web.context.store.keep(project)
