@@ -2,15 +2,18 @@
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from sqlmodel import select
 
 from app.db.engine import opened, reading
 from app.db.tables import Account, Project, Webhook
+from r2c2r_core.cli import _parser
 from tests.app.object_server import BUCKET, object_server
 from tests.app.people import PASSWORD
 from tests.app.postgres import PostgresServer, programs
@@ -49,6 +52,16 @@ def lines() -> list[str]:
     return [line for block in re.findall(r"^```bash\n(.*?)^```$", PAGE.read_text(), re.M | re.S) for line in block.splitlines()]
 
 
+def test_every_command_of_the_page_is_understood() -> None:
+    commands = [line for line in lines() if "r2c2r " in line]
+    given = [found[1] for line in commands if (found := re.search(r"(?:^|\()r2c2r ([^)]*)", line))]
+    assert len(given) > 10
+    for words in given:
+        known = _parser().parse_args(shlex.split(words.replace("$project", "project")))
+        assert callable(known.command), words
+
+
+@pytest.mark.slow
 def test_every_line_of_the_page_does_what_it_says(
     provider: Identities,  # noqa: F811
     postgres_server: PostgresServer,
