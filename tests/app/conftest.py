@@ -211,8 +211,9 @@ def _note_where_asked(connection: Connection) -> None:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Tests that start the app run on SQLite, and on Postgres too where its outcome could differ."""
     starts = "start" in metafunc.fixturenames or hasattr(metafunc.module, "running")
-    if starts and any(metafunc.definition.iter_markers("both_databases")):
-        metafunc.parametrize("rows_in", ["sqlite", "postgres"], indirect=True)
+    if starts and (wanted := metafunc.definition.get_closest_marker("both_databases")):
+        marks = () if wanted.kwargs.get("quick", True) else (pytest.mark.slow,)
+        metafunc.parametrize("rows_in", ["sqlite", pytest.param("postgres", marks=marks)], indirect=True)
 
 
 @pytest.fixture(scope="session")

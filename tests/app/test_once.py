@@ -180,6 +180,7 @@ def test_keys_are_forgotten_after_a_while_and_with_their_project(
     assert _kept(web) == 0
 
 
+@pytest.mark.both_databases(quick=False)
 def test_whatever_may_be_sent_again_changes_nothing_the_second_time(start: Callable[..., Any], tmp_path: Path) -> None:
     viewer = Viewer(Settings(data_dir=tmp_path / "data", **PATIENT), fake("viewer"))
     with start(viewer=viewer) as web:

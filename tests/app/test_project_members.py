@@ -64,6 +64,7 @@ def about(kept: Kept) -> list[tuple[str, str, str]]:
     return found
 
 
+@pytest.mark.both_databases(quick=False)
 def test_every_operation_about_the_project_is_not_found_by_others(kept: Kept) -> None:
     assert kept.keep_to("bob").json()["members"] == ["bob"]
     operations = about(kept)
@@ -78,6 +79,7 @@ def test_every_operation_about_the_project_is_not_found_by_others(kept: Kept) ->
         assert kept.of[name].get(f"/api/jobs/{kept.jobs[0]}").status_code == 200
 
 
+@pytest.mark.both_databases(quick=False)
 def test_lists_and_pages_do_not_tell_of_it(kept: Kept) -> None:
     kept.keep_to("bob")
     for name, seen in (("alice", 1), ("bob", 1), ("root", 1), ("carol", 0)):
@@ -89,6 +91,7 @@ def test_lists_and_pages_do_not_tell_of_it(kept: Kept) -> None:
         assert (f"/media/{kept.project}" in page.text) == bool(seen)
 
 
+@pytest.mark.both_databases(quick=False)
 def test_live_connections_tell_members_only(kept: Kept) -> None:
     address, sockets = f"{SOCKETS}/api/live?project={kept.project}", {"headers": {"origin": ORIGIN}}
     with (
@@ -110,6 +113,7 @@ def test_live_connections_tell_members_only(kept: Kept) -> None:
         assert not {"comments", "job"} & set(until_last(carol))
 
 
+@pytest.mark.both_databases(quick=False)
 def test_who_is_at_a_project_and_loses_sight_of_it_is_told(kept: Kept) -> None:
     address, sockets = f"{SOCKETS}/api/live?project={kept.project}", {"headers": {"origin": ORIGIN}}
 
@@ -137,6 +141,7 @@ def test_who_is_at_a_project_and_loses_sight_of_it_is_told(kept: Kept) -> None:
         assert message["project"] == kept.project
 
 
+@pytest.mark.both_databases(quick=False)
 def test_who_is_at_a_project_that_is_deleted_is_told(kept: Kept) -> None:
     with kept.of["carol"].websocket_connect(f"{SOCKETS}/api/live?project={kept.project}", headers={"origin": ORIGIN}) as carol:
         assert kept.of["root"].delete(f"/api/projects/{kept.project}").status_code == 200
@@ -145,6 +150,7 @@ def test_who_is_at_a_project_that_is_deleted_is_told(kept: Kept) -> None:
         assert (message["project"], message["why"]) == (kept.project, "was put into the trash")
 
 
+@pytest.mark.both_databases(quick=False)
 def test_a_3d_view_that_was_open_is_closed_to_who_may_not_look_any_more(kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
     kept.keep_to("bob")
     monkeypatch.setattr(type(kept.web.context.viewer), "project_of", lambda _, token: kept.project)
@@ -157,6 +163,7 @@ def test_a_3d_view_that_was_open_is_closed_to_who_may_not_look_any_more(kept: Ke
     assert closed.value.code == 4404
 
 
+@pytest.mark.both_databases(quick=False)
 def test_naming_members_closes_the_3d_views_of_others_only(kept: Kept) -> None:
     project, viewer = kept.project, kept.web.context.viewer
     sessions = {name: next(iter(kept.of[name].cookies.values())) for name in PEOPLE}
@@ -178,6 +185,7 @@ def test_only_the_owner_and_admins_name_members(kept: Kept) -> None:
     assert history[0]["text"] == "only its owner and bob see it"
 
 
+@pytest.mark.both_databases(quick=False)
 def test_a_project_is_open_until_members_are_named_and_opens_again(kept: Kept) -> None:
     for change in ((), (True,), (False,)):
         if change:

@@ -88,6 +88,7 @@ def test_undoing_a_deletion_whose_name_was_taken_says_so(web: Running) -> None:
     assert "drawer_1" in error["message"]
 
 
+@pytest.mark.both_databases(quick=False)
 def test_points_move_flip_and_go(web: Running) -> None:
     project = web.sample()
     made = web.get(f"/api/projects/{project}/objects")[0]
@@ -98,6 +99,7 @@ def test_points_move_flip_and_go(web: Running) -> None:
     web.delete(f"{base}/points/{point}", 404)
 
 
+@pytest.mark.both_databases(quick=False)
 def test_a_click_outside_the_recording_is_refused_in_one_line(web: Running) -> None:
     project = web.sample()
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
@@ -108,6 +110,7 @@ def test_a_click_outside_the_recording_is_refused_in_one_line(web: Running) -> N
     assert len(web.get(f"/api/projects/{project}/objects")[0]["points"]) == 1
 
 
+@pytest.mark.both_databases(quick=False)
 def test_names_are_unique_and_usable_in_simulators(web: Running) -> None:
     project = web.sample()
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
@@ -125,6 +128,7 @@ def test_an_old_version_is_a_conflict_that_shows_what_is_stored(web: Running) ->
     assert (error["kind"], error["current"]["category"]) == ("conflict", "oven")
 
 
+@pytest.mark.both_databases(quick=False)
 def test_a_category_of_ones_own_is_kept_with_a_notice(web: Running) -> None:
     project = web.sample()
     made = web.post(f"/api/projects/{project}/objects", {"category": "  tea   towel "}, 201)
@@ -132,6 +136,7 @@ def test_a_category_of_ones_own_is_kept_with_a_notice(web: Running) -> None:
     assert any("tea towel" in notice for notice in made["notices"])
 
 
+@pytest.mark.both_databases(quick=False)
 def test_what_people_call_things_is_offered_and_says_what_it_is_taken_for(web: Running) -> None:
     offered = {entry["name"]: (entry["label"], entry["joint"]) for entry in web.get("/api/system")["categories"]}
     for name in ("drawer", "bottle", "mug", "chair"):
@@ -144,6 +149,7 @@ def test_what_people_call_things_is_offered_and_says_what_it_is_taken_for(web: R
         assert web.post(f"/api/projects/{project}/objects", {"category": name}, 201)["notices"] == []
 
 
+@pytest.mark.both_databases(quick=False)
 def test_prompts_file_goes_out_and_in(web: Running) -> None:
     project = web.sample()
     file = web.get(f"/api/projects/{project}/prompts.json")
@@ -208,6 +214,7 @@ def test_what_is_said_of_a_frame_is_stored_exported_undone_and_taken_back(web: R
     put(3, {**mask, "runs": [1]}, 422)
 
 
+@pytest.mark.both_databases(quick=False)
 def test_a_mask_of_other_proportions_than_its_frame_is_refused(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
@@ -220,6 +227,7 @@ def test_a_mask_of_other_proportions_than_its_frame_is_refused(web: Running) -> 
     web.post(f"{at}/prompts.json", {"version": 2, "objects": [entry]}, 422)
 
 
+@pytest.mark.both_databases(quick=False)
 def test_what_is_said_of_a_frame_that_the_recording_lacks_is_neither_imported_nor_kept_for_good(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"

@@ -92,6 +92,7 @@ def finished(web: Running, monkeypatch: pytest.MonkeyPatch) -> tuple[Running, st
     return web, project, web.get(f"/api/projects/{project}/objects")[0]["id"]
 
 
+@pytest.mark.both_databases(quick=False)
 def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_is_more(
     finished: tuple[Running, str, int],
 ) -> None:
@@ -115,6 +116,7 @@ def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_i
     assert {path: size for path, (_, size) in after.items() if size > MOST_BYTES} == {}
 
 
+@pytest.mark.both_databases(quick=False)
 def test_no_question_reads_what_events_replaced_nor_the_events_to_say_what_stands(finished: tuple[Running, str, int]) -> None:
     """A list of objects says what can be undone, the history who did what: neither reads a state, neither replays."""
     web, project, item = finished
@@ -143,6 +145,7 @@ ONE_WORD = re.compile(r"JSON_EXTRACT\([^)]*\)|events\.(before|after) ->> ")  # o
 QUEUE = {"/api/projects": 1, "/api/jobs": 1}  # once something waits, its place among all that do is looked up
 
 
+@pytest.mark.both_databases(quick=False)
 def test_what_is_sent_as_it_is_stored_is_what_its_schema_says(finished: tuple[Running, str, int]) -> None:
     web, project, item = finished
     grow(web, project)
