@@ -15,7 +15,8 @@ from r2c2r_core.config import ReconstructConfig
 from r2c2r_core.tuning import modules_with_numbers, params_of
 
 ROOT = Path(__file__).resolve().parent.parent
-pytestmark = pytest.mark.skipif(importlib.util.find_spec("mkdocs") is None, reason="pip install --group dev")
+without_mkdocs = pytest.mark.skipif(importlib.util.find_spec("mkdocs") is None, reason="pip install --group dev")
+SHOWN = re.compile(r'^ *--8<-- "([^":]+)(?::(\w+))?"$', re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +49,8 @@ def settings_of(config: object, path: str = "") -> list[tuple[str, str]]:
     return found
 
 
+@pytest.mark.slow
+@without_mkdocs
 def test_every_setting_stands_in_the_documentation(site: Path) -> None:
     sections = re.split(r"<h3 id=\"[^\"]*\">", (site / "settings.html").read_text())
     by_name = {section.partition("<a ")[0]: section for section in sections[1:]}
@@ -55,6 +58,8 @@ def test_every_setting_stands_in_the_documentation(site: Path) -> None:
     assert missing == []
 
 
+@pytest.mark.slow
+@without_mkdocs
 def test_every_page_is_reached_and_asks_nothing_of_other_hosts(site: Path) -> None:
     start = (site / "index.html").read_text()
     pages = [p for p in site.rglob("*.html") if p.name != "404.html"]
@@ -65,6 +70,8 @@ def test_every_page_is_reached_and_asks_nothing_of_other_hosts(site: Path) -> No
         assert loaded == [], page
 
 
+@pytest.mark.slow
+@without_mkdocs
 def test_files_of_the_checkout_stand_in_their_pages(site: Path) -> None:
     """A marker that is misspelt is printed as it stands, without a warning: every page has what it includes."""
     for page in (ROOT / "docs").rglob("*.md"):
@@ -76,7 +83,17 @@ def test_files_of_the_checkout_stand_in_their_pages(site: Path) -> None:
     assert "def main" in re.sub(r"<[^>]*>", "", (site / "how-to" / "python.html").read_text())
 
 
+@pytest.mark.slow
+@without_mkdocs
 def test_the_reference_has_the_docstrings(site: Path) -> None:
     reference = (site / "reference.html").read_text()
     assert "Turn one RGB-D recording into an articulated scene" in reference
     assert "world_from_mesh = world_from_camera @ camera_from_mesh" in reference
+
+
+def test_what_a_page_shows_of_the_checkout_is_there() -> None:
+    shown = [found for page in (ROOT / "docs").rglob("*.md") for found in SHOWN.findall(page.read_text())]
+    assert len(shown) > 5
+    for name, section in shown:
+        text = (ROOT / name).read_text()
+        assert not section or text.count(f"[start:{section}]") == text.count(f"[end:{section}]") == 1, (name, section)
