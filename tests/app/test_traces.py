@@ -1,7 +1,5 @@
-"""Traces of requests and stages, taken where a setting says so, with OpenTelemetry imported only then."""
+"""Traces of requests and stages, taken where a setting says so; tests/test_architecture.py: imported only then."""
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -46,14 +44,6 @@ def test_requests_and_the_stages_of_jobs_are_traced(tmp_path: Path) -> None:
     assert all(jobs[span.parent.span_id].attributes["job"] == span.attributes["job"] for span in stages)
     assert [span.name for span in stages if not span.status.is_unset] == ["stage generate"]
     assert asked.resource.attributes["service.name"] == "r2c2r"
-
-
-def test_nothing_that_takes_traces_is_imported_unless_it_is_asked_for() -> None:
-    program = "import sys, app.main, app.work; print([name for name in sys.modules if name.startswith('opentelemetry.')])"
-    said = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout
-    assert "opentelemetry.trace" in said  # the interface, by FastAPI
-    assert "opentelemetry.sdk" not in said
-    assert "opentelemetry.exporter" not in said
 
 
 def test_another_kind_of_traces_is_refused_in_one_line() -> None:
