@@ -217,7 +217,9 @@ def test_a_neighbours_masks_are_drawn_anew_and_every_tab_hears_why(panels: Calla
             web.until(lambda: spans(web, project, number, second["id"]) == [(0, 40), (40, 80)])
 
 
-@pytest.mark.parametrize("change", ["delete", "undo", "move", "remove", "thing"])
+@pytest.mark.parametrize(
+    "change", ["delete", "undo", *(pytest.param(other, marks=pytest.mark.slow) for other in ("move", "remove", "thing"))]
+)
 def test_a_front_is_whole_again_also_where_the_server_was_started_anew_meanwhile(
     panels: Callable[..., Any], change: str
 ) -> None:

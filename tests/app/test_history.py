@@ -154,29 +154,31 @@ def whole(session: Session, scope: history.Scope) -> Any:
     return {"override": corrected, "verdicts": [{"candidate": k.split()[1], **v} for k, v in flat.items() if k[0] == "v"]}
 
 
-def test_an_old_history_becomes_differences_that_undo_step_by_step_and_goes_back_to_what_it_was(tmp_path: Path) -> None:
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 6))])
+def test_an_old_history_becomes_differences_that_undo_step_by_step_and_goes_back_to_what_it_was(
+    tmp_path: Path, seed: int
+) -> None:
     scopes: tuple[history.Scope, ...] = ("prompts", "review")
-    for seed in range(6):
-        path = tmp_path / f"{seed}.db"
-        old = old_database(path, seed)
-        stored = events(path)
-        engine = open_engine(path)
-        with writing(engine) as session:
-            item = session.get_one(SceneObject, 1)
-            for scope in scopes:
-                steps = history.steps(session, "p", scope).get(1, history.Steps())
-                assert steps == (bool(old.done[scope]), bool(old.undone[scope]))
-                assert whole(session, scope) == old.states[scope]
-                for number, before in zip(reversed(old.done[scope]), reversed(old.past[scope]), strict=True):
-                    assert history.undo(session, item, scope, who="eve").id == number
-                    assert whole(session, scope) == before
-                for number in old.done[scope] + old.undone[scope][::-1]:
-                    redone = history.redo(session, item, scope, who="eve")
-                    assert (redone.id, whole(session, scope)) == (number, old.events[number - 1][9])
-            session.rollback()
-        engine.dispose()
-        go_down(path)
-        assert events(path) == stored
+    path = tmp_path / f"{seed}.db"
+    old = old_database(path, seed)
+    stored = events(path)
+    engine = open_engine(path)
+    with writing(engine) as session:
+        item = session.get_one(SceneObject, 1)
+        for scope in scopes:
+            steps = history.steps(session, "p", scope).get(1, history.Steps())
+            assert steps == (bool(old.done[scope]), bool(old.undone[scope]))
+            assert whole(session, scope) == old.states[scope]
+            for number, before in zip(reversed(old.done[scope]), reversed(old.past[scope]), strict=True):
+                assert history.undo(session, item, scope, who="eve").id == number
+                assert whole(session, scope) == before
+            for number in old.done[scope] + old.undone[scope][::-1]:
+                redone = history.redo(session, item, scope, who="eve")
+                assert (redone.id, whole(session, scope)) == (number, old.events[number - 1][9])
+        session.rollback()
+    engine.dispose()
+    go_down(path)
+    assert events(path) == stored
 
 
 def test_results_that_were_current_stay_so_in_both_directions(tmp_path: Path) -> None:

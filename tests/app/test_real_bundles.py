@@ -142,6 +142,7 @@ def test_an_object_downloaded_alone_loads_with_its_texture(made: tuple[Running, 
     assert web.client.get(f"/media/{project}/bundles/2/objects/fridge.zip").json()["kind"] == "not-found"
 
 
+@pytest.mark.slow
 def test_variants_are_made_of_it_again_the_same_and_load(made: tuple[Running, str], tmp_path: Path) -> None:
     import mujoco
 
