@@ -54,6 +54,7 @@ def test_clicking_and_cutting(run: Run, sample: SamplePaths, tmp_path: Path) -> 
     assert (tmp_path / "cut.png").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_the_candidates_of_one_object(run: Run, sample: SamplePaths, tmp_path: Path) -> None:
     drawer = next(found.name for found in read_prompts(sample.prompts).objects if found.category == "drawer")
     said = run("candidates", sample.scan, sample.prompts, drawer, tmp_path)

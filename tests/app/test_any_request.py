@@ -15,7 +15,7 @@ def benchmarks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(BENCHMARKS)
 
 
-@pytest.mark.parametrize(("every", "least"), [(8, 10), pytest.param(1, 100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("every", "least"), [(8, 10), pytest.param(1, 50, marks=pytest.mark.slow)])
 def test_no_operation_ends_in_a_server_error(
     tmp_path: Path, kitchen_bundle: tuple[Path, Certificate], every: int, least: int
 ) -> None:
