@@ -33,6 +33,7 @@ def main() -> int:
     if REQUIRED and not_run:
         sys.stderr.write(f"required here but not possible: {', '.join(not_run)}\n")
         return 1
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of processes start: each would compile all it imports
     arguments = sys.argv[1:]
     slow = "--slow" in arguments
     passes = [

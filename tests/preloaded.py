@@ -5,11 +5,13 @@ from tempfile import TemporaryDirectory
 
 from starlette.testclient import TestClient
 
+import tests.app.served
 import tests.browser.stand_in
 from app.main import create_app
 from app.settings import Settings
 
 with TemporaryDirectory() as folder:  # the first request builds what every route needs
+    assert tests.app.served
     assert tests.browser.stand_in
     assert (
         TestClient(create_app(Settings(data_dir=Path(folder))), base_url="http://127.0.0.1")
