@@ -10,11 +10,8 @@ import tests.browser.stand_in
 from app.main import create_app
 from app.settings import Settings
 
+assert tests.app.served
+assert tests.browser.stand_in
 with TemporaryDirectory() as folder:  # the first request builds what every route needs
-    assert tests.app.served
-    assert tests.browser.stand_in
-    assert (
-        TestClient(create_app(Settings(data_dir=Path(folder))), base_url="http://127.0.0.1")
-        .get("/static/js/main.js")
-        .is_success
-    )
+    browser = TestClient(create_app(Settings(data_dir=Path(folder))), base_url="http://127.0.0.1")
+    assert browser.get("/static/js/main.js").is_success

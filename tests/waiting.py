@@ -11,6 +11,7 @@ PATIENCE_S = 180 * FACTOR
 """Seconds until a test gives up waiting for what should happen: nothing that works comes near it."""
 PATIENCE_MS = 1000 * PATIENCE_S
 LOOK_S = 0.02  # between two looks at a condition, at least
+LONGEST_S = 0.5  # and at most
 REST = 3  # times as long as a look took: what is waited for needs the processor more than who waits
 
 
@@ -21,7 +22,7 @@ def until(condition: Callable[[], object], said: str = "what was waited for did 
     while not condition():
         looked = time.monotonic()
         assert looked < deadline, said
-        time.sleep(max(LOOK_S, REST * (looked - began)))
+        time.sleep(min(max(LOOK_S, REST * (looked - began)), LONGEST_S))
         began = time.monotonic()
 
 
