@@ -20,6 +20,8 @@ TWO_WORKERS = ("-n", "2", "--dist", "worksteal")  # half of the tests each, then
 WITHOUT_BROWSER = ("not browser", "--ignore=tests/browser")  # what is ignored is not even imported
 WITH_BROWSER = ("browser", "--ignore=tests/app", "--ignore=tests/core")
 PASSED, FAILED, NOTHING_RAN = 0, 1, 5  # exit codes of pytest
+MEMORY = Path("/dev/shm")  # files of tests are put there: a disk is waited for at every transaction
+MIN_MEMORY_B = 4 << 30  # free; a run takes 1 GB
 MAX_RERUN = 20  # tests; more failures than that are no accident of timing
 
 
@@ -34,6 +36,8 @@ def main() -> int:
         sys.stderr.write(f"required here but not possible: {', '.join(not_run)}\n")
         return 1
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of processes start: each would compile all it imports
+    if MEMORY.is_dir() and shutil.disk_usage(MEMORY).free > MIN_MEMORY_B:
+        os.environ.setdefault("TMPDIR", str(MEMORY))
     arguments = sys.argv[1:]
     slow = "--slow" in arguments
     passes = [
