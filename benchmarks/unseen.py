@@ -71,6 +71,8 @@ def row_of(outcome: Outcome, truth: Sequence[dict[str, Any]], overlaps: dict[str
     largest = {name: max(sides) for name, sides in errors.items()}
     joints = {item["name"]: joint_right(found.get(item["name"], {})) for item in truth if item["joint"]}
     usable = [name for name in errors if largest[name] <= USABLE_PERCENT and joints.get(name, True)]
+    named = {name for name in errors if name in outcome.doubted or name not in outcome.present}  # what is missing is said
+    wrong = [name for name in errors if name not in usable]
     category = {item["name"]: item["category"] for item in truth}
     return {
         "objects": len(errors),
@@ -92,8 +94,10 @@ def row_of(outcome: Outcome, truth: Sequence[dict[str, Any]], overlaps: dict[str
         },
         "far_off": [name for name in errors if largest[name] > FAR_OFF_PERCENT],
         "certified": outcome.certified,
+        "wrong_flagged": f"{len(named.intersection(wrong))} of {len(wrong)}",
+        "right_flagged": f"{len(named.intersection(usable))} of {len(usable)}",
         "cpu_minutes": round(outcome.cost.cpu_s / 60, 1),
-        "wrong": {name: _failing(errors[name], joints.get(name, True)) for name in errors if name not in usable},
+        "wrong": {name: _failing(errors[name], joints.get(name, True)) for name in wrong},
     }
 
 
@@ -131,14 +135,15 @@ def _value(metrics: dict[str, Any], name: str) -> float | None:
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """As Markdown; w, d and h are width, depth and height in percent."""
-    heads = ("kitchen", "usable", "median %", "worst %", "joints", "masks", "certified", "wrong")
+    heads = ("kitchen", "usable", "median %", "worst %", "joints", "masks", "certified", "wrong told", "right told", "wrong")
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for name, row in rows.items():
         wrong = ", ".join(f"{key} ({what})" for key, what in row["wrong"].items())
         masks = ", ".join(f"{kind}s {share}" for kind, share in row["mask_iou"].items())
         share = f"{row['usable']} of {row['objects']}"
         certified = "yes" if row["certified"] else "no"
-        figures = (share, row["median_percent"], row["worst_percent"], row["joints_right"], masks, certified, wrong)
+        named = (row.get("wrong_flagged", "–"), row.get("right_flagged", "–"))
+        figures = (share, row["median_percent"], row["worst_percent"], row["joints_right"], masks, certified, *named, wrong)
         lines.append(f"| {name} | {' | '.join(str(figure) for figure in figures)} |")
     return "\n".join(lines)
 

@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,12 @@ class Outcome:
     cost: Cost
     certified: bool
     evaluation: dict[str, Any] | None  # what `r2c2r evaluate --json` writes; None where there is no bundle
+    doubted: frozenset[str] = frozenset()  # objects of the bundle that the certificate's likeness names
+    present: frozenset[str] = frozenset()  # objects of the bundle
 
 
 def whole_way(recording: Path, prompts: Path, truth: Path, work: Path) -> Outcome:
-    """Run the commands; `work` is emptied before, and keeps bundle.zip, run.log and evaluation.json."""
+    """Run the commands; `work` is emptied before, and keeps bundle.zip, run.log, certificate.json and evaluation.json."""
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
     bundle, masks, answer = work / "bundle.zip", work / "masks", work / "evaluation.json"
@@ -33,13 +36,26 @@ def whole_way(recording: Path, prompts: Path, truth: Path, work: Path) -> Outcom
     if not bundle.exists():
         print(f"{work.name}: no bundle (exit {cost.exit_code}); see {work / 'run.log'}", file=sys.stderr)
         return Outcome(cost=cost, certified=False, evaluation=None)
-    certified = _said("check", str(bundle)).returncode == 0
+    certified = _said("check", str(bundle), "--json", str(work / "certificate.json")).returncode == 0
     done = _said("evaluate", str(bundle), "--truth", str(truth), "--masks", str(masks), "--json", str(answer))
     if done.returncode != 0:
         print(f"{work.name}: {done.stderr.strip()}", file=sys.stderr)
         return Outcome(cost=cost, certified=certified, evaluation=None)
     (work / "evaluation.txt").write_text(done.stdout, encoding="utf-8")
-    return Outcome(cost=cost, certified=certified, evaluation=json.loads(answer.read_text(encoding="utf-8")))
+    likeness = _read(work / "certificate.json")["likeness"]
+    with zipfile.ZipFile(bundle) as archive:
+        manifest = json.loads(archive.read("manifest.json"))
+    return Outcome(
+        cost=cost,
+        certified=certified,
+        evaluation=_read(answer),
+        doubted=frozenset(doubt["object"] for doubt in likeness["doubts"]),
+        present=frozenset(item["name"] for item in manifest["objects"]),
+    )
+
+
+def _read(path: Path) -> Any:
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def _said(*words: str) -> subprocess.CompletedProcess[str]:

@@ -42,9 +42,17 @@ def certificate_text(certificate: Certificate) -> str:
         *(f"{finding.severity}: {finding.rule}: {finding.where}: {finding.message}" for finding in certificate.findings),
         f"deepest contact at rest {1000 * certificate.rest_penetration_m:.2f} mm, drift {1000 * certificate.drift_m:.2f} mm, "
         f"{certificate.realtime_factor:.0f} x real time",
-        f"certificate {'passed' if certificate.passed else 'FAILED'}",
+        verdict(certificate),
     ]
     return shown("\n".join(lines))
+
+
+def verdict(certificate: Certificate) -> str:
+    """Both verdicts in a line: whether the scene moves as it should, and whether it looks like what was filmed."""
+    likeness = certificate.likeness
+    look_at = f" (look at {', '.join(name for name, _ in likeness.doubts)})" if likeness.doubts else ""
+    state = "FAILED" if likeness.state == "failed" else likeness.state
+    return f"certificate {'passed' if certificate.passed else 'FAILED'}, likeness {state}{look_at}"
 
 
 def _speed(loader: LoaderResult) -> str:

@@ -139,12 +139,27 @@ class ThingVerdict(Shape):
     opening_free: float | None = None  # share of its hollow that no collider fills
 
 
+class Doubt(Shape):
+    """An object that may not be what was filmed, and why."""
+
+    object: str
+    why: str
+
+
+class Likeness(Shape):
+    """Whether the scene can be what was filmed: passed, doubtful or failed."""
+
+    state: str
+    doubts: list[Doubt]
+
+
 class Certificate(Shape):
     """The proof in the newest bundle."""
 
     version: int
     current: bool  # nothing was changed since
     passed: bool
+    likeness: Likeness | None = None  # of a bundle made before it was judged: null
     findings: list[Finding]
     loaders: list[LoaderVerdict]
     joints: list[JointVerdict]

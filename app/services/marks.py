@@ -27,8 +27,9 @@ def marks(
     bundle = queries.newest_bundle(session, project_id)
     findings = (bundle.certificate or {}).get("findings", []) if bundle else []
     found = [mark for item in items for mark in (*_axes(item), _box(item))] if name is not None else []
-    for finding in findings:
-        item = next((i for i in items if finding["where"] == i.name or finding["where"].startswith(f"{i.name}_")), None)
+    places = [(finding, where) for finding in findings for where in finding["where"].split(", ")]
+    for finding, where in places:
+        item = next((i for i in items if where == i.name or where.startswith(f"{i.name}_")), None)
         if item is not None and (name is not None or finding["severity"] == "error"):
             above = _LINE_M * sum(mark["colour"] == list(_FINDING) for mark in found)  # one object may have several
             found.append(_word(item.world_from_object.translation + np.array([0, 0, above]), finding["message"], _FINDING))

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from r2c2r_core.commands.options import Parsers, add_command, add_json, existing, write_json
+from r2c2r_core.commands.options import Parsers, add_command, add_json, add_strict, existing, write_json
 from r2c2r_core.errors import InputError
 from r2c2r_core.terminal import arm_text, certificate_text, gripper_text, show_progress
 
@@ -26,6 +26,7 @@ def add(parsers: Parsers) -> None:
         metavar="DIR",
         help="with --gripper or --arm: a film and a sheet of pictures of each go there, the arm's and its map into its arm/",
     )
+    add_strict(added)
     add_json(added)
 
 
@@ -57,4 +58,5 @@ def check(options: argparse.Namespace) -> int:
         print(f"\n{arm_text(arm)}")
     if options.json:
         write_json(options.json, found)
-    return 0 if certificate.passed and (gripped is None or gripped.passed) else 1
+    alike = not options.strict or certificate.likeness.state == "passed"
+    return 0 if certificate.passed and alike and (gripped is None or gripped.passed) else 1

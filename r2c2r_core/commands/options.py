@@ -50,6 +50,11 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON too")
 
 
+def add_strict(parser: argparse.ArgumentParser) -> None:
+    """--strict: a scene that may not be what was filmed is not good enough."""
+    parser.add_argument("--strict", action="store_true", help="exit 1 also where the likeness is doubtful or failed")
+
+
 def add_reading(parser: argparse.ArgumentParser) -> None:
     """--depth-scale, --register-depth: what mends a recording that `r2c2r info` finds fault with."""
     parser.add_argument(

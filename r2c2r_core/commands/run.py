@@ -10,9 +10,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from r2c2r_core.commands.options import Parsers, add_command, add_reading, existing, seed, whole, with_reading
+from r2c2r_core.commands.options import Parsers, add_command, add_reading, add_strict, existing, seed, whole, with_reading
 from r2c2r_core.errors import CaptureError, InputError
-from r2c2r_core.terminal import show_progress, table
+from r2c2r_core.terminal import show_progress, table, verdict
 from r2c2r_core.texts import shown
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def add(parsers: Parsers) -> None:
         "--workers", type=whole(0, 64), default=0, help="objects computed side by side; 0: as cores and memory allow"
     )
     added.add_argument("--masks", type=Path, help="write DIR/<object>/<frame:06d>.png")
+    add_strict(added)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -57,6 +58,7 @@ def run(options: argparse.Namespace) -> int:
         seed=options.seed,
         workers=options.workers,
         masks=options.masks,
+        strict=options.strict,
     )
     return 0 if passed else 1
 
@@ -74,8 +76,11 @@ def write_bundle(
     seed: int = 0,
     workers: int = 0,
     masks: Path | None = None,
+    strict: bool = False,
 ) -> bool:
     """Reconstruct, say what came out, and copy the bundle there; whether it is certified and complete.
+
+    With `strict` its likeness must have passed too.
 
     `tools` are names of backends by seam: segmenter, generator, matcher; `fixtures` wins over the configuration's.
     """
@@ -120,8 +125,9 @@ def write_bundle(
         print(shown(f"r2c2r: {line}"), file=sys.stderr)
     for name, reason in outcome.failures.items():
         print(shown(f"r2c2r: {name} is not in the bundle: {reason}"), file=sys.stderr)
-    print(f"{destination}: certificate {'passed' if outcome.certificate.passed else 'FAILED'}")
-    return outcome.certificate.passed and not outcome.failures
+    print(shown(f"{destination}: {verdict(outcome.certificate)}"))
+    alike = not strict or outcome.certificate.likeness.state == "passed"
+    return outcome.certificate.passed and alike and not outcome.failures
 
 
 def _warn(capture: Path, doubts: "Doubts") -> None:

@@ -10,6 +10,7 @@ from r2c2r_core.export.loaders import EVERY_LOADER, try_loaders
 from r2c2r_core.export.openings import NEEDED_OPENING, opening_free
 from r2c2r_core.export.reading import Urdf, read_urdf
 from r2c2r_core.export.rules.files import BundleFiles
+from r2c2r_core.export.rules.likeness import judge_likeness
 from r2c2r_core.export.rules.table import UNSAFE, finding
 from r2c2r_core.export.simulate import Simulation, simulate
 from r2c2r_core.model.report import Blocker, Certificate, ColliderFit, Finding, Gap, LoaderResult, ThingResult
@@ -46,6 +47,7 @@ def certify(folder: Path, *, sapien_python: str | None = None, progress: Progres
     progress.at(1.0, "certificate passed" if not failed else "certificate failed")
     return Certificate(
         passed=not failed and simulation is not _NOT_SIMULATED,
+        likeness=judge_likeness(findings),
         findings=tuple(sorted(findings, key=lambda f: f.severity)),
         loaders=loaders,
         joints=simulation.joints,
@@ -63,6 +65,10 @@ def certificate_to_json(certificate: Certificate) -> dict[str, Any]:
     return {
         "version": CERTIFICATE_VERSION,
         "passed": certificate.passed,
+        "likeness": {
+            "state": certificate.likeness.state,
+            "doubts": [{"object": name, "why": why} for name, why in certificate.likeness.doubts],
+        },
         "findings": [
             {"rule": f.rule, "severity": f.severity, "where": f.where, "message": f.message} for f in certificate.findings
         ],

@@ -85,6 +85,14 @@ def report_html(manifest: dict[str, Any], report: dict[str, Any], pictures: dict
     return page
 
 
+def _likeness(likeness: dict[str, Any]) -> str:
+    """The second verdict, with the objects to look at."""
+    badge = {"passed": "good", "doubtful": "warn", "failed": "bad"}[likeness["state"]]
+    names = ", ".join(_text(doubt["object"]) for doubt in likeness["doubts"])
+    look_at = f": look at {names}" if names else ""
+    return f'<p>Likeness <span class="badge {badge}">{likeness["state"]}</span>{look_at}</p>'
+
+
 def _object_row(entry: dict[str, Any]) -> dict[str, Any]:
     placement, mask = entry["placement"] or {}, entry["mask"] or {}
     return {
@@ -127,7 +135,7 @@ def _headline(manifest: dict[str, Any], certificate: dict[str, Any]) -> str:
     source = f"{_text(capture['format'])}, {_text(capture['frames'])} frames, sha256 {_text(capture['sha256'])[:12]}…"
     created = f" · {_text(manifest['created'])}" if manifest.get("created") else ""
     return (
-        f"<header><h1>{_text(capture['name'])}</h1><p>Certificate {verdict}</p>"
+        f"<header><h1>{_text(capture['name'])}</h1><p>Certificate {verdict}</p>{_likeness(certificate['likeness'])}"
         f'<p class="quiet">{source} · r2c2r {_text(manifest["tool_version"])}{created}</p>'
         '<p><a href="review.html">Open the scene and its doors</a> · <a href="README.txt">How to load it</a></p></header>'
         f'<dl class="tiles">{cells}</dl>'

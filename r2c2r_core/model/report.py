@@ -72,10 +72,22 @@ class ColliderFit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Likeness:
+    """Whether the scene can be what was filmed: the second verdict of a certificate, beside that of physics."""
+
+    state: Literal["passed", "doubtful", "failed"]
+    doubts: tuple[tuple[str, str], ...]  # objects to look at, and why: contradictions first
+
+
+ALIKE = Likeness(state="passed", doubts=())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """The proof that goes into every bundle."""
 
     passed: bool
+    likeness: Likeness
     findings: tuple[Finding, ...]
     loaders: tuple[LoaderResult, ...]
     joints: tuple[JointResult, ...]

@@ -53,6 +53,13 @@ def _is_front(item: MeasuredObject) -> bool:
 
 def _drawn_in(item: MeasuredObject, sign: float, amount_m: float, other: str) -> MeasuredObject:
     warning = f"{1000 * amount_m:.0f} mm of its width left as the filler at the corner with {other}"
-    narrower = edge_moved(item, 0, sign, amount_m)
+    narrower = _without_handle_beside(edge_moved(item, 0, sign, amount_m))
     _, depth_source, height_source = item.sources
-    return replace(narrower, sources=("inferred", depth_source, height_source), warnings=(*item.warnings, warning))
+    return replace(narrower, sources=("inferred", depth_source, height_source), warnings=(*narrower.warnings, warning))
+
+
+def _without_handle_beside(item: MeasuredObject) -> MeasuredObject:
+    """The door without a handle on its filler: the shadow in a corner looks like an upright bar."""
+    if item.handle is None or abs(item.handle.centre[0]) < item.dimensions_m[0] / 2:
+        return item
+    return replace(item, handle=None, warnings=(*item.warnings, "what looked like its handle is on the filler: left out"))

@@ -106,7 +106,8 @@ def outliers_of(objects: Sequence[MeasuredObject]) -> dict[str, str]:
             break
         others = {other: depth for pair, depth in clashes.items() if worst in pair for other in pair if other != worst}
         said = ", ".join(f"{other} by {1000 * depth:.0f} mm" for other, depth in others.items())
-        found[worst] = f"where it was measured it overlaps {said}, and they agree without it; click it again"
+        mend = "delete it if it is one of them, else click it again"
+        found[worst] = f"where it was measured it overlaps {said}, and they agree without it; {mend}"
         clashes = {pair: depth for pair, depth in clashes.items() if worst not in pair}
     return found
 
@@ -141,6 +142,8 @@ def _on_support(item: MeasuredObject, others: Sequence[MeasuredObject], *, floor
     if floor_found:
         tops.append(0.0)
     near = [top for top in tops if abs(top + params.rest_gap_m - bottom) <= params.drop_m]
+    if floor_found and bottom < 0.0:  # however far: nothing stands below the floor
+        near.append(0.0)
     if not near and item.support_z_m is not None and abs(item.support_z_m - bottom) <= params.drop_m:
         near = [item.support_z_m]
     if not near:
@@ -181,7 +184,7 @@ def _solved_in_rounds(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]
 def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, float]]:
     """Index pairs whose boxes come nearer than GAP_M (REST_GAP_M vertically, for what stands on the other), and by how much.
 
-    Leaves that pass each other have one body, and each its own track: they part nothing.
+    Leaves that pass each other have one body, and each its own track: they part nothing. Nor do a table and a chair under it.
     """
     if len(items) < 2:
         return []
@@ -194,8 +197,15 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
         if d > 1e-6 and not _rests_on(items[i], items[j]) and not _rests_on(items[j], items[i]):
             if (items[i].fixed_by_person and items[j].fixed_by_person) or lap_of(items[i], items[j]) is not None:
                 continue
-            found.append((i, j, d))
+            if not _pushed_under(items[i], items[j]):
+                found.append((i, j, d))
     return found
+
+
+def _pushed_under(first: MeasuredObject, second: MeasuredObject) -> bool:
+    """Whether a seat may stand under a table: their boxes are mostly air, so that they say nothing of an overlap."""
+    both_on_legs = first.spec.on_legs and second.spec.on_legs
+    return both_on_legs and first.spec.flat_top != second.spec.flat_top
 
 
 def _rests_on(top: MeasuredObject, below: MeasuredObject) -> bool:

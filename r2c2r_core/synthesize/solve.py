@@ -1,8 +1,8 @@
 """The layout as one small optimisation: the least change of all faces together that meets what furniture must.
 
 Unknowns are the six faces of every object along its own axes; each counts in units of what measuring it can be wrong by.
-Hard: faces that are one line, plane or seam (ties), what a person fixed, how much a size may change; overlapping pairs keep
-their gap along the axis on which that is cheapest, to a tenth of a millimetre.
+Hard: faces that are one line, plane or seam (ties), what a person fixed, how much a size may change, the floor; overlapping
+pairs keep their gap along the axis on which that is cheapest, to a tenth of a millimetre.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,6 +21,7 @@ from r2c2r_core.tuning import param, tuned
 _FIXED_M = 1e-6
 _SOFT_M = 1e-5  # what a bound may give where it must
 _SPARE_M = 1e-4
+_UPRIGHT = 0.9999  # cosine of a tilt of 0.8 degrees
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,6 +100,7 @@ def _solved(
         equal[row, second], equal[row, first] = 1.0, -1.0
         equal_to[row] = tie.gap_m - (faces[second] - faces[first])
     bounds = [bound for index, item in enumerate(items) for bound in _size_bounds(index, item, len(sigma))]
+    bounds += [_floor_bound(index, faces) for index, item in enumerate(items) if _is_upright(item)]
     bounds += [_separation(items, pair, faces, sigma, gap_m) for pair in apart]
     rows, needed = np.array([row for row, _ in bounds]), np.array([least for _, least in bounds])
     slack = np.eye(len(rows)) * _SOFT_M
@@ -168,6 +170,17 @@ def _size_bounds(index: int, item: MeasuredObject, unknowns: int) -> list[tuple[
         row[6 * index + 2 * axis + 1], row[6 * index + 2 * axis] = 1.0, -1.0
         bounds += [(row, -_shrink(item, axis)), (-row, -_trim(item, axis))]
     return bounds
+
+
+def _is_upright(item: MeasuredObject) -> bool:
+    return not item.fixed_by_person and float(item.world_from_object.rotation[2, 2]) > _UPRIGHT
+
+
+def _floor_bound(index: int, faces: np.ndarray) -> tuple[np.ndarray, float]:
+    """Row and bound that keep an upright object's underside above the floor, or where it was measured below it."""
+    row, underside = np.zeros(len(faces)), 6 * index + 4
+    row[underside] = 1.0
+    return row, -max(float(faces[underside]), 0.0)
 
 
 def _trim(item: MeasuredObject, axis: int) -> float:

@@ -243,6 +243,7 @@ export interface Certificate {
   version: number;
   current: boolean;
   passed: boolean;
+  likeness: Likeness | null;
   findings: Finding[];
   loaders: LoaderVerdict[];
   joints: JointVerdict[];
@@ -335,6 +336,12 @@ export interface Differences {
   longest_m: number | null;
   candidates: Difference[];
   crops: Crop[];
+}
+
+/** An object that may not be what was filmed, and why. */
+export interface Doubt {
+  object: string;
+  why: string;
 }
 
 /** A plane to scale. Cells are counted from its top left corner, to the right and down; axes are unit vectors. */
@@ -613,6 +620,12 @@ export interface Leaf {
 export interface LeftOut {
   object: number;
   name: string;
+}
+
+/** Whether the scene can be what was filmed: passed, doubtful or failed. */
+export interface Likeness {
+  state: string;
+  doubts: Doubt[];
 }
 
 /** An object that is to be clicked. */

@@ -6,7 +6,7 @@ from r2c2r_core.cli import main
 from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.report import report_html, report_of
-from r2c2r_core.model.report import Certificate, LoaderResult
+from r2c2r_core.model.report import ALIKE, Certificate, LoaderResult
 from r2c2r_core.terminal import certificate_text, table
 from r2c2r_core.texts import OBEYED, shown
 from tests.core.export.kitchen import kitchen, reconstruction
@@ -17,7 +17,14 @@ EVIL = "\x1b]0;owned\x07\x9b31m\u202e\ud800"
 def certificate() -> Certificate:
     loader = LoaderResult(loader="PyBullet", state="failed", detail=f"says {EVIL}")
     return Certificate(
-        passed=True, findings=(), loaders=(loader,), joints=(), rest_penetration_m=0.0, drift_m=0.0, realtime_factor=1.0
+        passed=True,
+        likeness=ALIKE,
+        findings=(),
+        loaders=(loader,),
+        joints=(),
+        rest_penetration_m=0.0,
+        drift_m=0.0,
+        realtime_factor=1.0,
     )
 
 

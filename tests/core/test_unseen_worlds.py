@@ -103,7 +103,13 @@ def test_what_is_missing_is_wrong_in_every_mean(monkeypatch: pytest.MonkeyPatch)
         "objects": [_found("cabinet_0", good), _found("bottle_0", good | {"height_error": 7.0}), _found("cabinet_1", {})]
     }
     truth = [_true("cabinet_0", "cabinet"), _true("bottle_0", "bottle"), _true("cabinet_1", "cabinet")]
-    outcome: Any = SimpleNamespace(evaluation=evaluation, certified=True, cost=SimpleNamespace(cpu_s=60.0))
+    outcome: Any = SimpleNamespace(
+        evaluation=evaluation,
+        certified=True,
+        doubted={"bottle_0"},
+        present={"cabinet_0", "bottle_0"},
+        cost=SimpleNamespace(cpu_s=60.0),
+    )
     row = row_of(outcome, truth, {"cabinet_0": 0.9, "bottle_0": 0.8, "cabinet_1": 0.0})
     assert (row["objects"], row["usable"]) == (3, 1)
     assert (row["median_percent"], row["worst_percent"]) == (7.0, 100.0)
@@ -111,6 +117,7 @@ def test_what_is_missing_is_wrong_in_every_mean(monkeypatch: pytest.MonkeyPatch)
     assert row["mask_iou"] == {"front": 0.45, "thing": 0.8}
     assert row["worst_height_percent"] == {"bottle": 7.0}
     assert row["far_off"] == ["cabinet_1"]
+    assert (row["wrong_flagged"], row["right_flagged"]) == ("2 of 2", "0 of 1")  # what is missing is said too
     assert json.dumps(row)
 
 

@@ -1,6 +1,6 @@
-"""Whether the scene can be what was filmed: contradictions the segmenter found, joints that an obstacle all but locks."""
+"""Likeness of the scene to what was filmed: contradictions, unsure places and hinges, joints that hardly open."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from r2c2r_core.documents import parse_json
@@ -9,9 +9,24 @@ from r2c2r_core.export.handles import out_of_reach
 from r2c2r_core.export.rules.files import BundleFiles
 from r2c2r_core.export.rules.table import LIKENESS_RULES, finding
 from r2c2r_core.model.handle import Room
-from r2c2r_core.model.report import Finding
+from r2c2r_core.model.report import Finding, Likeness
 
+_SURE_HINGE = 0.8  # certainty of a side; doors without a telling handle have 0.75 (as a pair) or the share of their category
 _LEAST_TRAVEL = 0.5  # of what its kind opens: less, and its unit or its neighbour is in the wrong place
+
+
+def judge_likeness(findings: Iterable[Finding]) -> Likeness:
+    """The verdict of these findings: failed where one is an error, doubtful where there is any.
+
+    Findings of other rules, as of physics, say nothing about it. Each object is named once, with the first of its findings.
+    """
+    about = sorted((found for found in findings if found.rule in LIKENESS_RULES), key=lambda found: found.severity)
+    doubts = dict[str, str]()
+    for found in about:
+        for name in found.where.split(", "):
+            doubts.setdefault(name, found.message)
+    failed = any(found.severity == "error" for found in about)
+    return Likeness(state="failed" if failed else "doubtful" if doubts else "passed", doubts=tuple(doubts.items()))
 
 
 def check_likeness(files: BundleFiles) -> Iterator[Finding]:
@@ -21,9 +36,14 @@ def check_likeness(files: BundleFiles) -> Iterator[Finding]:
         return
     try:
         manifest = parse_json(path.read_bytes(), "manifest.json", BundleError, hint="")
-        present = {item["name"] for item in manifest["objects"]}
-        yield from _contradictions(manifest.get("contradictions", []), present)
-        yield from (found for item in manifest["objects"] for joint in item.get("joints", []) for found in _of_joint(joint))
+        objects = manifest["objects"]
+        yield from _contradictions(manifest.get("contradictions", []), {item["name"] for item in objects})
+        for item in objects:
+            yield from _unsure_place(item)
+            for joint in item.get("joints", []):
+                yield from _cut_short(item["name"], joint)
+                yield from _handles(joint)
+        yield from _unsure_hinges(objects)
     except (BundleError, KeyError, IndexError, TypeError, AttributeError):
         return
 
@@ -35,20 +55,43 @@ def _contradictions(entries: list[dict[str, Any]], present: set[str]) -> Iterato
             yield finding(entry["rule"], ", ".join(entry["objects"]), f"{entry['message']}; {entry['mend']}")
 
 
-def _of_joint(joint: dict[str, Any]) -> Iterator[Finding]:
-    yield from _cut_short(joint)
+def _unsure_place(item: dict[str, Any]) -> Iterator[Finding]:
+    placement = item.get("placement")
+    if placement is not None and placement["unsure"]:
+        turn = placement.get("runner_up_turn_deg")
+        turned = f" turned by {turn:.0f} degrees" if turn else ""
+        yield finding(
+            "place-unsure", item["name"], f"another place{turned} fits about as well; click it in more frames, or move it"
+        )
+
+
+def _unsure_hinges(objects: list[dict[str, Any]]) -> Iterator[Finding]:
+    """One finding for all doors whose side little tells: they are set together."""
+    unsure = {
+        item["name"]
+        for item in objects
+        for joint in item.get("joints", [])
+        if joint.get("motion") is None and joint.get("confidence") is not None and joint["confidence"] < _SURE_HINGE
+    }
+    if unsure:
+        yield finding(
+            "hinge-unsure", ", ".join(sorted(unsure)), "no handle tells the side of its hinge; set it, for several at once"
+        )
+
+
+def _cut_short(name: str, joint: dict[str, Any]) -> Iterator[Finding]:
+    uncut = joint.get("uncut")
+    if uncut is not None and joint["upper"] < _LEAST_TRAVEL * uncut:
+        share = 100 * joint["upper"] / uncut
+        yield finding(
+            "travel-cut", name, f"{joint['name']} opens {share:.0f} % of what its kind does before something is in its way"
+        )
+
+
+def _handles(joint: dict[str, Any]) -> Iterator[Finding]:
     for handle in joint.get("handles", []):
         room = handle["room"]
         free = Room(before_m=room["before_m"], beside_m=tuple(room["beside_m"]), depth_m=tuple(room["depth_m"]))
         reason = out_of_reach(handle["kind"], handle["size_m"][1], free)
         if reason is not None:
             yield finding("handle-reach", handle["name"], f"a gripper 9 cm wide cannot take it: {reason}")
-
-
-def _cut_short(joint: dict[str, Any]) -> Iterator[Finding]:
-    uncut = joint.get("uncut")
-    if uncut is not None and joint["upper"] < _LEAST_TRAVEL * uncut:
-        share = 100 * joint["upper"] / uncut
-        yield finding(
-            "travel-cut", joint["name"], f"it opens {share:.0f} % of what its kind does before something is in its way"
-        )

@@ -67,6 +67,7 @@ RULES: dict[str, Rule] = {
     "asset-missing": Rule("error", "a file that an asset, scene.sdf or the ROS package reads is not in the bundle"),
     "asset-unreadable": Rule("error", "an asset that is damaged"),
     "asset-differs": Rule("error", "a joint of an asset is not the scene's"),
+    "handle-reach": Rule("warning", "a handle that a gripper 9 cm wide cannot take"),
 }
 
 SIMULATION_RULES: dict[str, Rule] = {
@@ -91,9 +92,10 @@ LIKENESS_RULES: dict[str, Rule] = {
     "click-disobeyed": Rule("warning", "a mask that is not what a person clicked"),
     "size-unlikely": Rule("warning", "two doors built as one, or a part of one as a whole"),
     "in-the-air": Rule("warning", "the upper part of what stands on the floor, built as a whole"),
-    "handle-reach": Rule("warning", "a handle that a gripper 9 cm wide cannot take"),
     "in-a-wall": Rule("warning", "a drawer that slides out of a bare wall"),
     "edge-unsure": Rule("warning", "a front that ends where no edge shows, or holds a seam"),
+    "place-unsure": Rule("warning", "an object that stands turned round or in the wrong place"),
+    "hinge-unsure": Rule("warning", "a door hinged on the wrong side"),
     "travel-cut": Rule(
         "warning", "a joint that opens to less than half of what its kind does: something is in the wrong place"
     ),

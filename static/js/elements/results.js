@@ -84,6 +84,16 @@ export function findingList(findings) {
   return h("ul", { class: "findings", "aria-label": "Findings of the certificate" }, ...lines);
 }
 
+/** Whether the scene can be what was filmed, and where to look. @param {NonNullable<Certificate["likeness"]>} likeness */
+function likenessLine({ state, doubts }) {
+  const tone = state === "passed" ? "good" : state === "failed" ? "bad" : "warn";
+  const names = doubts.flatMap(({ object, why }, at) => [
+    at ? ", " : ": look at ",
+    h("strong", { title: why }, object),
+  ]);
+  return h("p", {}, "Likeness to the scan ", h("span", { class: `chip ${tone}` }, state), ...names);
+}
+
 /** @param {Certificate} certificate */
 export function certificateCard(certificate) {
   const state = certificate.passed ? "passed" : "did not pass";
@@ -108,6 +118,7 @@ export function certificateCard(certificate) {
       h("span", { class: `chip ${!certificate.current ? "" : certificate.passed ? "good" : "bad"}` }, state),
       certificate.current ? "" : h("span", { class: "chip warn" }, "stale"),
     ),
+    certificate.likeness ? likenessLine(certificate.likeness) : null,
     certificate.current
       ? null
       : h("p", {}, `Of version ${certificate.version}: something was changed since, and the next run certifies that.`),

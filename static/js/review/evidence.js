@@ -2,6 +2,7 @@
 
 import { h } from "../dom.js";
 import { findingList } from "../elements/results.js";
+import { findingsAbout } from "../lib/findings.js";
 import { centimetres } from "../lib/format.js";
 import { motionOf } from "../lib/joints.js";
 import { sourceChip } from "../source-chip.js";
@@ -69,23 +70,4 @@ function joints(item) {
 export function findingsOf(certificate, name, names) {
   const mine = findingsAbout(certificate, name, names);
   return mine.length ? findingList(mine) : "";
-}
-
-/**
- * @param {Certificate | null} certificate
- * @param {string} name
- * @param {string[]} names of all objects
- */
-export function findingsAbout(certificate, name, names) {
-  return (certificate?.findings ?? []).filter(({ where }) => owner(where, names) === name);
-}
-
-/**
- * @param {string} where
- * @param {string[]} names
- */
-function owner(where, names) {
-  return names
-    .filter((name) => where === name || where.startsWith(`${name}_`))
-    .toSorted((a, b) => b.length - a.length)[0];
 }

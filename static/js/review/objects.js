@@ -6,8 +6,8 @@
 import { getCertificate, getScene, getSystem, listCandidates } from "../api.js";
 import { sayError } from "../elements/toasts.js";
 import { Answers } from "../lib/answers.js";
+import { findingsAbout } from "../lib/findings.js";
 import { riskiestFirst, riskOf } from "../lib/risk.js";
-import { findingsAbout } from "./evidence.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").Certificate} Certificate */

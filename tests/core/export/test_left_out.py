@@ -14,7 +14,7 @@ from r2c2r_core.export import plan as planning
 from r2c2r_core.export import stage, support
 from r2c2r_core.export.stage import ExportConfig, write_bundle
 from r2c2r_core.export.writers import table
-from r2c2r_core.model.report import Certificate
+from r2c2r_core.model.report import ALIKE, Certificate
 from tests.core.export.kitchen import CREATED, reconstruction
 
 QUICK = ExportConfig(pictures=False, gripper=False, texture_max_px=64)
@@ -24,7 +24,14 @@ QUICK = ExportConfig(pictures=False, gripper=False, texture_max_px=64)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is judged here is what is in the bundle, not how it moves."""
     judged = Certificate(
-        passed=True, findings=(), loaders=(), joints=(), rest_penetration_m=0.0, drift_m=0.0, realtime_factor=1.0
+        passed=True,
+        likeness=ALIKE,
+        findings=(),
+        loaders=(),
+        joints=(),
+        rest_penetration_m=0.0,
+        drift_m=0.0,
+        realtime_factor=1.0,
     )
     monkeypatch.setattr(stage, "certify", lambda folder, progress: judged)
     monkeypatch.setattr(stage, "preview_png", lambda *_: b"")

@@ -8,6 +8,8 @@ from typing import Any
 from r2c2r_core.export.lint import lint
 from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.rules.likeness import judge_likeness
+from r2c2r_core.export.rules.table import LIKENESS_RULES, finding
 from r2c2r_core.model.contradiction import Contradiction
 from r2c2r_core.model.report import Finding
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
@@ -22,7 +24,7 @@ SAID = Contradiction(
 
 def findings(folder: Path, document: dict[str, Any]) -> list[Finding]:
     (folder / "manifest.json").write_text(json.dumps(document))
-    return [found for found in lint(folder) if found.rule in ("same-thing", "travel-cut", "manifest-schema")]
+    return [found for found in lint(folder) if found.rule in LIKENESS_RULES or found.rule == "manifest-schema"]
 
 
 def document(scene: ArticulatedScene, *said: Contradiction) -> dict[str, Any]:
@@ -41,6 +43,41 @@ def test_a_door_that_something_all_but_locks_is_a_finding(good_folder: Path) -> 
     for share, count in ((0.6, 0), (0.4, 1)):
         cut = replace(scene, objects=tuple(_cut(item, share) for item in scene.objects))
         assert len(findings(good_folder, document(cut))) == count
+
+
+def test_hinges_that_no_handle_tells_are_one_finding_for_all_doors(good_folder: Path) -> None:
+    said = document(kitchen())
+    doors = [item["name"] for item in said["objects"] if item["joint"] and item["joint"]["type"] == "revolute"]
+    for item in said["objects"]:
+        for joint in item["joints"]:
+            joint["confidence"] = 0.75 if item["name"] in doors else None
+    (found,) = findings(good_folder, said)
+    assert (found.rule, found.severity, found.where) == ("hinge-unsure", "warning", ", ".join(sorted(doors)))
+    for item in said["objects"]:
+        for joint in item["joints"]:
+            joint["confidence"] = 0.98
+    assert findings(good_folder, said) == []
+
+
+def test_a_place_that_is_unsure_is_a_finding_with_how_far_another_one_is_turned(good_folder: Path) -> None:
+    said = document(kitchen())
+    placement = next(item for item in said["objects"] if item["placement"])["placement"]
+    placement |= {"unsure": True, "runner_up_turn_deg": 90.0}
+    (found,) = findings(good_folder, said)
+    assert found.rule == "place-unsure"
+    assert "90 degrees" in found.message
+
+
+def test_likeness_is_judged_by_its_own_rules_and_names_each_object_once() -> None:
+    about = [
+        finding("hinge-unsure", "cabinet_1, cabinet_2", "no handle tells"),
+        finding("travel", "drawer_1_slide", "a joint jams"),
+    ]
+    assert judge_likeness(about[1:]).state == "passed"
+    assert judge_likeness(about).state == "doubtful"
+    worse = judge_likeness([*about, finding("same-thing", "cabinet_2, mug_1", "one thing")])
+    assert worse.state == "failed"
+    assert worse.doubts == (("cabinet_2", "one thing"), ("mug_1", "one thing"), ("cabinet_1", "no handle tells"))
 
 
 def test_what_the_clearance_takes_from_a_joint_is_known() -> None:

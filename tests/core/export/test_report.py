@@ -8,7 +8,7 @@ from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.export.rules.table import finding
 from r2c2r_core.export.writers.table import FORMATS
-from r2c2r_core.model.report import Blocker, Certificate, JointResult, LoaderResult, ThingResult
+from r2c2r_core.model.report import ALIKE, Blocker, Certificate, JointResult, LoaderResult, ThingResult
 from tests.core.export.kitchen import kitchen, reconstruction
 
 EVIL = '<script>alert("x")</script>'
@@ -17,6 +17,7 @@ EVIL = '<script>alert("x")</script>'
 def certificate(**changes: object) -> Certificate:
     values = {
         "passed": True,
+        "likeness": ALIKE,
         "findings": (),
         "loaders": (LoaderResult(loader="PyBullet", state="not tried", detail=f"not installed {EVIL}"),),
         "joints": (JointResult(joint="cabinet_1_hinge", deepest_penetration_m=0.0001, travel_reached=1.0),),

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,16 @@ def test_the_handle_stays_where_it_was_in_the_world() -> None:
     for item, handle in ((before, before.handle), (after, after.handle)):
         world = item.world_from_object.apply(np.array([[handle.left_m, 0.0, 0.0]]))[0]
         assert world[0] == pytest.approx(0.315 + 0.1, abs=1e-9), item.name
+
+
+def test_a_handle_on_the_filler_is_the_shadow_in_the_corner() -> None:
+    a, b = corner(0.63)
+    shadow = FrontHandle(left_m=0.29, right_m=0.31, bottom_m=-0.2, top_m=0.2, protrusion_m=0.03, confidence=0.9)
+    narrowed = leave_fillers([replace(a, handle=shadow), b])[0]
+    assert narrowed.handle is None
+    assert any("on the filler" in line for line in narrowed.warnings)
+    beside = [door("a", (0.0, -1.0), (0.0, 0.0), 0.6), door("b", (0.0, -1.0), (0.602, 0.0), 0.6)]
+    assert leave_fillers([replace(beside[0], handle=shadow), beside[1]])[0].handle == shadow
 
 
 def test_doors_side_by_side_or_face_to_face_keep_their_width() -> None:

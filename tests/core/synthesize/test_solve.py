@@ -83,6 +83,14 @@ def test_an_appliance_gives_way_to_what_is_built_in_and_a_person_is_right() -> N
     assert low(moved, 0) >= 0.3 + GAP_M - ATOL
 
 
+def test_nothing_is_pushed_below_the_floor_and_what_was_measured_there_no_further() -> None:
+    for measured_m in (0.0, -0.004):
+        below = item("a", (0, 0, 0.36 + measured_m), category="box")
+        first, second = solved([below, item("b", (0, 0, 1.04), category="box")], [], [(0, 1)], GAP_M)
+        assert low(first, 2) == pytest.approx(measured_m, abs=ATOL)
+        assert low(second, 2) - high(first, 2) >= GAP_M - ATOL
+
+
 def test_sizes_change_no_more_than_measuring_can_be_wrong() -> None:
     """Three units in the room of two and nine tenths: they are pushed apart, not crushed."""
     items = [item(name, (x, 0, 0.5)) for name, x in (("a", 0.0), ("b", 0.56), ("c", 1.12))]

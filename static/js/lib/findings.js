@@ -1,0 +1,25 @@
+/** Which findings of the certificate are about an object; no DOM. */
+
+/** @typedef {import("../api-types").Certificate} Certificate */
+
+/**
+ * Findings at an object, at several of which it is one, or at a part of it: links and joints begin with their object's name.
+ * @param {Certificate | null} certificate
+ * @param {string} name
+ * @param {string[]} names of all objects
+ */
+export function findingsAbout(certificate, name, names) {
+  return (certificate?.findings ?? []).filter(({ where }) =>
+    where.split(", ").some((part) => owner(part, names) === name),
+  );
+}
+
+/**
+ * @param {string} where
+ * @param {string[]} names
+ */
+function owner(where, names) {
+  return names
+    .filter((name) => where === name || where.startsWith(`${name}_`))
+    .toSorted((a, b) => b.length - a.length)[0];
+}
