@@ -1,4 +1,4 @@
-"""Every rule of linter, simulation, likeness to the scan and checksums: its name, how bad a hit is, what it protects from."""
+"""Every rule of linter, simulation, likeness, hands and checksums: its name, how bad a hit is, what it protects from."""
 
 from typing import Literal, NamedTuple
 
@@ -67,7 +67,6 @@ RULES: dict[str, Rule] = {
     "asset-missing": Rule("error", "a file that an asset, scene.sdf or the ROS package reads is not in the bundle"),
     "asset-unreadable": Rule("error", "an asset that is damaged"),
     "asset-differs": Rule("error", "a joint of an asset is not the scene's"),
-    "handle-reach": Rule("warning", "a handle that a gripper 9 cm wide cannot take"),
 }
 
 SIMULATION_RULES: dict[str, Rule] = {
@@ -101,6 +100,10 @@ LIKENESS_RULES: dict[str, Rule] = {
     ),
 }
 
+HAND_RULES: dict[str, Rule] = {
+    "handle-reach": Rule("warning", "a handle that a gripper 9 cm wide cannot take"),
+}
+
 SEAL_RULES: dict[str, Rule] = {
     "file-changed": Rule("error", "a file that is not the one that was certified"),
     "file-lost": Rule("error", "a file of the bundle that is gone"),
@@ -112,7 +115,7 @@ UNSAFE = ("mesh-path", "mjcf-path", "usd-path", "asset-path")
 """With one of these, no loader is given the bundle: it would read files of this machine."""
 
 
-EVERY_RULE = RULES | SIMULATION_RULES | LIKENESS_RULES | SEAL_RULES
+EVERY_RULE = RULES | SIMULATION_RULES | LIKENESS_RULES | HAND_RULES | SEAL_RULES
 
 
 def finding(rule: str, where: str, message: str) -> Finding:

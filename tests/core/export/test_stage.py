@@ -225,6 +225,7 @@ def test_the_certificate_as_json_is_versioned_and_complete(kitchen_bundle: tuple
     assert set(document) == {
         "version",
         "passed",
+        "likeness",
         "findings",
         "loaders",
         "joints",
