@@ -1,5 +1,7 @@
-"""Pages made from the code while the site is built: every setting of a run, with its default, its bounds and its meaning."""
+"""Pages made from the code while the site is built: every setting of a run, every option of every command."""
 
+import argparse
+from collections.abc import Iterator
 from dataclasses import Field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -7,7 +9,7 @@ from typing import Any
 from r2c2r_core.tuning import modules_with_numbers, params_of
 
 _BOUNDS = {"ge": "from {}", "gt": "above {}", "le": "to {}", "lt": "below {}"}
-_MARK = "<!-- every setting -->"
+_SETTINGS, _COMMANDS = "<!-- every setting -->", "<!-- every command -->"
 
 
 def on_config(config: Any) -> Any:
@@ -21,7 +23,10 @@ def on_config(config: Any) -> Any:
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """The page with the tables where it asks for them."""
-    return markdown.replace(_MARK, tables()) if _MARK in markdown else markdown
+    for mark, made in ((_SETTINGS, tables), (_COMMANDS, commands)):
+        if mark in markdown:
+            markdown = markdown.replace(mark, made())
+    return markdown
 
 
 def tables() -> str:
@@ -30,6 +35,38 @@ def tables() -> str:
 
     config = ReconstructConfig()
     return "\n".join(line for stage in fields(config) for line in _section(getattr(config, stage.name), stage.name))
+
+
+def commands() -> str:
+    """A heading, a sentence and a table of options for each command, and for each of its own commands."""
+    from r2c2r_core.cli import build_parser
+
+    return "\n".join(line for parser in _commands_of(build_parser()) for line in _command(parser))
+
+
+def _commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """Those of a parser, each followed by its own."""
+    for action in parser._actions:  # argparse has no public way to its commands
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield command
+                yield from _commands_of(command)
+
+
+def _command(parser: argparse.ArgumentParser) -> list[str]:
+    """Heading, meaning and options of one command; defaults are those of this machine, with its home folder as ~."""
+    lines = [f"### {parser.prog}", "", parser.description or "", ""]
+    listed = [action for action in parser._actions if action.help != argparse.SUPPRESS and "-h" not in action.option_strings]
+    if listed:
+        lines += ["| option | meaning |", "|---|---|"]
+    for action in listed:
+        names = ", ".join(action.option_strings) or str(action.metavar or action.dest)
+        value = f" {action.metavar or action.dest.upper()}" if action.option_strings and action.nargs != 0 else ""
+        default = "" if action.default is None else str(action.default).replace(str(Path.home()), "~")
+        meaning = (action.help or "").replace("%(default)s", default)
+        cells = (f"`{names}{value}`", meaning)
+        lines.append(f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |")
+    return [*lines, "", *(("```", parser.epilog, "```", "") if parser.epilog else ())]
 
 
 def _section(config: Any, path: str) -> list[str]:

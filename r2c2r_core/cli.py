@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = argparse.Namespace(debug=False)
     try:
         with _ended_by_sigterm():
-            options = _parser().parse_args(arguments)
+            options = build_parser().parse_args(arguments)
             return int(options.command(options))
     except R2C2RError as error:
         if options.debug:
@@ -150,7 +150,8 @@ def _way_out(number: int | None) -> str:
     return "free some space or choose another folder"
 
 
-def _parser() -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of the command line, with every command that is installed."""
     parser = argparse.ArgumentParser(prog="r2c2r", description="One RGB-D scan of a kitchen in, a scene that opens out.")
     parser.add_argument("--version", action="version", version=f"r2c2r {__version__}")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")

@@ -11,7 +11,7 @@ from r2c2r_core.terminal import arm_text, certificate_text, gripper_text, show_p
 def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "check", check)
-    added.add_argument("bundle", type=Path)
+    added.add_argument("bundle", type=Path, help="bundle, zipped or as a folder")
     added.add_argument(
         "--gripper", action="store_true", help="let a friction gripper open every joint and move what stands free"
     )

@@ -12,7 +12,7 @@ def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "dataset", dataset)
     added.add_argument("workdir", type=Path, help="the --workdir of r2c2r run, or a project's work folder")
-    added.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    added.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
 
 
 def dataset(options: argparse.Namespace) -> int:

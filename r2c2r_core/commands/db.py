@@ -19,7 +19,7 @@ def add(parsers: Parsers) -> None:
     add_data_folder(backup)
     backup.add_argument("-o", dest="target", type=Path, required=True, metavar="OUT.db", help="a new file")
     restore = actions.add_parser("restore")
-    restore.add_argument("source", type=Path, metavar="BACKUP.db")
+    restore.add_argument("source", type=Path, metavar="BACKUP.db", help="what `r2c2r db backup` wrote")
     add_data_folder(restore)
     add_data_folder(actions.add_parser("check"))
 

@@ -14,7 +14,7 @@ from r2c2r_core.texts import shown
 def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "info", info)
-    added.add_argument("capture", type=Path)
+    added.add_argument("capture", type=Path, help="recording: a file, a folder or a zip")
     added.add_argument("--overrides", type=Path, help="what a person said about the room: up, floor, manhattan_yaw, walls")
     added.add_argument("--picture", type=Path, metavar="FILE.png", help="the fused scan and the camera's path, drawn")
     add_reading(added)

@@ -26,16 +26,16 @@ def add(parsers: Parsers) -> None:
             metavar="ADDRESS",
             help="default: R2C2R_SERVER of the environment",
         )
-    added["upload"].add_argument("capture", type=Path)
+    added["upload"].add_argument("capture", type=Path, help="recording: a file, a folder or a zip")
     added["upload"].add_argument("--name", help="of the project (default: the file's)")
     for what in ("click", "run", "wait", "download", "export"):
         added[what].add_argument("project", help="its id, as upload and list print it")
-    added["click"].add_argument("prompts", type=Path, metavar="PROMPTS.json")
+    added["click"].add_argument("prompts", type=Path, metavar="PROMPTS.json", help="what is clicked, by name and category")
     for seam in _SEAMS:
-        added["run"].add_argument(f"--{seam}")
-    added["run"].add_argument("--seed", type=seed, default=0)
-    added["download"].add_argument("-o", "--output", type=Path, required=True, metavar="BUNDLE.zip")
-    added["export"].add_argument("-o", "--output", type=Path, required=True, metavar="PROJECT.zip")
+        added["run"].add_argument(f"--{seam}", help="name of a backend of the server")
+    added["run"].add_argument("--seed", type=seed, default=0, help="of what generators draw at random (default: %(default)s)")
+    added["download"].add_argument("-o", "--output", type=Path, required=True, metavar="BUNDLE.zip", help="file to write")
+    added["export"].add_argument("-o", "--output", type=Path, required=True, metavar="PROJECT.zip", help="file to write")
     added["export"].add_argument("--recording", action="store_true", help="with its recording")
     added["download"].add_argument("--version", type=whole(1, 2**31 - 1), help="default: the newest")
 

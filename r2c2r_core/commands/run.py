@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "run", run)
-    added.add_argument("capture", type=Path)
-    added.add_argument("--prompts", type=Path, required=True)
-    added.add_argument("-o", "--output", type=Path, required=True, metavar="BUNDLE.zip")
+    added.add_argument("capture", type=Path, help="recording: a file, a folder or a zip")
+    added.add_argument("--prompts", type=Path, required=True, help="prompts.json: what was clicked, by name and category")
+    added.add_argument("-o", "--output", type=Path, required=True, metavar="BUNDLE.zip", help="bundle to write")
     added.add_argument("--workdir", type=Path, help="where stages are kept (default: beside the bundle)")
-    added.add_argument("--overrides", type=Path)
-    added.add_argument("--config", type=Path)
+    added.add_argument("--overrides", type=Path, help="overrides.json: what a person corrected")
+    added.add_argument("--config", type=Path, help="JSON file of settings; `r2c2r schema config` describes it")
     add_reading(added)
     for seam in ("segmenter", "generator", "matcher"):
-        added.add_argument(f"--{seam}")
+        added.add_argument(f"--{seam}", help="name of a backend; `r2c2r doctor` lists them")
     added.add_argument("--fixtures", help="what makes carcasses: boards (default), or scene-synthesizer, the paper's")
-    added.add_argument("--seed", type=seed, default=0)
+    added.add_argument("--seed", type=seed, default=0, help="of what generators draw at random (default: %(default)s)")
     added.add_argument(
         "--workers", type=whole(0, 64), default=0, help="objects computed side by side; 0: as cores and memory allow"
     )

@@ -12,8 +12,10 @@ from r2c2r_core.terminal import show_progress
 def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "sample", sample)
-    added.add_argument("out", type=Path)
-    added.add_argument("--seed", type=seed, default=0)
+    added.add_argument("out", type=Path, help="folder to write: scan.r3d, truth.json, prompts.json")
+    added.add_argument(
+        "--seed", type=seed, default=0, help="of the kitchen; equal seeds give equal recordings (default: %(default)s)"
+    )
     added.add_argument("--opened", action="store_true", help="fronts are opened and closed while it is filmed")
     add_size(added)
     added.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -36,8 +38,8 @@ def _listed(title: str, names: Mapping[str, str]) -> str:
 
 def add_size(parser: argparse.ArgumentParser) -> None:
     """How long and how large the recording is."""
-    parser.add_argument("--frames", type=whole(1, 10_000), default=180)
-    parser.add_argument("--size", type=size, default=(960, 720), metavar="WxH")
+    parser.add_argument("--frames", type=whole(1, 10_000), default=180, help="of the recording (default: %(default)s)")
+    parser.add_argument("--size", type=size, default=(960, 720), metavar="WxH", help="of its pictures in px (default: 960x720)")
 
 
 def sample(options: argparse.Namespace) -> int:

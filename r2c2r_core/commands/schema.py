@@ -14,7 +14,7 @@ NAMES = ("prompts", "overrides", "config", "manifest")
 
 def add(parsers: Parsers) -> None:
     """The command and its options."""
-    add_command(parsers, "schema", schema).add_argument("document", choices=NAMES)
+    add_command(parsers, "schema", schema).add_argument("document", choices=NAMES, help="file whose JSON Schema is printed")
 
 
 def schema(options: argparse.Namespace) -> int:

@@ -28,8 +28,8 @@ def add(parsers: Parsers) -> None:
 
 def add_address(parser: argparse.ArgumentParser) -> None:
     """Where the app listens."""
-    parser.add_argument("--host", default="127.0.0.1")
-    parser.add_argument("--port", type=port, default=8000)
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
+    parser.add_argument("--port", type=port, default=8000, help="port to listen on (default: %(default)s)")
 
 
 def serve(options: argparse.Namespace) -> int:

@@ -21,7 +21,7 @@ def add(parsers: Parsers) -> None:
             action.add_argument("--scope", default="annotator", help=f"{_SCOPES} (default: %(default)s)")
             action.add_argument("--account", metavar="NAME", help="whom it acts for (default: whoever starts the server)")
         if what == "revoke":
-            action.add_argument("number", type=whole(0, 2**63 - 1))
+            action.add_argument("number", type=whole(0, 2**63 - 1), help="of the token, as `list` shows it")
 
 
 def token(options: argparse.Namespace) -> int:

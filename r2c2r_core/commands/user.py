@@ -19,7 +19,7 @@ def add(parsers: Parsers) -> None:
         action = actions.add_parser(what)
         add_data(action)
         if what != "list":
-            action.add_argument("name")
+            action.add_argument("name", help="of the account")
         if what == "add":
             action.add_argument("--role", default="annotator", help=f"{_ROLES} (default: %(default)s)")
         if what == "role":

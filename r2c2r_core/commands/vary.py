@@ -10,9 +10,11 @@ from r2c2r_core.terminal import show_progress
 def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "vary", vary)
-    added.add_argument("bundle", type=Path)
+    added.add_argument("bundle", type=Path, help="bundle, zipped or as a folder")
     added.add_argument("-n", type=whole(1, 100_000), default=100, metavar="N", help="how many (default: %(default)s)")
-    added.add_argument("--seed", type=seed, default=0)
+    added.add_argument(
+        "--seed", type=seed, default=0, help="of the draws; equal seeds give equal variants (default: %(default)s)"
+    )
     added.add_argument("-o", type=Path, required=True, metavar="DIR", help="a new folder")
 
 

@@ -1,11 +1,13 @@
 """The command line as a person meets it: exit codes, one-line errors."""
 
+import argparse
 import io
 import json
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -13,7 +15,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core import cli
-from r2c2r_core.cli import main
+from r2c2r_core.cli import build_parser, main
 from r2c2r_core.synthetic.choices import LAYOUTS, PALETTES, STYLES
 
 from .ingest.corruptions import Corruption, corrupt_r3d
@@ -58,6 +60,24 @@ def prompts(tmp_path: Path) -> Path:
 def test_help_and_version() -> None:
     assert "COMMAND" in started("--help", code=0)[0]
     assert r2c2r("--version", code=0)[0].startswith("r2c2r ")
+
+
+def test_every_option_says_what_it_is_for() -> None:
+    silent = [
+        f"{parser.prog} {action.dest}"
+        for parser in commands_of(build_parser())
+        for action in parser._actions
+        if not action.help and not isinstance(action, argparse._SubParsersAction)
+    ]
+    assert silent == []
+
+
+def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield command
+                yield from commands_of(command)
 
 
 def test_wrong_usage_is_two() -> None:
