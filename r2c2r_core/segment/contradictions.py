@@ -243,9 +243,9 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
 
 
 def has_seams(category: Category, width_m: float) -> bool:
-    """Whether lines across such a front are nothing to ask about: two doors, a machine, a stack."""
+    """Whether lines across such a front are nothing to ask about: two doors, a stack, a machine's window, keypad or drawer."""
     pair = category.opens == "pair" or (category.wider is not None and width_m >= category.wider[0])
-    return pair or category.one_front or category.several_fronts
+    return pair or category.one_front or category.several_fronts or category.kind == "appliance"
 
 
 def _range(size: Size) -> str:
