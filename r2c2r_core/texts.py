@@ -9,6 +9,16 @@ import re
 OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
+IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+"""A name that every format takes: USD prims, and Isaac's importers, refuse a leading digit, the others any other character."""
+
+
+def identifier(text: str) -> str:
+    """An identifier made of a text; "object" where nothing of it can stay."""
+    plain = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_") or "object"
+    return f"item_{plain}" if plain[0].isdigit() else plain
+
+
 def shown(text: str) -> str:
     """The text with the code of each such character in its place."""
     return OBEYED.sub(lambda found: f"\\u{ord(found.group()):04x}", text)

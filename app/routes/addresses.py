@@ -1,4 +1,7 @@
-"""Addresses that may be looked up: nothing in them is too long for a file name or cannot be written into a file."""
+"""Addresses that may be looked up: nothing in them is too long for a file name or cannot be written into a file.
+
+Pages, API and sockets have absolute addresses: below a path of a proxy none of them would be found, which is said at once.
+"""
 
 from urllib.parse import parse_qsl
 
@@ -26,6 +29,10 @@ class Addresses:
 
 def _refused(scope: Scope) -> JSONResponse | None:
     path: str = scope["path"]
+    prefix = dict(scope["headers"]).get(b"x-forwarded-prefix", b"").decode("latin-1").rstrip("/")
+    if prefix:
+        message = f"a proxy publishes this server below the path {prefix[:80]!a}, where its pages are not found"
+        return JSONResponse(body("invalid", message, "give it a host name of its own, such as r2c2r.example"), 421)
     if OBEYED.search(path) or any(len(part.encode()) > LONGEST_FILE_NAME for part in path.split("/")):
         return JSONResponse(body("not-found", "there is nothing at this address", "check the address"), 404)
     for name, value in parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True):

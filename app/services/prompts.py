@@ -1,6 +1,5 @@
 """Objects and clicks. Every change is stored, with what was before it, before the answer goes out."""
 
-import re
 from typing import Any, NamedTuple
 
 from sqlalchemy import func
@@ -17,6 +16,7 @@ from app.services import assigning, masks
 from app.services.context import Context
 from app.services.in_frames import check_point, check_said, table_of
 from r2c2r_core.errors import PromptError
+from r2c2r_core.texts import IDENTIFIER, identifier
 from r2c2r_core.workspace import noun_path
 
 
@@ -27,9 +27,6 @@ class Change(NamedTuple):
     item: SceneObject
     shape: schemas.SceneObject
     infer: bool
-
-
-_NAME = re.compile(r"[A-Za-z0-9_]+")
 
 
 def list_objects(context: Context, project_id: str, deleted: bool) -> list[dict[str, Any]]:
@@ -236,8 +233,8 @@ def create_in(context: Context, session: Session, project: Project, body: schema
 
 def require_usable(name: str) -> None:
     """Raise PromptError for a name that simulators do not accept."""
-    if not _NAME.fullmatch(name):
-        hint = "use letters, digits and underscores: simulators accept no more"
+    if not IDENTIFIER.fullmatch(name):
+        hint = f"use letters, digits and underscores, no digit first, such as {identifier(name)}: simulators accept no more"
         raise PromptError(f"the name '{name}' is not usable", hint=hint)
 
 
@@ -395,7 +392,7 @@ def _name(session: Session, project_id: str, name: str, mine: int | None) -> str
 
 
 def _free_name(session: Session, project_id: str, category: str) -> str:
-    stem = re.sub(r"[^A-Za-z0-9]+", "_", category).strip("_") or "object"
+    stem = identifier(category)
     taken = _names(session, project_id, None)
     number = 1
     while f"{stem}_{number}".casefold() in taken:

@@ -109,7 +109,7 @@ class FolderFiles:
 
 
 class ZipFiles:
-    """The members of a zip, read in memory one at a time."""
+    """The members of a zip, read in memory one at a time; names that Windows packed with backslashes are read with slashes."""
 
     def __init__(self, source: Path) -> None:
         self.source = source
@@ -123,18 +123,17 @@ class ZipFiles:
         except OSError as problem:
             raise CaptureError(f"{source}: {problem.strerror or problem}", hint="check that the file can be read") from problem
         self._refuse_hostile()
-        self._names = frozenset(
-            info.filename for info in self._zip.infolist() if not info.is_dir() and not _is_clutter(info.filename)
-        )
+        members = {info.filename.replace("\\", "/"): info.filename for info in self._zip.infolist()}
+        self._members = {name: member for name, member in members.items() if name[-1:] != "/" and not _is_clutter(name)}
 
     def names(self) -> frozenset[str]:
         """All file names."""
-        return self._names
+        return frozenset(self._members)
 
     def read(self, name: str) -> bytes:
         """The content; raises CaptureError when the member is damaged."""
         try:
-            return self._zip.read(name)
+            return self._zip.read(self._members.get(name, name))
         except (
             zipfile.BadZipFile,
             zlib.error,
@@ -149,13 +148,13 @@ class ZipFiles:
     def open(self, name: str) -> BinaryIO:
         """The member as a stream; raises CaptureError when it is damaged."""
         try:
-            return cast(BinaryIO, self._zip.open(name))
+            return cast(BinaryIO, self._zip.open(self._members.get(name, name)))
         except (zipfile.BadZipFile, NotImplementedError, RuntimeError, UnicodeDecodeError, OSError) as problem:
             raise self._damaged(name, problem) from problem
 
     def place(self, name: str) -> tuple[str, ...]:
         """The zip's path and the member."""
-        return str(self.source.absolute()), name
+        return str(self.source.absolute()), self._members.get(name, name)
 
     def sha256(self, names: Iterable[str]) -> str:
         """Digest of the zip file itself."""

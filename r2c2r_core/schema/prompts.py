@@ -177,7 +177,7 @@ class PromptsFileCrop(Document):
 class PromptsFileObject(Document):
     """One object of prompts.json."""
 
-    name: Name = Field(description=f"1 to {LONGEST} letters, digits and underscores: simulators accept no more")
+    name: Name = Field(description=f"1 to {LONGEST} letters, digits and underscores, no digit first: simulators accept no more")
     category: Category = Field(description=f"a word such as drawer, of at most {LONGEST} characters")
     points: list[PromptsFilePoint] = Field(max_length=MOST_POINTS, description=f"a list of at most {MOST_POINTS} clicks")
     front: PromptsFileFront | None = Field(default=None, description="from version 2 on: drawn, whatever is clicked")

@@ -13,6 +13,7 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, Prompts
 from r2c2r_core.schema.document import checked
 from r2c2r_core.schema.prompts import PromptsFile, PromptsFileMask
+from r2c2r_core.texts import IDENTIFIER, identifier
 
 _NAME = re.compile(r"[A-Za-z0-9_]+")
 _HINT = "see `r2c2r sample` for one"
@@ -108,6 +109,11 @@ def _check_names(objects: tuple[ObjectPrompt, ...]) -> None:
     seen: set[str] = set()
     for prompt in objects:
         _check_name(prompt.name)
+        if not IDENTIFIER.fullmatch(prompt.name):  # clicks on it are drawn all the same: it may have been named long ago
+            raise PromptError(
+                f"name '{prompt.name}' found, which begins with a digit: USD and Isaac's importers refuse it",
+                hint=f"rename it, such as {identifier(prompt.name)}",
+            )
         if prompt.name in seen:
             raise PromptError(f"two objects named '{prompt.name}' found, unique names expected", hint="rename one of them")
         seen.add(prompt.name)

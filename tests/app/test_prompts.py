@@ -117,6 +117,10 @@ def test_names_are_unique_and_usable_in_simulators(web: Running) -> None:
     assert "mug_1" in web.patch(f"/api/projects/{project}/objects/{number}", {"name": "mug_1"}, 422)["message"]
     assert web.patch(f"/api/projects/{project}/objects/{number}", {"name": "a b"}, 422)["kind"] == "prompt"
     web.post(f"/api/projects/{project}/objects", {"name": "MUG_1"}, 422)
+    assert "item_1st_drawer" in web.patch(f"/api/projects/{project}/objects/{number}", {"name": "1st_drawer"}, 422)["hint"]
+    made = web.post(f"/api/projects/{project}/objects", {"category": "2-door cabinet"})
+    assert made["name"] == "item_2_door_cabinet_1"  # its category stays as it was typed
+    assert made["category"] == "2-door cabinet"
 
 
 def test_an_old_version_is_a_conflict_that_shows_what_is_stored(web: Running) -> None:

@@ -245,3 +245,12 @@ def test_no_path_leads_out(web: Running) -> None:
 def test_the_key_to_the_app_is_not_told_twice(web: Running) -> None:
     assert web.settings.launch_token not in web.client.get("/api/system").text
     assert web.settings.launch_token not in web.client.get("/api/openapi.json").text
+
+
+@pytest.mark.parametrize("path", ["/", "/api/projects", "/static/js/main.js"])
+def test_a_proxy_that_publishes_it_below_a_path_is_told_that_it_needs_a_host_name(web: Running, path: str) -> None:
+    answer = web.client.get(path, headers={"X-Forwarded-Prefix": "/lab/r2c2r"})
+    assert answer.status_code == 421
+    assert "/lab/r2c2r" in answer.json()["message"]
+    assert "host name of its own" in answer.json()["hint"]
+    assert web.client.get(path, headers={"X-Forwarded-Prefix": "/"}).is_success

@@ -720,6 +720,7 @@ test("a name is joined to one that simulators accept", () => {
     ["mom's cup (blue)", "mom_s_cup_blue"],
     ["drawer_1", "drawer_1"],
     ["架子", ""],
+    ["2-door cabinet", "item_2_door_cabinet"],
   ])
     assert.equal(usableName(typed ?? ""), name);
 });

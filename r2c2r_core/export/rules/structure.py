@@ -1,6 +1,5 @@
 """Names, tree and joint types."""
 
-import re
 from collections import Counter
 from collections.abc import Iterator
 
@@ -8,6 +7,7 @@ from r2c2r_core.export.plan import WORLD
 from r2c2r_core.export.reading import Urdf
 from r2c2r_core.export.rules.table import finding
 from r2c2r_core.model.report import Finding
+from r2c2r_core.texts import IDENTIFIER
 
 _WANTED = {"strippath": "false", "discardvisual": "false", "fusestatic": "false"}
 
@@ -31,8 +31,8 @@ def _names(urdf: Urdf) -> Iterator[Finding]:
         for name, count in Counter(names).items():
             if count > 1:
                 yield finding(f"duplicate-{kind}", name, f"{count} {kind}s have this name")
-            if not re.fullmatch(r"[A-Za-z0-9_]+", name):
-                yield finding("name", name or f"a {kind}", f"{kind} names may hold letters, digits and _ only")
+            if not IDENTIFIER.fullmatch(name):
+                yield finding("name", name or f"a {kind}", f"{kind} names may hold letters, digits and _ only, no digit first")
 
 
 def _tree(urdf: Urdf) -> Iterator[Finding]:

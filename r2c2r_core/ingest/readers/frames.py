@@ -1,7 +1,7 @@
 """Frames put together from what a folder holds under each number: colour, depth, confidence, pose; nothing goes by position."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
@@ -27,8 +27,12 @@ def joined_frames(
 ) -> tuple[tuple[RawFrame, ...], list[str]]:
     """The frames that have colour, depth and a pose, and what to tell about the others; raises CaptureError.
 
-    In a recording without any pose, all frames are without one.
+    In a recording without any pose that can be used, all frames are without one: ingest tracks them.
     """
+    notices = []
+    if found.poses and not any(pose is not None for pose in found.poses.values()):
+        notices.append(f"none of {len(found.poses)} poses is finite and a rotation: they are left out, as if there were none")
+        found = replace(found, poses={})
     poses = found.poses or dict.fromkeys(found.colour)
     shared = found.colour.keys() & found.depth.keys() & poses.keys()
     if not shared:
@@ -51,9 +55,10 @@ def joined_frames(
     )
     if not frames:
         raise CaptureError(
-            f"{files.source}: none of {len(shared)} poses is finite and a rotation", hint="record again with tracking"
+            f"{files.source}: none of the {len(shared)} frames with colour and depth has a pose that is finite and a rotation",
+            hint="take the pose files away to have the poses estimated",
         )
-    return frames, _left_out(found, shared, len(frames))
+    return frames, [*notices, *_left_out(found, shared, len(frames))]
 
 
 def read_poses(files: Files, names: Mapping[int, str]) -> dict[int, Rigid3 | None]:

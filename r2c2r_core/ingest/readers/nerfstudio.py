@@ -1,8 +1,9 @@
-"""nerfstudio: transforms.json with depth_file_path; OpenGL camera-to-world, world z up.
+"""nerfstudio and NeRFCapture: transforms.json with depth_file_path or depth_path; OpenGL camera-to-world, world z up.
 
-fl_x, fl_y, cx, cy, w, h stand once or in every frame; depth is a 16-bit PNG or .npy in steps of depth_unit_scale_factor (1 mm
-unless said), 0 unknown, of the colour image's view; black in mask_path means ignore. cx and cy count from the corner of the
-first pixel, as ours do. k1, k2, p1, p2, k3 are taken out here. (nerfstudio, docs/quickstart/data_conventions.md.)
+fl_x, fl_y, cx, cy, w, h stand once or in every frame; depth is a 16-bit PNG or .npy in steps of depth_unit_scale_factor or
+integer_depth_scale (1 mm unless said), 0 unknown, of the colour image's view; black in mask_path means ignore. cx and cy count
+from the corner of the first pixel, as ours do. k1, k2, p1, p2, k3 are taken out here. (nerfstudio,
+docs/quickstart/data_conventions.md.)
 """
 
 import io
@@ -28,6 +29,7 @@ from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_json_object
 
 _TRANSFORMS = "transforms.json"
 _PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")
+_DEPTHS = ("depth_file_path", "depth_path")  # nerfstudio's; NeRFCapture's
 _CAMERA, _LENS = ("fl_x", "fl_y", "cx", "cy"), ("k1", "k2", "p1", "p2", "k3")
 
 
@@ -35,9 +37,10 @@ def open_nerfstudio(files: Files) -> Recording:
     """The recording that a transforms.json describes; raises CaptureError."""
     document = read_json_object(files, _TRANSFORMS)
     entries = _entries(files, document)
-    colour, depth, masks = (_named(files, entries, key) for key in ("file_path", "depth_file_path", "mask_path"))
+    colour, masks = (_named(files, entries, key) for key in ("file_path", "mask_path"))
+    depth = next((found for key in _DEPTHS if (found := _named(files, entries, key))), {})
     if not depth:
-        said = sum("depth_file_path" in entry for entry in entries.values())
+        said = sum(any(key in entry for key in _DEPTHS) for entry in entries.values())
         raise CaptureError(
             f"{files.source}/{_TRANSFORMS}: {said} of {len(entries)} frames name a depth image, none of them exists",
             hint="export with depth: each frame needs a depth_file_path",

@@ -1,8 +1,9 @@
 """Polycam's raw export: keyframes/{images,cameras,depth,confidence}/<microseconds>.{jpg,json,png,png}.
 
 corrected_images and corrected_cameras (undistorted) are preferred where they exist; large scans have none. Camera files hold
-fx, fy, cx, cy, width, height and t_00..t_23, row-major camera-to-world with ARKit's axes in a y-up world. Depth is uint16
-millimetres, confidence 0, 127 or 255. Frames are named by their time; their number here is its rank. (PolyCam/polyform.)
+fx, fy, cx, cy, width, height and t_00..t_23, row-major camera-to-world with ARKit's axes in a y-up world; since 2025 corrected
+ones have no width and height, which are those of the image. Depth is uint16 millimetres, confidence 0, 127 or 255. Frames are
+named by their time; their number here is its rank. (PolyCam/polyform; nerfstudio pull request 3725.)
 """
 
 from collections.abc import Iterable
@@ -61,7 +62,8 @@ def _by_time(names: Iterable[str], pattern: str) -> dict[int, str]:
 
 
 def _camera(document: dict[str, Any], size: tuple[int, int]) -> Intrinsics | None:
-    numbers = _numbers(document, ("fx", "fy", "cx", "cy", "width", "height"))
+    sized = {"width": size[0], "height": size[1], **document}
+    numbers = _numbers(sized, ("fx", "fy", "cx", "cy", "width", "height"))
     if numbers is None or not (numbers[[0, 1, 4, 5]] >= 1).all():
         return None
     fx, fy, cx, cy, width, height = numbers

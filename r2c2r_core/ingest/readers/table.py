@@ -37,8 +37,8 @@ READERS: tuple[Reader, ...] = (
     seven_scenes.READER,
     threedmatch.READER,
     tum.READER,
+    nerfstudio.READER,  # before Redwood, whose folders it may have beside its transforms.json
     redwood.READER,
-    nerfstudio.READER,
     arti4d.READER,
 )
 """The project's own; `readers()` also has those of other packages."""
@@ -78,19 +78,19 @@ def _reader_of(root: Files) -> Reader | None:
 
 
 def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
-    """What was found, what it most looks like, and what was looked for."""
-    miss = _nearest_miss(roots)
+    """What was found, and the formats that it is nearest to with what each of them lacks."""
+    nearest = _nearest(roots)
     archives = sorted(name for name in files.names() if name.endswith((".r3d", ".zip")))
-    if miss is None and archives:
+    if not nearest and archives:
         inside = f"{source}: holds {archives[0]}, which may be a recording itself"
         return CaptureError(inside, hint="choose that file; take it out first if it lies in another archive")
-    if miss is None:
-        return CaptureError(f"{source}: {_found(files)}; no known recording format", hint=f"looked for {_formats()}")
-    reader, missing = miss
+    if not nearest:
+        return CaptureError(f"{source}: {_found(files)}; no known recording format", hint=f"one of {_formats()}")
+    reader, missing = nearest[0]
+    others = "".join(f"; it would be {other.name} with {' and '.join(lacking)}" for other, lacking in nearest[1:])
     lacks = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
     return CaptureError(
-        f"{source}: {_found(files)}; looks like {reader.name}, but {lacks}",
-        hint=f"it holds {reader.expects}; also looked for {', '.join(r.name for r in readers() if r is not reader)}",
+        f"{source}: {_found(files)}; looks like {reader.name}, but {lacks}", hint=f"it holds {reader.expects}{others}"
     )
 
 
@@ -102,11 +102,13 @@ def _roots(files: Files) -> tuple[list[Files], dict[str, Files]]:
     return outer, {folder: WithAbove(SubFiles(outer[-1], folder), outer[-1]) for folder in folders[:_WIDEST]}
 
 
-def _nearest_miss(roots: list[Files]) -> tuple[Reader, tuple[str, ...]] | None:
-    """The format that lacks the smallest share of its parts, if at least half of them are there."""
+def _nearest(roots: list[Files]) -> list[tuple[Reader, tuple[str, ...]]]:
+    """The two formats that lack the smallest share of their parts, of those of which at least half are there."""
     misses = [(reader, reader.missing(root.names())) for root in roots for reader in readers()]
-    reader, missing = min(misses, key=lambda miss: (len(miss[1]) / len(miss[0].parts), -len(miss[0].parts)))
-    return (reader, missing) if len(missing) <= len(reader.parts) / 2 else None
+    misses = [(reader, missing) for reader, missing in misses if len(missing) <= len(reader.parts) / 2]
+    misses.sort(key=lambda miss: (len(miss[1]) / len(miss[0].parts), -len(miss[0].parts)))
+    first = {reader.name: (reader, missing) for reader, missing in reversed(misses)}
+    return sorted(first.values(), key=misses.index)[:2]
 
 
 def _found(files: Files) -> str:
@@ -118,4 +120,4 @@ def _found(files: Files) -> str:
 
 
 def _formats() -> str:
-    return "; ".join(f"{reader.name} ({reader.expects})" for reader in readers())
+    return ", ".join(reader.name for reader in readers())

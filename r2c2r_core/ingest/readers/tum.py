@@ -1,7 +1,9 @@
 """TUM RGB-D: rgb.txt, depth.txt, often groundtruth.txt; depth in 1/5000 m registered to colour; OpenCV camera-to-world, z up.
 
 Also the key-frame layout whose pose file is truth_cam_poses.txt (line i belongs to image i, the clocks differ) and whose
-calibration is an ORB-SLAM settings file. Clocks are associated within 20 ms, poses interpolated. Pixel centres lie at integers.
+calibration is an ORB-SLAM settings file; and sets whose two lists are one, associations.txt (`time file time file`, colour or
+depth first), as ICL-NUIM's, whose poses are in a .freiburg file. Clocks are associated within 20 ms, poses interpolated. Pixel
+centres lie at integers.
 """
 
 import re
@@ -20,7 +22,8 @@ from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_quaternion, read_numbers
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
-_POSE_FILES = ("groundtruth.txt", "truth_cam_poses.txt")
+_POSES = r"groundtruth\.txt|truth_cam_poses\.txt|[^/]+\.freiburg"  # z is up but in the last
+_ASSOCIATIONS = r"associat\w*\.txt"
 _NAMED_IN = ("groundtruth.txt", "rgb.txt", "depth.txt")
 _APART_S = 0.02
 _GAP_S = 0.1  # poses farther apart than this are not interpolated
@@ -42,9 +45,10 @@ class _Calibration(NamedTuple):
 
 def open_tum(files: Files) -> Recording:
     """The recording in a TUM RGB-D folder; raises CaptureError."""
-    rgb, rgb_lines = _image_list(files, "rgb.txt")
-    depth, _ = _image_list(files, "depth.txt")
-    pose_name = next((name for name in _POSE_FILES if name in files.names()), None)
+    lists = _lists(files)
+    rgb, rgb_lines = _present(files, *lists.colour)
+    depth, _ = _present(files, *lists.depth)
+    pose_name = next((name for name in sorted(files.names()) if re.fullmatch(_POSES, name)), None)
     calibration = _calibration(files)
     colour, times = {n: name for n, (_, name) in rgb.items()}, {n: time_s for n, (time_s, _) in rgb.items()}
     placed = _placed(files, pose_name, times, rgb_lines) if pose_name else _Placed({}, times, None)
@@ -63,9 +67,9 @@ def open_tum(files: Files) -> Recording:
         frames=frames,
         colour_of=partial(colour_file, files),
         depth_of=partial(depth_file, files, calibration.units_per_metre),
-        up_capture=np.array([0.0, 0.0, 1.0]) if pose_name else None,
+        up_capture=np.array([0.0, 0.0, 1.0]) if pose_name and not pose_name.endswith(".freiburg") else None,
         notices=(*(notice for notice in (calibration.notice, placed.notice) if notice), *left_out),
-        other_names=("rgb.txt", "depth.txt", *(name for name in (pose_name, calibration.name) if name)),
+        other_names=tuple({lists.colour[0], lists.depth[0], *(name for name in (pose_name, calibration.name) if name)}),
     )
 
 
@@ -108,15 +112,39 @@ def _timed_poses(files: Files, name: str) -> tuple[dict[int, tuple[float, Rigid3
     return posed, len(lines)
 
 
-def _image_list(files: Files, name: str) -> tuple[dict[int, tuple[float, str]], int]:
-    """(time, file) by line, of the files that exist, and how many lines there are."""
-    images = []
+_Listed = list[tuple[float, str]]  # time, file
+
+
+class _Lists(NamedTuple):
+    colour: tuple[str, _Listed]  # the list's own name, and what stands in it
+    depth: tuple[str, _Listed]
+
+
+def _lists(files: Files) -> _Lists:
+    """From rgb.txt and depth.txt, else from the columns of an associations file: a file below depth/ is depth."""
+    if {"rgb.txt", "depth.txt"} <= files.names():
+        colour, depth = (_columns(files, name, 1) for name in ("rgb.txt", "depth.txt"))
+        return _Lists(("rgb.txt", [row[0] for row in colour]), ("depth.txt", [row[0] for row in depth]))
+    name = min(name for name in files.names() if re.fullmatch(_ASSOCIATIONS, name))
+    rows = [row if "depth" in row[1][1].lower() else row[::-1] for row in _columns(files, name, 2)]
+    return _Lists((name, [row[0] for row in rows]), (name, [row[1] for row in rows]))
+
+
+def _columns(files: Files, name: str, count: int) -> list[_Listed]:
+    """`count` pairs of time and file in each line."""
+    rows = []
     for line in lines_of(files, name):
+        words = line.split()
         try:
-            time_s, image = line.split()[:2]
-            images.append((float(time_s), image))
-        except ValueError as problem:
-            raise CaptureError(f"{files.source}/{name}: line '{line[:80]}'", hint="expected 'time filename'") from problem
+            rows.append([(float(words[2 * k]), words[2 * k + 1]) for k in range(count)])
+        except (ValueError, IndexError) as problem:
+            expected = " ".join(["time filename"] * count)
+            raise CaptureError(f"{files.source}/{name}: line '{line[:80]}'", hint=f"expected '{expected}'") from problem
+    return rows
+
+
+def _present(files: Files, name: str, images: _Listed) -> tuple[dict[int, tuple[float, str]], int]:
+    """(time, file) by line, of the files that exist, and how many lines there are."""
     present = {n: (time_s, image) for n, (time_s, image) in enumerate(images) if image in files.names()}
     if not present:
         found = f"none of the {len(images)} files it names exist" if images else "it names no file"
@@ -153,8 +181,8 @@ def _heading(files: Files, name: str) -> str:
 READER = Reader(
     name="TUM RGB-D",
     parts=(
-        Part("rgb.txt", r"rgb\.txt"),
-        Part("depth.txt", r"depth\.txt"),
+        Part("rgb.txt (or associations.txt)", rf"rgb\.txt|{_ASSOCIATIONS}"),
+        Part("depth.txt (or associations.txt)", rf"depth\.txt|{_ASSOCIATIONS}"),
     ),
     open=open_tum,
 )

@@ -56,5 +56,6 @@ export function jointValue(type, value) {
 /** A name as simulators accept it: accents go, and what else is no letter, digit or underscore becomes one. @param {string} typed */
 export function usableName(typed) {
   const plain = typed.trim().normalize("NFKD").replaceAll(/\p{M}/gu, "");
-  return plain.replaceAll(/\W+/g, "_").replaceAll(/^_|_$/g, "");
+  const joined = plain.replaceAll(/\W+/g, "_").replaceAll(/^_|_$/g, "");
+  return /^\d/.test(joined) ? `item_${joined}` : joined; // simulators take no name that begins with a digit
 }

@@ -1,6 +1,7 @@
 """What is particular to the format of each data set, and its traps."""
 
 import json
+import zipfile
 from dataclasses import replace
 
 import cv2
@@ -170,6 +171,26 @@ def test_nerfstudio_fisheyes_are_refused_and_colmaps_world_has_no_up(tmp_path):
     assert open_recording(folder).up_capture is None
 
 
+def test_transforms_beside_folders_of_rgb_and_depth_are_read_with_their_poses_and_unit(tmp_path):
+    """As NeRFCapture writes it: `depth_path`, in steps of integer_depth_scale."""
+    folder = write_nerfstudio(tmp_path / "n", SMALL, integer_depth_scale=1e-3)
+    document = json.loads((folder / "transforms.json").read_text())
+    for old, new in (("images", "rgb"), ("depths", "depth")):
+        (folder / old).rename(folder / new)
+        for path in (folder / new).iterdir():
+            path.rename(path.with_stem(path.stem.removeprefix("frame_")))
+    for entry in document["frames"]:
+        entry["file_path"] = entry["file_path"].replace("images/frame_", "rgb/")
+        entry["depth_path"] = entry.pop("depth_file_path").replace("depths/frame_", "depth/")
+    (folder / "transforms.json").write_text(json.dumps(document))
+    recording = open_recording(folder)
+    assert recording.format == "nerfstudio transforms.json"
+    expected = open_recording(write_nerfstudio(tmp_path / "same", SMALL))
+    for found, same in zip(recording.frames, expected.frames, strict=True):
+        assert np.allclose(found.capture_from_camera.matrix, same.capture_from_camera.matrix)
+        assert np.allclose(recording.depth_of(found).metres, expected.depth_of(same).metres)
+
+
 # TUM RGB-D
 
 
@@ -191,7 +212,88 @@ def test_tums_sequence_is_known_by_the_comments_that_head_its_lists(tmp_path):
     assert open_recording(renamed).frames[0].rgb_camera.fx == 520.9  # what the recording says, before its folder's name
 
 
+def _associated(folder, line):
+    """The two lists as one associations.txt."""
+    rows = [
+        [row for row in (folder / f"{name}.txt").read_text().splitlines() if not row.startswith("#")]
+        for name in ("rgb", "depth")
+    ]
+    (folder / "associations.txt").write_text(
+        "\n".join(line.format(rgb=rgb, depth=depth) for rgb, depth in zip(*rows, strict=True))
+    )
+    for name in ("rgb.txt", "depth.txt"):
+        (folder / name).unlink()
+
+
+@pytest.mark.parametrize("line", ["{rgb} {depth}", "{depth} {rgb}"])
+def test_tums_two_lists_may_be_one_in_either_order(line, tmp_path):
+    as_lists = open_recording(write_tum(tmp_path / "t", SMALL))
+    folder = write_tum(tmp_path / "a", SMALL)
+    _associated(folder, line)
+    recording = open_recording(folder)
+    assert recording.format == "TUM RGB-D"
+    for found, expected in zip(recording.frames, as_lists.frames, strict=True):
+        assert (found.rgb_name, found.depth_name) == (expected.rgb_name, expected.depth_name)
+        assert np.allclose(found.capture_from_camera.matrix, expected.capture_from_camera.matrix)
+
+
+def test_icl_nuims_poses_are_read_and_do_not_tell_which_way_is_up(tmp_path):
+    folder = write_tum(tmp_path / "t", SMALL)
+    _associated(folder, "{depth} {rgb}")
+    (folder / "groundtruth.txt").rename(folder / "livingRoom0.gt.freiburg")
+    recording = open_recording(folder)
+    assert all(frame.capture_from_camera is not None for frame in recording.frames)
+    assert recording.up_capture is None
+
+
+def test_an_associations_file_of_other_columns_is_named_with_what_was_expected(tmp_path):
+    folder = write_tum(tmp_path / "t", SMALL)
+    _associated(folder, "{rgb}")
+    with pytest.raises(CaptureError, match=r"associations\.txt: line") as caught:
+        open_recording(folder)
+    assert "time filename time filename" in caught.value.hint
+
+
 # All of them
+
+
+def test_a_zip_that_windows_packed_is_read_like_the_folder(tmp_path):
+    folder = write_polycam(tmp_path / "p", SMALL)
+    for top in ("", "2026-11-02 kitchen/"):
+        packed = tmp_path / f"{len(top)}.zip"
+        with zipfile.ZipFile(packed, "w") as archive:
+            for path in folder.rglob("*"):
+                member = zipfile.ZipInfo("x")
+                member.filename = (top + path.relative_to(folder).as_posix()).replace("/", "\\") + "\\" * path.is_dir()
+                archive.writestr(member, b"" if path.is_dir() else path.read_bytes())
+        recording = open_recording(packed)
+        assert recording.format == "Polycam raw export"
+        frame = recording.frames[0]
+        assert recording.colour_of(frame) == (folder / frame.rgb_name).read_bytes()
+        assert np.isfinite(recording.depth_of(frame).metres).any()
+
+
+@pytest.mark.parametrize("worth", [np.full(12, np.nan), np.zeros(12)])
+def test_a_recording_whose_poses_are_all_useless_is_opened_without_poses(worth, tmp_path):
+    folder = write_polycam(tmp_path / "p", SMALL)
+    for path in (folder / "keyframes").glob("*cameras/*.json"):
+        camera = json.loads(path.read_text())
+        camera |= {f"t_{n // 4}{n % 4}": value for n, value in enumerate(worth.tolist())}
+        path.write_text(json.dumps(camera))
+    recording = open_recording(folder)
+    assert [frame.capture_from_camera for frame in recording.frames] == [None] * 4
+    assert told(recording, "none of 4 poses")
+
+
+def test_an_unknown_folder_is_told_the_two_nearest_formats_and_what_each_lacks(tmp_path):
+    folder = write_redwood(tmp_path / "r", SMALL)
+    for name in ("trajectory.log", "camera.json"):
+        (folder / name).unlink()
+    with pytest.raises(CaptureError) as caught:
+        open_recording(folder)
+    assert "looks like 7-Scenes folder, but intrinsics_color.txt is missing" in str(caught.value)
+    assert "it would be Redwood / Open3D with trajectory.log or a camera's .json" in caught.value.hint
+    assert len(f"{caught.value}{caught.value.hint}") < 500
 
 
 @pytest.mark.parametrize(

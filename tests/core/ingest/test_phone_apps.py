@@ -47,7 +47,7 @@ def test_stray_without_its_camera_is_named_as_the_nearest_miss(tmp_path):
     (write_stray(tmp_path / "s", SMALL) / "camera_matrix.csv").unlink()
     with pytest.raises(CaptureError, match=r"looks like Stray Scanner, but camera_matrix\.csv is missing") as caught:
         open_recording(tmp_path / "s")
-    assert "Polycam" in caught.value.hint
+    assert "odometry.csv" in caught.value.hint
 
 
 def test_stray_columns_go_by_name(tmp_path):
@@ -148,6 +148,18 @@ def test_polycam_without_corrected_images_uses_the_others(tmp_path):
     corrected = open_recording(write_polycam(tmp_path / "c", SMALL))
     assert "keyframes/corrected_images/" in corrected.frames[0].rgb_name
     assert corrected.frames[1].timestamp_s == pytest.approx(0.25)
+
+
+def test_polycams_corrected_cameras_without_a_size_have_that_of_their_image(tmp_path):
+    """Exports since 2025."""
+    folder = write_polycam(tmp_path / "p", SMALL)
+    for path in (folder / "keyframes" / "corrected_cameras").iterdir():
+        camera = json.loads(path.read_text())
+        del camera["width"], camera["height"]
+        path.write_text(json.dumps(camera))
+    recording = open_recording(folder)
+    assert [frame.rgb_camera for frame in recording.frames] == [ROOM.camera] * 4
+    assert all(frame.capture_from_camera is not None for frame in recording.frames)
 
 
 def test_polycams_frames_are_matched_by_time(tmp_path):

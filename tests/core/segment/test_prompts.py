@@ -131,3 +131,10 @@ def test_no_objects_and_repeated_names_are_refused(boxes: tuple[Capture, Truth])
     twice = prompt("drawer", "drawer", PromptPoint(frame=60, x=10.0, y=10.0, label=1))
     with pytest.raises(PromptError, match="two objects named 'drawer'"):
         check_prompts(boxes[0], Prompts(objects=(twice, twice)))
+
+
+def test_a_name_that_begins_with_a_digit_is_refused_with_one_that_would_do(boxes: tuple[Capture, Truth]) -> None:
+    numbered = prompt("2_door_cabinet_1", "cabinet", PromptPoint(frame=60, x=10.0, y=10.0, label=1))
+    with pytest.raises(PromptError, match="begins with a digit") as caught:
+        check_prompts(boxes[0], Prompts(objects=(numbered,)))
+    assert "item_2_door_cabinet_1" in caught.value.hint

@@ -1,0 +1,135 @@
+"""Elevations of a recording as pictures: what each front was cut on, for a person who looks for the cause of a wrong one.
+
+    python benchmarks/elevations.py RECORDING [--prompts FILE] [--truth FILE] [--workdir DIR] -o DIR
+
+Each vertical plane of the scan gives DIR/plane_NN.png, the largest plane first, with four pictures one below the other:
+the orthomosaic; the same with what was cut on it (green), the fronts that clicks found (orange, by name) and the true ones
+(white); the odds of edges (red upright, blue level) and handles (green) that the cut read; and what the scan has depth for.
+A table says how large each plane is, what was cut and which clicks lie on it. What was prepared is kept in --workdir.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from segment_fronts import TrueFront, true_fronts
+
+from r2c2r_core.arrays import Image
+from r2c2r_core.errors import R2C2RError
+from r2c2r_core.ingest.stage import IngestConfig, read_capture
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.segment.fronts.found import FoundFront
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell, PlaneGrid
+from r2c2r_core.segment.prompts import read_prompts
+from r2c2r_core.segment.runs.run import Run
+from r2c2r_core.segment.stage import open_session
+from r2c2r_core.workspace import Workspace
+
+LEAST_SIDE_M = 0.3  # of a plane that is drawn: a single front is as large
+ON_PLANE_M = 0.03  # of a true front's face from a plane that it is drawn on
+GREEN, ORANGE, WHITE = (90, 200, 90), (40, 140, 255), (255, 255, 255)  # BGR
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw every plane and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recording", type=Path)
+    parser.add_argument("--prompts", type=Path)
+    parser.add_argument("--truth", type=Path)
+    parser.add_argument("--workdir", type=Path, default=Path("elevations-work"))
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    options = parser.parse_args(arguments)
+    capture = read(options.recording, options.workdir)
+    session = open_session(capture, Workspace(options.workdir).cache)
+    prompts = read_prompts(options.prompts).objects if options.prompts else ()
+    found = {prompt.name: front for prompt in prompts if (front := front_of(session, prompt)) is not None}
+    true = list(true_fronts(options.truth, capture.world_from_capture)) if options.truth else []
+    large = [plane for plane in session.planes if min(plane.width_m, plane.height_m) >= LEAST_SIDE_M]
+    runs = [run for plane in sorted(large, key=lambda plane: -plane.area_m2) if (run := session.run_of(plane)) is not None]
+    options.output.mkdir(parents=True, exist_ok=True)
+    for number, run in enumerate(runs):
+        mine = {name: front.front.cell for name, front in found.items() if front.front.run.region is run.region}
+        faces = [cell for front in true if (cell := face_on(run.grid, front)) is not None]
+        cv2.imwrite(str(options.output / f"plane_{number:02d}.png"), drawn(run, mine, faces))
+        size = f"{run.region.width_m:.2f} x {run.region.height_m:.2f} m"
+        print(f"plane_{number:02d}  {size}  {len(run.cells)} cut, {len(faces)} true  {' '.join(mine)}")
+    lost = [prompt.name for prompt in prompts if prompt.name not in found]
+    print(f"no front: {' '.join(lost) or '-'}")
+    return 0
+
+
+def read(recording: Path, folder: Path) -> Capture:
+    """The recording as `r2c2r run` reads it; kept in `folder`."""
+    work = Workspace(folder)
+    if work.load_latest("ingest", "scene") is None:
+        made = read_capture(recording, work.store("elevations"), IngestConfig())
+        work.save("ingest", "scene", made, {"key": "benchmark", "seconds": 0.0})
+    capture: Capture = work.load_latest("ingest", "scene")
+    return capture
+
+
+def front_of(session: Any, prompt: ObjectPrompt) -> FoundFront | None:
+    """What its clicks mean, where that is a front; why not is printed."""
+    try:
+        found = session.find(prompt)
+    except R2C2RError as error:
+        print(f"{prompt.name}: {error}", file=sys.stderr)
+        return None
+    return found if isinstance(found, FoundFront) else None
+
+
+def face_on(grid: PlaneGrid, front: TrueFront) -> Cell | None:
+    """A true front's face in grid cells; None where it lies on another plane."""
+    half = np.array([front.width_m, front.height_m]) / 2
+    corners = front.world_from_face.apply(np.array([[-half[0], 0.0, half[1]], [half[0], 0.0, -half[1]]]))
+    local = grid.world_from_plane.inverse.apply(corners)
+    facing = float(grid.outward @ -front.world_from_face.rotation[:, 1])
+    if facing < np.cos(np.deg2rad(10)) or np.abs(local[:, 1]).max() > ON_PLANE_M:
+        return None
+    (left, top), (right, bottom) = grid.cells_of(corners).tolist()
+    inside = 0 < (left + right) / 2 < grid.columns and 0 < (top + bottom) / 2 < grid.rows
+    return Cell(left, top, right, bottom) if inside else None
+
+
+def drawn(run: Run, found: dict[str, Cell], true: Sequence[Cell]) -> Image:
+    """The four pictures of a plane."""
+    plain = np.ascontiguousarray(run.mosaic[..., ::-1])
+    cut = plain.copy()
+    for cell in true:
+        outline(cut, cell, WHITE, 3)
+    for cell in run.cells:
+        outline(cut, cell, GREEN, 2)
+    for name, cell in found.items():
+        outline(cut, cell, ORANGE, 1)
+        at = (round(cell.left) + 4, round(cell.top) + 16)
+        cv2.putText(cut, name, at, cv2.FONT_HERSHEY_SIMPLEX, 0.45, ORANGE, 1, cv2.LINE_AA)
+    odds = np.stack([run.odds.level, run.odds.handle, run.odds.upright], axis=-1)  # BGR
+    shares = np.round(255 / (1 + np.exp(-odds))).astype(np.uint8)
+    shares = cv2.resize(shares, None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST)
+    depth = np.repeat(255 * run.seen.astype(np.uint8)[..., None], 3, axis=2)
+    size = (run.grid.columns, run.grid.rows)
+    return np.concatenate([fitted(picture, size) for picture in (plain, cut, shares, depth)])
+
+
+def fitted(picture: Image, size: tuple[int, int]) -> Image:
+    """The picture cut or padded to a plane's grid, with a line below it."""
+    out = np.zeros((size[1] + 2, size[0], 3), np.uint8)
+    part = picture[: size[1], : size[0]]
+    out[: part.shape[0], : part.shape[1]] = part
+    out[-2:] = 255
+    return out
+
+
+def outline(picture: Image, cell: Cell, colour: tuple[int, int, int], width: int) -> None:
+    """A rectangle of grid cells, drawn in place."""
+    corners = (round(cell.left), round(cell.top)), (round(cell.right), round(cell.bottom))
+    cv2.rectangle(picture, *corners, colour, width)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
