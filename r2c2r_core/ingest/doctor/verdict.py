@@ -174,13 +174,14 @@ def _conventions(
 
 
 def _unregistered(found: Registration) -> Remark:
+    """Unusable only from where masks suffer: depth's own pixels are 2.5 px of 640 on a phone."""
+    verdict: Verdict = "unusable" if found.off_px > tuned(Params).masks_px else "usable with care"
     if found.focal_only:
         text = f"the colour camera's focal length is off by {abs(1 / found.focal_factor - 1):.0%}"
         gain = f": depth lies {found.off_px:.0f} px of 640 beside the picture"
-        return _remark("unusable", "colour_focal_length", text + gain, f"correct the colour calibration, or {_REGISTER}")
+        return _remark(verdict, "colour_focal_length", text + gain, f"correct the colour calibration, or {_REGISTER}")
     text = f"the depth is not registered to the colour images: it lies {found.off_px:.0f} px of 640 beside them"
     fit = f" (fits with {found.focal_factor:.3f} x the focal length, {found.shift_mm[0]:.0f} and {found.shift_mm[1]:.0f} mm)"
-    verdict: Verdict = "unusable" if found.off_px > tuned(Params).masks_px else "usable with care"
     return _remark(verdict, "unregistered", text + fit, f"export registered depth, or {_REGISTER}")
 
 

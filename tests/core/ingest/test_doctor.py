@@ -177,6 +177,11 @@ def test_colour_elsewhere_than_its_calibration_says_is_told(capture):
     report = examine(with_frames(capture, lambda _, f: replace(f, rgb_camera=longer)))
     assert report.remarks[0].cause == "colour_focal_length"
     assert report.registration.focal_factor == pytest.approx(1 / 1.1, rel=0.05)  # a depth pixel is 4 px of 640
+    verdicts = {}
+    for off_px in (3.0, 9.0):  # a depth pixel of a phone, and more than masks bear
+        found = judge(report.figures, None, None, replace(report.registration, off_px=off_px, limit_px=2.5))
+        verdicts[off_px] = next(remark.verdict for remark in found if remark.cause == "colour_focal_length")
+    assert verdicts == {3.0: "usable with care", 9.0: "unusable"}
     beside = replace(camera, cx=camera.cx + 10.0)
     report = examine(with_frames(capture, lambda _, f: replace(f, rgb_camera=beside)))
     assert report.remarks[0].cause == "unregistered"
