@@ -38,7 +38,7 @@ def open_nerfstudio(files: Files) -> Recording:
     document = read_json_object(files, _TRANSFORMS)
     entries = _entries(files, document)
     colour, masks = (_named(files, entries, key) for key in ("file_path", "mask_path"))
-    depth = next((found for key in _DEPTHS if (found := _named(files, entries, key))), {})
+    depth = next((named for key in _DEPTHS if (named := _named(files, entries, key))), {})
     if not depth:
         said = sum(any(key in entry for key in _DEPTHS) for entry in entries.values())
         raise CaptureError(
