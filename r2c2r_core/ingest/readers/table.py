@@ -14,6 +14,7 @@ from r2c2r_core.ingest.readers import (
     record3d,
     record3d_exr,
     redwood,
+    rtabmap,
     scanner_app,
     scannet,
     seven_scenes,
@@ -37,6 +38,7 @@ READERS: tuple[Reader, ...] = (
     seven_scenes.READER,
     threedmatch.READER,
     tum.READER,
+    rtabmap.READER,
     nerfstudio.READER,  # before Redwood, whose folders it may have beside its transforms.json
     redwood.READER,
     arti4d.READER,

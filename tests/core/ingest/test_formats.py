@@ -19,6 +19,7 @@ from .tiny_formats import (
     write_nerfstudio,
     write_polycam,
     write_redwood,
+    write_rtabmap,
     write_scannet,
     write_threedmatch,
 )
@@ -252,6 +253,27 @@ def test_an_associations_file_of_other_columns_is_named_with_what_was_expected(t
     with pytest.raises(CaptureError, match=r"associations\.txt: line") as caught:
         open_recording(folder)
     assert "time filename time filename" in caught.value.hint
+
+
+# RTAB-Map
+
+
+@pytest.mark.parametrize(("by_id", "of_camera"), [(True, True), (False, False), (True, False)])
+def test_rtabmaps_files_are_named_by_node_or_time_and_its_poses_are_of_the_camera_or_the_device(by_id, of_camera, tmp_path):
+    expected = open_recording(write_rtabmap(tmp_path / "e", SMALL))
+    found = open_recording(write_rtabmap(tmp_path / "f", SMALL, by_id=by_id, of_camera=of_camera))
+    assert [frame.index for frame in found.frames] == [0, 5, 10, 15]
+    for one, same in zip(found.frames, expected.frames, strict=True):
+        assert np.allclose(one.capture_from_camera.matrix, same.capture_from_camera.matrix)
+        assert (one.rgb_camera, one.depth_camera) == (same.rgb_camera, same.depth_camera)
+
+
+def test_rtabmaps_poses_of_another_format_are_named_with_what_was_expected(tmp_path):
+    folder = write_rtabmap(tmp_path / "r", SMALL)
+    (folder / "kitchen_camera_poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    with pytest.raises(CaptureError, match="time x y z qx qy qz qw") as caught:
+        open_recording(folder)
+    assert "format 11" in caught.value.hint
 
 
 # All of them

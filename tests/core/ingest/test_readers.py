@@ -19,6 +19,7 @@ from .tiny_formats import (
     write_nerfstudio,
     write_polycam,
     write_redwood,
+    write_rtabmap,
     write_scanner_app,
     write_scannet,
     write_stray,
@@ -58,6 +59,7 @@ WRITERS = {
     "nerfstudio": write_nerfstudio,
     "3dmatch": write_threedmatch,
     "redwood": write_redwood,
+    "rtabmap": write_rtabmap,
     "arti4d": write_arti4d,
 }
 KINDS = ("r3d", "r3d-folder", "exr", "exr-below", *WRITERS, "7scenes-zip", "stray-zip", "polycam-zip", "3dmatch-zip")

@@ -184,6 +184,32 @@ def write_redwood(folder: Path, room: TinyRoom, *, first: int = 0, calibrated: b
     return folder
 
 
+def write_rtabmap(folder: Path, room: TinyRoom, *, by_id: bool = False, of_camera: bool = True) -> Path:
+    """rtabmap-export: files named by time or by node, poses of the camera or of the device that carries it."""
+    for name in ("rgb", "depth", "calib"):
+        (folder / f"kitchen_{name}").mkdir(parents=True)
+    optical = Rigid3(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]), np.array([0.02, 0.0, 0.05]))
+    matrix, (width, height) = integer_centred(room.camera), room.rgb_size
+    rows = ["#timestamp x y z qx qy qz qw id"]
+    for k, pose in enumerate(room.poses()):
+        stamp, node = 1700000000.25 + 0.25 * k, 5 * k
+        stem = str(node) if by_id else f"{stamp:f}"
+        (folder / "kitchen_rgb" / f"{stem}.jpg").write_bytes(jpeg(room.image(pose, room.camera)))
+        cv2.imwrite(str(folder / "kitchen_depth" / f"{stem}.png"), millimetres(room.depth(pose, room.depth_camera)))
+        numbers = {"camera_matrix": matrix, "distortion_coefficients": np.zeros(5), "local_transform": optical.matrix[:3]}
+        blocks = [
+            f"{key}:\n   rows: 3\n   cols: 3\n   data: [{', '.join(f'{n:.17g}' for n in np.ravel(values))}]"
+            for key, values in numbers.items()
+        ]
+        head = f"%YAML:1.0\n---\ncamera_name: '{stem}'\nimage_width: {width}\nimage_height: {height}"
+        (folder / "kitchen_calib" / f"{stem}.yaml").write_text("\n".join([head, *blocks]) + "\n")
+        stored = pose if of_camera else pose @ optical.inverse
+        quaternion = Rotation.from_matrix(stored.rotation).as_quat()
+        rows.append(" ".join([f"{stamp:.6f}", *(f"{n:.17g}" for n in (*stored.translation, *quaternion)), str(node)]))
+    (folder / f"kitchen_{'camera_' if of_camera else ''}poses.txt").write_text("\n".join(rows) + "\n")
+    return folder
+
+
 def write_nerfstudio(folder: Path, room: TinyRoom, *, depth: bool = True, npy: bool = False, **top: object) -> Path:
     """transforms.json with the camera in every frame; `top`: keys to add."""
     for name in ("images", "depths"):
