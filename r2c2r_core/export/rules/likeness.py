@@ -52,7 +52,8 @@ def _contradictions(entries: list[dict[str, Any]], present: set[str]) -> Iterato
     """Those among objects of the bundle: what was left out of it contradicts nothing there."""
     for entry in entries:
         if entry["rule"] in LIKENESS_RULES and present.issuperset(entry["objects"]):
-            yield finding(entry["rule"], ", ".join(entry["objects"]), f"{entry['message']}; {entry['mend']}")
+            where = ", ".join(entry["objects"])
+            yield finding(entry["rule"], where, f"{entry['message'].removeprefix(f'{where} ')}; {entry['mend']}")
 
 
 def _unsure_place(item: dict[str, Any]) -> Iterator[Finding]:

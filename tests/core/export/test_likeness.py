@@ -38,6 +38,12 @@ def test_a_contradiction_of_the_segmenter_is_a_finding(good_folder: Path) -> Non
     assert found.message == "both are on the same thing; delete one"
 
 
+def test_a_finding_about_one_object_does_not_repeat_its_name(good_folder: Path) -> None:
+    unsure = Contradiction(rule="edge-unsure", objects=("cabinet_1",), message="cabinet_1 is 35 % sure", mend="draw it")
+    (found,) = findings(good_folder, document(kitchen(), unsure))
+    assert (found.where, found.message) == ("cabinet_1", "is 35 % sure; draw it")
+
+
 def test_a_door_that_something_all_but_locks_is_a_finding(good_folder: Path) -> None:
     scene = kitchen()
     for share, count in ((0.6, 0), (0.4, 1)):

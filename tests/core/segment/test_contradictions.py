@@ -129,7 +129,7 @@ def test_an_edge_that_hardly_shows_and_a_seam_that_was_not_cut_are_asked_about()
     (doubt,) = found((faint, clicked))
     assert doubt.rule == "edge-unsure"
     assert (
-        "door_1 (50 x 70 cm) is 35 % sure: its right and upper edges hardly show, and there may be a seam inside it (30 %)"
+        "door_1 is 35 % sure at 50 x 70 cm: its right and upper edges hardly show, and there may be a seam inside it (30 %)"
         in doubt.message
     )
 
