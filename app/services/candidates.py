@@ -15,6 +15,8 @@ from app.jobs.plain import plain
 from app.services import views
 from app.services.context import Context
 from app.services.views import KeptFacts
+from r2c2r_core.errors import GenerationFailed
+from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.schema.overrides import MOST_BATCHES
 from r2c2r_core.workspace import noun_path
@@ -57,6 +59,8 @@ def _group(
     if facts is None:
         return None
     override, verdicts = said.overrides.get(item.id or 0, {}), said.verdicts.get(item.id or 0, {})
+    if override.get("rejected"):
+        facts = facts | _choice_without(files, item.result_name, tuple(override["rejected"]))
     accepted = next((v.candidate for v in verdicts.values() if v.verdict == "accepted"), None)
     steps = said.steps.get(item.id, history.Steps())
     placement = kept.of("align", item.result_name, plain)
@@ -85,6 +89,18 @@ def _group(
         can_redo=steps.redo,
         can_regenerate=(override.get("regenerate") or 0) < MOST_BATCHES,
     )
+
+
+def _choice_without(files: ProjectFiles, name: str, rejected: tuple[str, ...]) -> dict[str, Any]:
+    """What the next run chooses where people rejected some, by the pipeline's own rule; nothing where all are."""
+    from r2c2r_core.config import ReconstructConfig
+    from r2c2r_core.generate.candidates import select_candidate
+
+    found = views.latest(files, "generate", name)
+    try:
+        return _choice(select_candidate(found, ObjectOverride(rejected=rejected), ReconstructConfig().generate.rule))
+    except GenerationFailed as error:
+        return {"chosen_id": "", "reason": str(error)}
 
 
 def _candidate(entry: dict[str, Any], verdict: Verdict | None, address: str, version: str) -> schemas.Candidate:
@@ -132,8 +148,11 @@ def facts_of(files: ProjectFiles, name: str) -> dict[str, Any] | None:
 def _candidate_facts(found: CandidateSet) -> dict[str, Any]:
     kept = ("candidate_id", "generator", "seed", "assumes", "watertight", "frames", "metrics", "parameters", "warnings")
     candidates = [{**{key: plain(getattr(c, key)) for key in kept}, "faces": len(c.mesh.faces)} for c in found.candidates]
-    about = {key: plain(getattr(found, key)) for key in ("chosen_id", "chosen_by", "reason", "ranking")}
-    return {**about, "candidates": candidates}
+    return {**_choice(found), "candidates": candidates}
+
+
+def _choice(found: CandidateSet) -> dict[str, Any]:
+    return {key: plain(getattr(found, key)) for key in ("chosen_id", "chosen_by", "reason", "ranking")}
 
 
 def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:

@@ -98,7 +98,7 @@ def asset(name: str, candidate: str) -> MeshAsset:
         seed=0,
         watertight=True,
         frames=(3, 7),
-        metrics={"volume": 1.0, "odd": float("nan")},
+        metrics={"volume": 1.0, "odd": float("nan"), "extent_middle": 0.8, "extent_short": 0.5, "volume_ratio": 0.9},
         parameters={},
         warnings=(),
         assumes="0.58 m deep, to the wall behind it",

@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from app.serve import register_finished
+from r2c2r_core.generate.candidates import select_candidate
+from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.workspace import Workspace
 from tests.app.conftest import Running
 from tests.app.finished import copy_finished
@@ -42,7 +44,9 @@ def test_candidates_come_with_their_evidence_the_choice_and_its_reason(reviewed:
         "closest to the others",
     )
     assert [c["id"] for c in group["candidates"]] == ["c0", "c1"]
-    assert group["candidates"][0]["metrics"] == {"volume": 1.0}  # what is not a number is left out
+    metrics = group["candidates"][0]["metrics"]
+    assert metrics["volume"] == 1.0
+    assert "odd" not in metrics  # what is not a number is left out
     assert group["candidates"][0]["assumes"] == "0.58 m deep, to the wall behind it"
     assert (group["placement"]["candidate"], group["placement"]["rms_m"], group["placement"]["votes"]) == (
         "c0",
@@ -89,6 +93,31 @@ def test_rejecting_is_recorded_with_its_reason_and_makes_new_ones(reviewed: Revi
     assert said["group"]["candidates"][0]["verdict_reason"] == "the handle is missing"
     web.job(said["job"]["id"], "done")
     assert overrides(web, project) == {"rejected": ["c0"]}
+
+
+def test_the_candidate_that_is_shown_as_used_is_the_one_that_the_run_takes_after_every_verdict(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    address = f"/api/projects/{project}/objects/{number}"
+    work = Workspace(web.settings.data_dir / "projects" / project / "work")
+
+    def shown_and_taken() -> tuple[str, str]:
+        said = web.get(f"{address}/override")
+        corrected = ObjectOverride(candidate=said["candidate"], rejected=tuple(said["rejected"]))
+        taken = select_candidate(work.load_latest("generate", "drawer_1"), corrected, "medoid")
+        return web.get(f"{address}/candidates")["chosen"], taken.chosen_id
+
+    assert shown_and_taken() == ("c0", "c0")
+    said = web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "rejected", "rerun": False})
+    assert said["group"]["chosen"] == "c1"  # at once, before any run
+    assert shown_and_taken() == ("c1", "c1")
+    web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "accepted", "rerun": False})
+    assert shown_and_taken() == ("c0", "c0")
+    web.post(f"/api/projects/{project}/undo", {"object": number, "scope": "review"})
+    assert shown_and_taken() == ("c1", "c1")
+    web.post(f"{address}/verdicts", {"candidate": "c1", "verdict": "rejected", "rerun": False})
+    group = web.get(f"{address}/candidates")
+    assert group["chosen"] == ""  # nothing is used until further ones are made
+    assert "every candidate was rejected" in group["reason"]
 
 
 def test_rejecting_the_last_candidate_or_asking_makes_further_ones(reviewed: Reviewed) -> None:
