@@ -23,14 +23,21 @@ export function cards(group, current, told) {
  * @param {CandidateGroup} group
  */
 export function choice(group) {
-  const second = group.ranking.find((id) => id !== group.chosen);
+  const second = runnerUp(group);
+  const how = group.chosen_by === "person" ? "Chosen by a person: " : "Chosen automatically: ";
   return h(
     "p",
     { class: "why" },
-    group.chosen_by === "person" ? "Chosen by a person: " : "Chosen automatically: ",
+    group.chosen ? how : "None is used: ",
     h("span", { class: "muted" }, group.reason),
     second ? h("span", { class: "muted" }, ` Runner-up: ${second}.`) : "",
   );
+}
+
+/** The next best that nobody rejected. @param {CandidateGroup} group */
+function runnerUp(group) {
+  const rejected = new Set(group.candidates.filter(({ verdict }) => verdict === "rejected").map(({ id }) => id));
+  return group.ranking.find((id) => id !== group.chosen && !rejected.has(id));
 }
 
 /** Its candidates, the one that is used first. @param {CandidateGroup} group */
@@ -52,7 +59,7 @@ function card(group, candidate, current, told) {
   show.append(h("img", { src: candidate.thumbnail, alt: "", loading: "lazy" }));
   show.dataset.at = `show:${candidate.id}`;
   show.addEventListener("click", () => told.show(candidate));
-  const second = candidate.id === group.ranking.find((id) => id !== group.chosen);
+  const second = candidate.id === runnerUp(group);
   const said = candidate.verdict
     ? `${candidate.verdict} by ${candidate.verdict_by}${candidate.verdict_reason ? `: ${candidate.verdict_reason}` : ""}`
     : "";
