@@ -184,7 +184,7 @@ def _solved_in_rounds(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]
 def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, float]]:
     """Index pairs whose boxes come nearer than GAP_M (REST_GAP_M vertically, for what stands on the other), and by how much.
 
-    Leaves that pass each other have one body, and each its own track: they part nothing. Nor do a table and a chair under it.
+    Leaves that pass each other have one body, and each its own track: they part nothing.
     """
     if len(items) < 2:
         return []
@@ -197,15 +197,8 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
         if d > 1e-6 and not _rests_on(items[i], items[j]) and not _rests_on(items[j], items[i]):
             if (items[i].fixed_by_person and items[j].fixed_by_person) or lap_of(items[i], items[j]) is not None:
                 continue
-            if not _pushed_under(items[i], items[j]):
-                found.append((i, j, d))
+            found.append((i, j, d))
     return found
-
-
-def _pushed_under(first: MeasuredObject, second: MeasuredObject) -> bool:
-    """Whether a seat may stand under a table: their boxes are mostly air, so that they say nothing of an overlap."""
-    both_on_legs = first.spec.on_legs and second.spec.on_legs
-    return both_on_legs and first.spec.flat_top != second.spec.flat_top
 
 
 def _rests_on(top: MeasuredObject, below: MeasuredObject) -> bool:
