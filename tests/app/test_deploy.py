@@ -23,7 +23,7 @@ from websockets.sync.client import connect
 from app.main import create_app
 from app.services import accounts, tokens
 from app.settings import LOOPBACK, Settings
-from r2c2r_core.cli import _parser
+from r2c2r_core.cli import build_parser
 from r2c2r_core.client import Server
 from tests.app.conftest import FAKE_COMMANDS
 from tests.app.people import PASSWORD
@@ -258,7 +258,7 @@ def named_server(name: str) -> Iterator[int]:
 def test_the_containers_run_commands_that_exist() -> None:
     compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
     services, server = compose["services"], compose["services"]["r2c2r"]
-    given = _parser().parse_args([part.replace("${R2C2R_NAME:?}", NAME) for part in server["command"]])
+    given = build_parser().parse_args([part.replace("${R2C2R_NAME:?}", NAME) for part in server["command"]])
     subnet = compose["networks"]["default"]["ipam"]["config"][0]["subnet"]
     assert (given.host, given.behind_proxy) == ("0.0.0.0", [subnet])
     assert (DEPLOY / server["build"]["context"] / server["build"]["dockerfile"]).resolve() == DEPLOY / "Containerfile"
@@ -298,7 +298,7 @@ def test_kubernetes_objects_follow_the_apis_schema_and_run_commands_that_exist()
         assert kinds[kind, name]["selector"]["matchLabels"] == kinds[kind, name]["template"]["metadata"]["labels"]
         assert {mount["name"] for mount in container["volumeMounts"]} == {volume["name"] for volume in pod["volumes"]}
         if "args" in container:
-            _parser().parse_args([part.replace("$(R2C2R_NAME)", settings["R2C2R_NAME"]) for part in container["args"]])
+            build_parser().parse_args([part.replace("$(R2C2R_NAME)", settings["R2C2R_NAME"]) for part in container["args"]])
     assert len(settings["R2C2R_AT"].split()) == kinds["StatefulSet", "r2c2r"]["replicas"]
     assert all(at.endswith(f".{kinds['StatefulSet', 'r2c2r']['serviceName']}:8000") for at in settings["R2C2R_AT"].split())
     assert all((DEPLOY / name).is_file() for name in [*kustomization["resources"], *made["caddyfile"]["files"]])

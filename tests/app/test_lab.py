@@ -13,7 +13,7 @@ from sqlmodel import select
 
 from app.db.engine import opened, reading
 from app.db.tables import Account, Project, Webhook
-from r2c2r_core.cli import _parser
+from r2c2r_core.cli import build_parser
 from tests.app.object_server import BUCKET, object_server
 from tests.app.people import PASSWORD
 from tests.app.postgres import PostgresServer, programs
@@ -57,7 +57,7 @@ def test_every_command_of_the_page_is_understood() -> None:
     given = [found[1] for line in commands if (found := re.search(r"(?:^|\()r2c2r ([^)]*)", line))]
     assert len(given) > 10
     for words in given:
-        known = _parser().parse_args(shlex.split(words.replace("$project", "project")))
+        known = build_parser().parse_args(shlex.split(words.replace("$project", "project")))
         assert callable(known.command), words
 
 
