@@ -82,19 +82,22 @@ class FarWorkers:
         self._channel = channel
         self._seats: dict[str, int] = {}  # how many each runs
         self._workers: dict[str, FarWorker] = {}
+        self._lock = threading.Lock()
         channel.hears |= {"live-seat": self._offered, "live-line": self._said, "live-end": self._ended}
         channel.on_gone.append(lambda seat, _vanished: self._gone(seat))
         channel.on_gap.append(self._miss)
 
     def start(self, project: str, files: ProjectFiles, options: tuple[str, ...]) -> FarWorker | None:
         """One for the project; None where no seat takes any, or the project's files are this machine's alone."""
-        seats = dict(self._seats)
-        if not seats or files.work.parent != files.root:
+        if files.work.parent != files.root:
             return None
-        worker = FarWorker(self._channel, min(seats, key=lambda seat: seats[seat]), files)
+        with self._lock:  # a seat that goes meanwhile ends what was begun there
+            if not self._seats:
+                return None
+            worker = FarWorker(self._channel, min(self._seats, key=self._seats.__getitem__), files)
+            self._workers[worker.id] = worker
+            self._seats[worker.seat] += 1  # until it says so itself
         files.elevations.mkdir(parents=True, exist_ok=True)
-        self._workers[worker.id] = worker
-        self._seats[worker.seat] += 1  # until it says so itself
         worker.tell("live-start", project=project, options=options)
         return worker
 
@@ -116,9 +119,12 @@ class FarWorkers:
         self._workers.clear()
 
     def _gone(self, seat: str) -> None:
-        self._seats.pop(seat, None)
-        for worker in [worker for worker in self._workers.values() if worker.seat == seat]:
-            del self._workers[worker.id]
+        with self._lock:
+            self._seats.pop(seat, None)
+            lost = [worker for worker in self._workers.values() if worker.seat == seat]
+            for worker in lost:
+                del self._workers[worker.id]
+        for worker in lost:
             worker.ended()
 
 

@@ -5,12 +5,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import psutil
 import pytest
 
 from app import work
+from app.jobs.far import FarWorkers
 from tests.app.conftest import FAKE_COMMANDS, Running, running
 from tests.app.object_server import REQUIRED
 from tests.app.postgres import PostgresServer
@@ -104,6 +106,18 @@ def test_a_seat_that_ends_leaves_its_masks_to_the_server(shared: dict[str, Any],
             end()
             web.until(lambda: segmenters() == [str(tmp_path / f"web/projects/{project}/work")])
             web.until(lambda: state(web, project) == "running")
+
+
+def test_a_seat_that_goes_while_a_segmenter_is_begun_there_ends_it(tmp_path: Path) -> None:
+    channel: Any = SimpleNamespace(hears={}, on_gone=[], on_gap=[], say=lambda *_: None)
+    workers = FarWorkers(channel)
+    channel.hears["live-seat"]("seat", {"runs": 0})
+    goes = SimpleNamespace(mkdir=lambda **_: channel.on_gone[0]("seat", True))
+    files: Any = SimpleNamespace(root=tmp_path, work=tmp_path / "work", elevations=goes)
+    begun = workers.start("project", files, ())
+    assert begun is not None
+    assert not begun.alive
+    assert workers.start("project", files, ()) is None  # no seat is left
 
 
 def test_segmenters_of_a_server_that_is_gone_end(shared: dict[str, Any], tmp_path: Path) -> None:
