@@ -39,7 +39,7 @@ test("what a person wrote becomes names that can be used, each with a category",
     [
       { name: "Top_drawer", category: "drawer" },
       { name: "wall_cabinet_2", category: "wall_cabinet" },
-      { name: "7", category: "object" },
+      { name: "item_7", category: "object" }, // no name begins with a digit
     ],
   );
 });

@@ -36,7 +36,7 @@ export function fromText(text) {
   return text.split("\n").flatMap((line) => {
     const [first = "", ...rest] = line.split(/[,;\t]/);
     const name = usableName(first);
-    const category = rest.join(" ").trim() || name.replace(/_?\d+$/, "") || "object";
+    const category = rest.join(" ").trim() || usableName(first.replace(/\d+\s*$/, "")) || "object";
     return name ? [{ name, category }] : [];
   });
 }
