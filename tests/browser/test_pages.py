@@ -148,6 +148,12 @@ def test_lines_for_a_simulator_are_copied_by_keyboard_and_robots_are_seen(
     page.keyboard.press("Enter")
     expect(page.get_by_text("pip install pybullet")).to_be_visible()
     expect(page.get_by_text("pip install mujoco", exact=True)).to_be_hidden()  # one is open at a time
+    summary = page.locator("summary", has_text="PyBullet")
+    drawn = summary.element_handle()
+    page.evaluate("import('/static/js/live.js').then(({ live }) => live.dispatchEvent(new Event('project')))")
+    page.wait_for_function("summary => !summary.isConnected", arg=drawn)  # a word of the project draws the page anew
+    expect(page.get_by_text("pip install pybullet")).to_be_visible()
+    expect(summary).to_be_focused()
     page.get_by_role("button", name="Copy the lines for PyBullet").focus()
     page.keyboard.press("Enter")
     wait_for_toast(page, "Copied")

@@ -122,7 +122,13 @@ function simulator({ simulator: name, install, code, note, loader }, certificate
   return h(
     "details",
     { class: "simulator", name: "simulator", open },
-    h("summary", {}, name, " ", h("span", { class: `chip ${tone}`, title: verdict?.detail ?? "" }, tried)),
+    h(
+      "summary",
+      { "data-at": `simulator:${name}` },
+      name,
+      " ",
+      h("span", { class: `chip ${tone}`, title: verdict?.detail ?? "" }, tried),
+    ),
     h("p", { class: "muted" }, install),
     copyable(code, `the lines for ${name}`),
     note ? h("p", { class: "muted" }, note) : null,
@@ -135,7 +141,11 @@ function simulator({ simulator: name, install, code, note, loader }, certificate
  * @param {string} what
  */
 function copyable(text, what) {
-  const copy = h("button", { type: "button", class: "quiet", "aria-label": `Copy ${what}` }, "Copy");
+  const copy = h(
+    "button",
+    { type: "button", class: "quiet", "aria-label": `Copy ${what}`, "data-at": `copy:${what}` },
+    "Copy",
+  );
   copy.addEventListener("click", () => navigator.clipboard.writeText(text).then(() => say("Copied"), sayError));
   return h("div", { class: "copyable" }, h("pre", { tabIndex: 0, role: "region", "aria-label": what }, text), copy);
 }

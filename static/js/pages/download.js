@@ -61,11 +61,22 @@ export class DownloadPage extends LiveElement {
     this.#variants.after(...(inside?.robots ?? []).map(robotCard), this.#versions(bundles));
   }
 
-  /** The page drawn anew but for the variants: somebody may type there. @param {...(Node | string)} before them */
+  /**
+   * The page drawn anew but for the variants: somebody may type there. What is unfolded stays so, and who is at it by keyboard.
+   * @param {...(Node | string)} before them
+   */
   #around(...before) {
+    /** @param {string} which @returns {HTMLElement | null} */
+    const one = (which) => this.querySelector(which);
+    const [unfolded, at] = ["details[open] > [data-at]", "[data-at]:focus"].map(
+      (which) => one(which)?.dataset.at ?? "",
+    );
     for (const child of [...(this.#variants.parentElement?.childNodes ?? [])])
       if (child !== this.#variants) child.remove();
     this.#variants.before(...before);
+    const details = one(`[data-at="${CSS.escape(unfolded ?? "")}"]`)?.parentElement;
+    if (details instanceof HTMLDetailsElement) details.open = true;
+    one(`[data-at="${CSS.escape(at ?? "")}"]`)?.focus({ preventScroll: true });
   }
 
   #empty() {
