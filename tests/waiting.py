@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import psutil
+
 FACTOR = float(os.environ.get("R2C2R_PATIENCE", "1"))
 PATIENCE_S = 180 * FACTOR
 """Seconds until a test gives up waiting for what should happen: nothing that works comes near it."""
@@ -24,6 +26,14 @@ def until(condition: Callable[[], object], said: str = "what was waited for did 
         assert looked < deadline, said
         time.sleep(min(max(LOOK_S, REST * (looked - began)), LONGEST_S))
         began = time.monotonic()
+
+
+def gone(process: psutil.Process) -> bool:
+    """Whether a process has ended, be it unknown to its parent yet; it may end between two questions."""
+    try:
+        return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
 
 
 @contextmanager

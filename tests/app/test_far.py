@@ -1,5 +1,6 @@
 """Live segmenters at a seat: drawn there, shown where pages are served, ended with whoever wanted them."""
 
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -51,7 +52,8 @@ def live_seat(web: Running, folder: Path) -> Iterator[Callable[[], None]]:
 
 def segmenters() -> list[str]:
     """The folders that live segmenters of this process work on."""
-    lines = [child.cmdline() for child in psutil.Process().children() if child.status() != psutil.STATUS_ZOMBIE]
+    processes = [found.info for found in psutil.process_iter(["ppid", "cmdline"])]  # passes over what ends meanwhile
+    lines = [found["cmdline"] or [] for found in processes if found["ppid"] == os.getpid()]
     return [line[line.index(FAKE_COMMANDS.live[-1]) + 1] for line in lines if FAKE_COMMANDS.live[-1] in line]
 
 

@@ -16,7 +16,7 @@ from app.process import python_module
 from app.settings import Settings
 from app.store.opening import open_store
 from tests.app.object_server import REQUIRED
-from tests.waiting import PATIENCE_S, until
+from tests.waiting import PATIENCE_S, gone, until
 
 SAYS = """
 import json, pathlib, sys
@@ -128,7 +128,7 @@ def test_a_process_group_ends_with_who_began_it() -> None:
             assert len(group) == 2
             tethered.stdin.close()
             tethered.wait(timeout=PATIENCE_S)
-            until(lambda: not any(process.is_running() and process.status() != psutil.STATUS_ZOMBIE for process in group))
+            until(lambda: all(gone(process) for process in group))
         finally:
             for process in (*group, tethered):
                 with suppress(psutil.NoSuchProcess):

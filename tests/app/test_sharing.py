@@ -18,7 +18,7 @@ from tests.app.postgres import PostgresServer
 from tests.app.served import take_jobs
 from tests.app.test_jobs import behave, run
 from tests.forked import Forked
-from tests.waiting import FACTOR
+from tests.waiting import FACTOR, gone
 
 SHARED = {"segment": "objects", "generate": "objects"}
 NAMES = ("drawer_1", "mug_1")  # of the sample
@@ -51,10 +51,6 @@ def stored(folder: Path) -> dict[str, bytes]:
 
 def process_at(folder: Path, name: str) -> psutil.Process:
     return psutil.Process(int((folder / f"at-{name}.part").read_text()))
-
-
-def gone(process: psutil.Process) -> bool:
-    return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
 
 
 def parts(web: Running) -> list[Part]:
