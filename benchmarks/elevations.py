@@ -16,19 +16,15 @@ from typing import Any
 
 import cv2
 import numpy as np
-from segment_fronts import TrueFront, true_fronts
+from segment_fronts import TrueFront, opened_recording, true_fronts
 
 from r2c2r_core.arrays import Image
 from r2c2r_core.errors import R2C2RError
-from r2c2r_core.ingest.stage import IngestConfig, read_capture
-from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell, PlaneGrid
 from r2c2r_core.segment.prompts import read_prompts
 from r2c2r_core.segment.runs.run import Run
-from r2c2r_core.segment.stage import open_session
-from r2c2r_core.workspace import Workspace
 
 LEAST_SIDE_M = 0.3  # of a plane that is drawn: a single front is as large
 ON_PLANE_M = 0.03  # of a true front's face from a plane that it is drawn on
@@ -44,8 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--workdir", type=Path, default=Path("elevations-work"))
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     options = parser.parse_args(arguments)
-    capture = read(options.recording, options.workdir)
-    session = open_session(capture, Workspace(options.workdir).cache)
+    session, capture = opened_recording(options.recording, options.workdir)
     prompts = read_prompts(options.prompts).objects if options.prompts else ()
     found = {prompt.name: front for prompt in prompts if (front := front_of(session, prompt)) is not None}
     true = list(true_fronts(options.truth, capture.world_from_capture)) if options.truth else []
@@ -61,16 +56,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     lost = [prompt.name for prompt in prompts if prompt.name not in found]
     print(f"no front: {' '.join(lost) or '-'}")
     return 0
-
-
-def read(recording: Path, folder: Path) -> Capture:
-    """The recording as `r2c2r run` reads it; kept in `folder`."""
-    work = Workspace(folder)
-    if work.load_latest("ingest", "scene") is None:
-        made = read_capture(recording, work.store("elevations"), IngestConfig())
-        work.save("ingest", "scene", made, {"key": "benchmark", "seconds": 0.0})
-    capture: Capture = work.load_latest("ingest", "scene")
-    return capture
 
 
 def front_of(session: Any, prompt: ObjectPrompt) -> FoundFront | None:

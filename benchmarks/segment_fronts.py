@@ -101,13 +101,17 @@ def bench(kitchen: Path, folder: Path, clicks: int, pictures: Path | None) -> li
 
 
 def opened(kitchen: Path, folder: Path) -> tuple[Any, Capture]:
-    """A session on the kitchen's recording, and the capture; what was read is kept in `folder`."""
+    """A session on the recording in a kitchen's folder, and the capture."""
+    return opened_recording(next(kitchen.glob("*.r3d")), folder)
+
+
+def opened_recording(recording: Path, folder: Path) -> tuple[Any, Capture]:
+    """A session on a recording as `r2c2r run` reads it, and the capture; what was read is kept in `folder`."""
     work = Workspace(folder)
-    capture = work.load_latest("ingest", "scene")
-    if capture is None:
-        read = read_capture(next(kitchen.glob("*.r3d")), work.store(kitchen.name), IngestConfig())
+    if work.load_latest("ingest", "scene") is None:
+        read = read_capture(recording, work.store(recording.stem), IngestConfig())
         work.save("ingest", "scene", read, {"key": "benchmark", "seconds": 0.0})
-        capture = work.load_latest("ingest", "scene")
+    capture = work.load_latest("ingest", "scene")
     return open_session(capture, work.cache), capture
 
 
