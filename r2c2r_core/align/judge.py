@@ -24,6 +24,7 @@ class Params:
     """How well a placed mesh explains the views."""
 
     slab_m: float = param(0.015, "m", "of a front's depth that counts as its face", source="a door is 18-20 mm thick")
+    forwards: float = param(0.7, "cosine", "to a front's normal, from which a face of the mesh looks forwards")
     weights: tuple[float, float, float] = param((0.45, 0.35, 0.20), "score", "of mask, depth and colour")
 
 
@@ -80,11 +81,21 @@ def render_pose(shape: Shape, vertices_world: Points, behind: np.ndarray, view: 
 
 
 def behind_face(pose: Similarity3, shape: Shape, vertices_world: Points, front: FrontPanel | None) -> np.ndarray:
-    """How far each vertex lies behind the mesh's own front face, metres; 0 everywhere for what is no front."""
+    """How far each vertex lies behind the mesh's own front face, metres; 0 everywhere for what is no front.
+
+    Recessed panels are a part of the face, however deep: what looks forwards is not behind it.
+    """
     if front is None:
         return np.zeros(len(vertices_world))
-    face = face_depth(pose, shape, front)
-    return np.asarray(front.world_from_front.inverse.apply(vertices_world)[:, 1] - face)
+    local = front.world_from_front.inverse.apply(vertices_world)
+    behind = local[:, 1] - face_depth(pose, shape, front)
+    if shape.oriented:
+        a, b, c = (local[shape.faces[:, k]] for k in range(3))
+        normals = np.cross(b - a, c - a)
+        forwards = -normals[:, 1] > tuned(Params).forwards * np.linalg.norm(normals, axis=1)
+        panels = shape.faces[forwards]
+        behind[panels] = np.minimum(behind[panels], 0.0)
+    return np.asarray(behind)
 
 
 def face_depth(pose: Similarity3, shape: Shape, front: FrontPanel) -> float:
