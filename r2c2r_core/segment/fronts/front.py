@@ -17,6 +17,7 @@ from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid, joined
+from r2c2r_core.segment.mosaics.strips import clear_of_strips
 from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.occlusion import Facet, visible_mask
 from r2c2r_core.segment.runs.alignment import aligned
@@ -117,6 +118,7 @@ def find_front(
     refined = aligned(refined, cut, run.cells, surface, run.grid.cell_m)
     panel = evenly_framed(contrast, run.relief, refined, run.grid.cell_m)
     panel = clear_of_rails(contrast, panel, cut, run.cells, run.grid.cell_m)
+    panel = clear_of_strips(panel, surface, run.grid.cell_m)
     return Front(run, panel, own_handle(handle, panel), 0.0)
 
 

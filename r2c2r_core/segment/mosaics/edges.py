@@ -131,7 +131,7 @@ def panel_edges(cell: Cell, surface: Surface, cell_m: float) -> Refined:
     (left, right), beside = _ends(cell.left, cell.right, seen[:2], _profiles(surface, rows, axis=0), cell_m)
     across, lab = _profiles(surface, columns, axis=1), surface.lab[:, columns]
     (lit, bottom), upright = _ends(cell.top, cell.bottom, seen[2:], across, cell_m)
-    shown, lit = (*beside, *upright), _under_lip(lit, bottom, across, cell_m)
+    shown, lit = (*beside, *upright), _under_lip(lit, bottom, across, _rim(surface, rows, columns), cell_m)
     below = _below_upper_face(lit, bottom, across, lab, cell_m)
     if below is not None:
         return Refined(Cell(left, below, right, bottom), below, shown)
@@ -297,15 +297,23 @@ def _step_near(begins: int, gradient: np.ndarray, least: float, cell_m: float) -
     return (first - 1 + peaks[-1] if peaks else first + int(np.argmax(gradient[first:last]))) + 0.5
 
 
-def _under_lip(top: float, bottom: float, profile: Profile, cell_m: float) -> float:
+def _rim(surface: Surface, rows: slice, columns: slice) -> float:
+    """Mean height over the plane of a panel's outer eighths at both sides, half way up: of the stiles, where it is framed."""
+    quarter, eighth = (rows.stop - rows.start) // 4, (columns.stop - columns.start) // 8
+    rim = np.r_[columns.start : columns.start + eighth, columns.stop - eighth : columns.stop]
+    height, points = (values[rows.start + quarter : rows.stop - quarter, rim] for values in (surface.height_m, surface.points))
+    return float((height * points).sum() / points.sum()) if points.any() else float("-inf")
+
+
+def _under_lip(top: float, bottom: float, profile: Profile, rim_m: float, cell_m: float) -> float:
     """The upper edge, moved down where a lip of the panel's colour, as a worktop's, was taken for its upper part.
 
-    Depth shows a lip before the panel's plane; what stands out of a front, as a grip along its edge, has another front or a
-    lip over it.
+    Depth shows a lip before the panel's plane, and before its rim: the upper rail of a frame is as high as its stiles. What
+    stands out of a front, as a grip along its edge, has another front or a lip over it.
     """
     params, start, middle = tuned(Params), round(top), round((top + bottom) / 2)
     reach, off = round(params.lip_m / cell_m), round(params.depth_off_m / cell_m)
-    height = profile.height - _median_seen(profile.height[start + reach : middle])
+    height = profile.height - np.fmax(_median_seen(profile.height[start + reach : middle]), rim_m)
     usual = float(np.median(profile.points[start + reach : middle])) if start + reach < middle else 0.0
     over = slice(max(start - reach // 2, 0), max(start - off, 0))
     points = profile.points[over]
@@ -337,8 +345,8 @@ def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> 
     middle = lab[:, lab.shape[1] // 8 : lab.shape[1] - lab.shape[1] // 8]
     start, reach = round(top), round(params.shadow_m / cell_m)
     below = slice(start + reach // 2, max(round((top + bottom) / 2), start + reach // 2 + 1))
-    light = _linear(np.median(middle[max(start - reach, 0) : start + reach // 2 + 1], axis=1))
-    relative = light / np.maximum(_linear(np.median(middle[below].reshape(-1, 3), axis=0)[None]), 1e-3)
+    light = linear_light(np.median(middle[max(start - reach, 0) : start + reach // 2 + 1], axis=1))
+    relative = light / np.maximum(linear_light(np.median(middle[below].reshape(-1, 3), axis=0)[None]), 1e-3)
     shade = relative.mean(axis=1)
     even = np.abs(relative / np.maximum(shade, 1e-3)[:, None] - 1).max(axis=1) < params.even_shade
     first = k = start - max(start - reach, 0)
@@ -369,7 +377,7 @@ def _half_way(shade: np.ndarray) -> float | None:
     return back - 1 + (half - lower) / (upper - lower)
 
 
-def _linear(lab: np.ndarray) -> np.ndarray:
+def linear_light(lab: np.ndarray) -> np.ndarray:
     """Linear light in red, green and blue, 0..1, of rows of colours."""
     rgb = cv2.cvtColor(np.clip(lab, 0, 255).astype(np.uint8)[None], cv2.COLOR_LAB2RGB)[0]
     return np.asarray((rgb / 255.0) ** 2.2)
@@ -432,7 +440,7 @@ def _below_upper_face(top: float, bottom: float, profile: Profile, lab: np.ndarr
 def _same_colour(first: np.ndarray, second: np.ndarray) -> bool:
     """Whether two patches of CIELAB colours may be of one material in nearly the same light."""
     params = tuned(Params)
-    one, other = (_linear(np.median(patch.reshape(-1, 3), axis=0)[None])[0] for patch in (first, second))
+    one, other = (linear_light(np.median(patch.reshape(-1, 3), axis=0)[None])[0] for patch in (first, second))
     relative = one / np.maximum(other, 1e-3)
     shade = float(relative.mean())
     even = np.abs(relative / max(shade, 1e-3) - 1).max() < params.even_shade

@@ -166,3 +166,11 @@ def test_a_wall_darker_than_the_front_before_it_is_no_shadow_on_it() -> None:
     wall = Cell(0, 0, 320, 60)
     image = mosaic((PANEL, (200, 203, 190)), (wall, (165, 171, 168)), (Cell(60, 50, 260, 60), in_shade((200, 203, 190), 0.7)))
     assert edges(image, PANEL, PANEL, (wall, -0.03))[1] == pytest.approx(60, abs=EDGE_CELLS)
+
+
+def test_the_upper_rail_of_a_frame_is_no_lip_and_a_lip_over_it_is() -> None:
+    whole = Cell(PANEL.left, 52, PANEL.right, PANEL.bottom)
+    sunk, lip = Cell(whole.left + 24, whole.top + 24, whole.right - 24, whole.bottom - 24), Cell(40, 52, 280, 60)
+    image = mosaic((whole, BLUE), (Cell(60, 75, 260, 76), (62, 92, 121)), (Cell(60, 59, 260, 60), (62, 92, 121)))
+    assert edges(image, whole, whole, (sunk, -0.015))[1] == pytest.approx(52, abs=EDGE_CELLS)
+    assert edges(image, whole, whole, (sunk, -0.015), (lip, 0.014))[1] == pytest.approx(60, abs=EDGE_CELLS)
