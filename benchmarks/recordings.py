@@ -130,7 +130,8 @@ def _front_pixels(thing: ObjectRecord, camera: Intrinsics, pose: Rigid3) -> Mask
 def mask_overlap(folder: Path, name: str, found: Path) -> float:
     """Mean IoU of the masks in `found` (<frame:06d>.png) in the frames that show the object; a missing one counts as 0."""
     masks, overlaps = true_masks(folder), []
-    for frame in range(len(list((folder / "masks").glob("*.png")))):
+    own = folder / "truth_masks" / name
+    for frame in sorted(int(path.stem) for path in (own if own.exists() else folder / "masks").glob("*.png")):
         true = masks(name, frame)
         if true is None or np.count_nonzero(true) < MIN_TRUTH_PX:
             continue

@@ -3,7 +3,9 @@
     python benchmarks/unseen.py FOLDER... [--workdir DIR] [--json benchmarks/unseen.json] [--seed N]
 
 A FOLDER holds capture.r3d or scan.r3d, truth.json and masks/NNNNNN.png (number of the object in truth.json + 1), as
-second_styles.py, franka.py and replicacad.py write them. Clicks are random ones of `recordings.random_clicks`, with the seed.
+second_styles.py, franka.py and replicacad.py write them, or is a sample of `r2c2r sample`. Clicks are random ones of
+`recordings.random_clicks`, with the seed.
+
 Usable: every extent within 5 %, the joint of the right type, hinged on the right side. What is missing is wrong in every
 mean: its size by 100 %, its joint, all its mask. Joint figures are over the objects that have joints. Rows are added to the
 JSON file by the folder's name, each as soon as it is known.
