@@ -24,7 +24,7 @@ class Params:
     """How well a placed mesh explains the views."""
 
     slab_m: float = param(0.015, "m", "of a front's depth that counts as its face", source="a door is 18-20 mm thick")
-    forwards: float = param(0.7, "cosine", "to a front's normal, from which a face of the mesh looks forwards")
+    forwards: float = param(0.7, "cosine", "to a front's normal, from which a face looks forwards", source="45 degrees")
     weights: tuple[float, float, float] = param((0.45, 0.35, 0.20), "score", "of mask, depth and colour")
 
 

@@ -13,6 +13,8 @@ from r2c2r_core.segment.mosaics.edges import Surface, linear_light
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.tuning import param, tuned
 
+_SOURCE = "chosen on a real kitchen, compared on ten drawn ones"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -21,11 +23,13 @@ class Params:
     max_strip_m: float = param(
         0.08, "m", "height of such a strip, at most", gt=0, source="worktops are 20-40 mm thick, some 60"
     )
-    min_strip_m: float = param(0.008, "m", "height from which it is more than a blurred gap", gt=0)
-    min_difference: float = param(4.0, "σ", "of the panel's own rows, by which a row of the strip differs from them", gt=0)
-    min_sigma: float = param(4.0, "grey", "CIELAB units that rows of one material differ by, at least", gt=0)
-    beside_m: float = param(0.06, "m", "beyond the panel's sides, within which a strip must go on", gt=0)
-    side_m: float = param(0.03, "m", "inside the panel's sides, whose colour tells a frame", gt=0)
+    min_strip_m: float = param(0.008, "m", "height from which it is more than a blurred gap", gt=0, source=_SOURCE)
+    min_difference: float = param(
+        4.0, "σ", "of the panel's own rows, by which a row of the strip differs from them", gt=0, source=_SOURCE
+    )
+    min_sigma: float = param(4.0, "grey", "CIELAB units that rows of one material differ by, at least", gt=0, source=_SOURCE)
+    beside_m: float = param(0.06, "m", "beyond the panel's sides, within which a strip must go on", gt=0, source=_SOURCE)
+    side_m: float = param(0.03, "m", "inside the panel's sides, whose colour tells a frame", gt=0, source=_SOURCE)
 
 
 def clear_of_strips(panel: Cell, surface: Surface, cell_m: float) -> Cell:
