@@ -175,6 +175,8 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     move(bea, "Request changes", "answer the comment")
     expect(ann.locator("r2c2r-review-state")).to_contain_text("answer the comment")
     ann.get_by_role("button", name=re.compile("^Resolve")).click()
+    expect(ann.locator("r2c2r-comments")).to_contain_text("None open.")  # the steps are drawn anew with it
+    expect(ann.locator("r2c2r-review-state")).not_to_contain_text("open comment")
     move(ann, "Send to review again", "one drawer")
     move(bea, "Start the review")
     bea.get_by_role("button", name="drawer_1").first.click()
