@@ -107,19 +107,24 @@ def _beside(other: Cell, cell: Cell, axis: int) -> bool:
 def _inset(contrast: Contrast, field: LineField, cell: Cell, cell_m: float) -> Cell | None:
     """The front within a cell, with a frame at most of its sides, the largest of equals; None where there is none.
 
-    Its gaps are faint, but no lines that the network holds no edge possible on: those are grain.
+    Its gaps may be faint. A line on which the network holds no edge possible is grain, unless it is the clearest one at its
+    side and at least as clear as another gap of the front.
     """
     smallest, best = tuned(Params).smallest_m / cell_m, (0, 0.0, cell)
-    options = [
-        (border, *(line for line in lines_beside(contrast, cell, side, cell_m) if field.is_possible(cell, side[0], line)))
-        for side, border in zip(SIDES, edges_of(cell), strict=True)
-    ]
-    for left, right, top, bottom in product(*options):
+    options, grain = list[list[float]](), list[float | None]()
+    for side, border in zip(SIDES, edges_of(cell), strict=True):
+        lines = lines_beside(contrast, cell, side, cell_m)
+        possible = [line for line in lines if field.is_possible(cell, side[0], line)]
+        grain.append(lines[0] if lines and lines[0] not in possible else None)
+        options.append([border, *lines[: grain[-1] is not None], *possible])
+    for edges in product(*options):
+        left, right, top, bottom = edges
         front = Cell(left, top, right, bottom)
-        moved = [edge != border for edge, border in zip(edges_of(front), edges_of(cell), strict=True)]
+        moved = [edge != border for edge, border in zip(edges, edges_of(cell), strict=True)]
+        doubted = [edge == line for edge, line in zip(edges, grain, strict=True)]
         worth = (sum(moved), front.width * front.height)
         large = min(front.width, front.height) >= smallest
-        if worth > best[:2] and sum(moved) < 4 and large and _is_inset(contrast, front, cell, moved):
+        if worth > best[:2] and sum(moved) < 4 and large and _is_inset(contrast, front, cell, moved, doubted):
             best = (*worth, front)
     return best[2] if best[0] else None
 
@@ -166,8 +171,11 @@ def _shrunk(cell: Cell, by: float) -> Cell:
     return Cell(cell.left + by, cell.top + by, cell.right - by, cell.bottom - by)
 
 
-def _is_inset(contrast: Contrast, front: Cell, cell: Cell, moved: Sequence[bool]) -> bool:
-    """Whether a front has gaps from corner to corner where it was moved in, and those at its other sides end there."""
+def _is_inset(contrast: Contrast, front: Cell, cell: Cell, moved: Sequence[bool], doubted: Sequence[bool]) -> bool:
+    """Whether a front has gaps from corner to corner where it was moved in, and those at its other sides end there.
+
+    A gap that is doubted has to be as clear as one of those that were not moved.
+    """
     params = tuned(Params)
     parts = [
         contrast.along(axis, edge, across(front, 1 - axis)[0] + CORNER, across(front, 1 - axis)[1] - CORNER)
@@ -175,8 +183,12 @@ def _is_inset(contrast: Contrast, front: Cell, cell: Cell, moved: Sequence[bool]
     ]
     usual = [float(np.median(each)) for each in parts]
     beside = {k: _beyond(contrast, front, cell, moved, k) for k in range(len(SIDES))}
-    clear = max((own for k, own in enumerate(usual) if not moved[k] and not _is_other(beside[k], own)), default=0.0)
-    for each, own, inner in zip(parts, usual, moved, strict=True):
+    unmoved = [own for k, own in enumerate(usual) if not moved[k] and not _is_other(beside[k], own)]
+    clear = max(unmoved, default=0.0)
+    faint = min((own for own in unmoved if own >= max(params.alike * clear, params.contrast)), default=np.inf)
+    for each, own, inner, doubt in zip(parts, usual, moved, doubted, strict=True):
+        if doubt and own < faint - params.contrast:
+            return False
         faintest = min(np.sort(each)[1], each[0], each[-1])  # a handle may hide one, but not at a corner
         if inner and (faintest < max(params.alike * own, params.contrast) or own < params.alike * clear):
             return False

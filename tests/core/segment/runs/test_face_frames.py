@@ -18,16 +18,16 @@ RAIL = 15  # cells: 37.5 mm
 CLOSE = 1.5  # cells: 4 mm
 
 
-def mosaic(*gaps: Cell, dark: int = 90, worktop: int = 0) -> Contrast:
+def mosaic(*gaps: Cell, dark: int = 90, worktop: int = 0, grain: Sequence[Cell] = ()) -> Contrast:
     """Lightness of one paint with outlines of gaps, one cell wide, as blurred as mosaics are, with a little noise.
 
-    A worktop is over all of it, and its shadow ends at a row.
+    A worktop is over all of it, and its shadow ends at a row. Outlines of grain are fainter than gaps.
     """
     light = np.full((360, 320), 170, np.uint8)
     light[:worktop], light[max(worktop - 3, 0) : worktop] = 110, 80
-    for gap in gaps:
-        corners = (round(gap.left), round(gap.top)), (round(gap.right), round(gap.bottom))
-        cv2.rectangle(light, *corners, dark, 1)
+    for outline, shade in [*((each, 130) for each in grain), *((each, dark) for each in gaps)]:
+        corners = (round(outline.left), round(outline.top)), (round(outline.right), round(outline.bottom))
+        cv2.rectangle(light, *corners, shade, 1)
     noise = np.random.default_rng(0).normal(0, 1.0, light.shape)
     return Contrast(cv2.GaussianBlur(light.astype(np.float32), (0, 0), 0.8) + noise)
 
@@ -65,8 +65,16 @@ def test_a_front_is_what_its_gaps_enclose_not_the_frame_round_it(cut: Cell) -> N
 
 
 def test_grain_where_the_network_rules_edges_out_is_no_gap() -> None:
-    cut = grown(left=2 * RAIL, top=RAIL, right=2 * RAIL)
-    assert inset_fronts(mosaic(FRONT), relief(), odds(-4.0), [cut], CELL_M) == [cut]
+    cut, lowest = grown(left=2 * RAIL, top=RAIL, right=2 * RAIL), Cell(FRONT.left, FRONT.bottom, FRONT.right, FRONT.bottom)
+    grain = mosaic(lowest, grain=[FRONT])
+    assert inset_fronts(grain, relief(), odds(-4.0), [cut], CELL_M) == [cut]
+    assert inset_fronts(grain, relief(), odds(), [cut], CELL_M) != [cut]  # possible, it would be a gap
+
+
+@pytest.mark.parametrize("cut", [grown(top=RAIL), grown(top=RAIL, right=RAIL)])
+def test_a_line_as_clear_as_the_other_gaps_is_one_whatever_the_network_says(cut: Cell) -> None:
+    cells = inset_fronts(mosaic(FRONT), relief(), odds(-4.0), [cut], CELL_M)
+    assert edges(cells[0]) == pytest.approx(edges(FRONT), abs=CLOSE)
 
 
 def test_a_worktops_edge_that_goes_on_over_a_stile_does_not_make_it_a_part_of_the_front() -> None:
