@@ -339,16 +339,15 @@ def _lip_over(top: float, profile: Profile, cell_m: float) -> bool:
 def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> float:
     """The upper edge, moved up where what it follows is the end of a shadow that a lip, as a worktop's, throws on the panel.
 
-    In shadow a surface is darker by one factor in all colours: up to where that stops being so, or it is darkest.
+    The shadow reaches up to where the surface is no longer darker by one factor in all colours, or darkest.
     """
     params = tuned(Params)
     middle = lab[:, lab.shape[1] // 8 : lab.shape[1] - lab.shape[1] // 8]
     start, reach = round(top), round(params.shadow_m / cell_m)
     below = slice(start + reach // 2, max(round((top + bottom) / 2), start + reach // 2 + 1))
-    light = linear_light(np.median(middle[max(start - reach, 0) : start + reach // 2 + 1], axis=1))
-    relative = light / np.maximum(linear_light(np.median(middle[below].reshape(-1, 3), axis=0)[None]), 1e-3)
-    shade = relative.mean(axis=1)
-    even = np.abs(relative / np.maximum(shade, 1e-3)[:, None] - 1).max(axis=1) < params.even_shade
+    rows = np.median(middle[max(start - reach, 0) : start + reach // 2 + 1], axis=1)
+    shade, unevenness = shading(rows, np.median(middle[below].reshape(-1, 3), axis=0))
+    even = unevenness < params.even_shade
     first = k = start - max(start - reach, 0)
     while k > 0 and even[k - 1] and params.darkest_shade < shade[k - 1] < shade[k] - 0.005:
         k -= 1
@@ -377,7 +376,17 @@ def _half_way(shade: np.ndarray) -> float | None:
     return back - 1 + (half - lower) / (upper - lower)
 
 
-def linear_light(lab: np.ndarray) -> np.ndarray:
+def shading(lab: np.ndarray, usual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Light of colours (n, 3) relative to a usual one (3,), and its unevenness over red, green and blue.
+
+    In a shadow a surface is darker by one factor in all of them: its unevenness is 0.
+    """
+    relative = _linear_light(lab) / np.maximum(_linear_light(usual[None]), 1e-3)
+    shade = relative.mean(axis=1)
+    return shade, np.abs(relative / np.maximum(shade, 1e-3)[:, None] - 1).max(axis=1)
+
+
+def _linear_light(lab: np.ndarray) -> np.ndarray:
     """Linear light in red, green and blue, 0..1, of rows of colours."""
     rgb = cv2.cvtColor(np.clip(lab, 0, 255).astype(np.uint8)[None], cv2.COLOR_LAB2RGB)[0]
     return np.asarray((rgb / 255.0) ** 2.2)
@@ -440,11 +449,9 @@ def _below_upper_face(top: float, bottom: float, profile: Profile, lab: np.ndarr
 def _same_colour(first: np.ndarray, second: np.ndarray) -> bool:
     """Whether two patches of CIELAB colours may be of one material in nearly the same light."""
     params = tuned(Params)
-    one, other = (linear_light(np.median(patch.reshape(-1, 3), axis=0)[None])[0] for patch in (first, second))
-    relative = one / np.maximum(other, 1e-3)
-    shade = float(relative.mean())
-    even = np.abs(relative / max(shade, 1e-3) - 1).max() < params.even_shade
-    return bool(even and params.least_shade < shade < 1 / params.least_shade)
+    one, other = (np.median(patch.reshape(-1, 3), axis=0) for patch in (first, second))
+    (shade,), (unevenness,) = shading(one[None], other)
+    return bool(unevenness < params.even_shade and params.least_shade < shade < 1 / params.least_shade)
 
 
 def _luminance(lightness: np.ndarray) -> np.ndarray:

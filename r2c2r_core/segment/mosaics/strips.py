@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2c2r_core.segment.mosaics.edges import Params as EdgeParams
-from r2c2r_core.segment.mosaics.edges import Surface, linear_light
+from r2c2r_core.segment.mosaics.edges import Surface, shading
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.tuning import param, tuned
 
@@ -81,10 +81,8 @@ def _rows(surface: Surface, rows: slice, columns: slice) -> np.ndarray:
 def _shaded(rows: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Which rows may be the panel's own material in a shadow: darker by one factor in red, green and blue."""
     params = tuned(EdgeParams)
-    light, usual = linear_light(np.nan_to_num(rows)), linear_light(own[None])
-    relative = light / np.maximum(usual, 1e-3)
-    shade = relative.mean(axis=1)
-    even = np.abs(relative / np.maximum(shade, 1e-3)[:, None] - 1).max(axis=1) < 2 * params.even_shade
+    shade, unevenness = shading(np.nan_to_num(rows), own)
+    even = unevenness < 2 * params.even_shade
     return np.asarray(even & (shade > params.darkest_shade) & (shade < 1 / params.least_shade))
 
 
