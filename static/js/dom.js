@@ -75,13 +75,40 @@ export function slider(text, input) {
   return h("label", { class: "slider", title: text }, h("span", {}, text), input);
 }
 
+/** What a pointer is held down on. @type {Node | null} */
+let pressed = null;
+/** The children that wait until it is released, by their parent. @type {Map<HTMLElement, (Node | string)[]>} */
+const waiting = new Map();
+
+addEventListener(
+  "pointerdown",
+  ({ target }) => (pressed = target instanceof Element ? target.closest("button, a, summary") : null),
+  true,
+);
+for (const type of ["pointerup", "pointercancel"]) addEventListener(type, () => setTimeout(release), true); // after its click
+addEventListener("click", () => (pressed = null), true); // what its click changes is drawn at once
+addEventListener("blur", release); // the window's: a release outside is not heard
+
+function release() {
+  pressed = null;
+  const late = [...waiting];
+  waiting.clear();
+  for (const [parent, children] of late) renew(parent, ...children);
+}
+
 /**
  * New children in the place of the old ones. Who was at one of them by keyboard, or at a field at all, stays where they were: at the
  * one with the same `data-at`, "what:which", else at the next of the same "what"; and what was selected of a text still is.
+ * While a button in the parent is held down it waits: a browser clicks only what is there from press to release.
  * @param {HTMLElement} parent
  * @param {...(Node | string)} children
  */
 export function renew(parent, ...children) {
+  if (pressed && parent.contains(pressed)) {
+    waiting.set(parent, children);
+    return;
+  }
+  waiting.delete(parent);
   const at = parent.querySelector("[data-at]:is(:focus-visible, input:focus)");
   const old = at instanceof HTMLElement ? (at.dataset.at ?? "") : "";
   const alike = `[data-at^="${CSS.escape(old.split(":")[0] ?? "")}:"]`;

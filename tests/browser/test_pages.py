@@ -165,6 +165,24 @@ def test_lines_for_a_simulator_are_copied_by_keyboard_and_robots_are_seen(
         page.wait_for_function("image => image.naturalWidth > 0", arg=picture.element_handle())
 
 
+def test_a_button_held_down_while_its_list_changes_is_still_clicked(new_context: NewContext, finished: tuple[str, str]) -> None:
+    page = signed_in(new_context, finished[0])
+    page.evaluate("""import("/static/js/dom.js").then(({ h, renew }) => {
+        const list = h("div"), button = (text) => h("button", { onclick: () => (window.clicked = text) }, text);
+        document.body.prepend(list);
+        renew(list, button("Held down"));
+        window.change = () => renew(list, button("Changed"));
+    })""")
+    held = page.get_by_role("button", name="Held down")
+    held.hover()
+    page.mouse.down()
+    page.evaluate("change()")
+    expect(held).to_be_visible()
+    page.mouse.up()
+    expect(page.get_by_role("button", name="Changed")).to_be_visible()
+    assert page.evaluate("clicked") == "Held down"
+
+
 def test_a_change_made_without_a_connection_is_stored_when_it_is_back(
     changed: tuple[str, str], new_context: NewContext
 ) -> None:

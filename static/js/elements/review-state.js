@@ -1,7 +1,7 @@
 /** Where the project stands, who brought it there, and the steps it may take from here with what each still lacks. */
 
 import { ApiError, getFigures, getReview, stepReview } from "../api.js";
-import { h, LiveElement } from "../dom.js";
+import { h, LiveElement, renew } from "../dom.js";
 import { Answers } from "../lib/answers.js";
 import { ago, duration } from "../lib/format.js";
 import { live } from "../live.js";
@@ -50,7 +50,8 @@ export class ReviewState extends LiveElement {
    */
   #draw(status, figures) {
     const by = status.at ? `${status.who}, ${ago(status.at, Date.now() / 1000)}` : "";
-    this.#body.replaceChildren(
+    renew(
+      this.#body,
       h("div", { class: "row" }, stateChip(status.state), h("span", { class: "muted" }, by)),
       status.reason ? h("p", { class: "said" }, status.reason) : "",
       ...status.moves.map((move) => this.#move(status, move)),
@@ -65,6 +66,7 @@ export class ReviewState extends LiveElement {
   #move(status, move) {
     const onward = PLACES[move.to] > PLACES[status.state] && !move.unmet.length;
     const button = h("button", { type: "button", class: onward ? "primary" : "" }, move.text);
+    button.dataset.at = `move:${move.to}`;
     button.addEventListener("click", () => this.#step(status, move));
     const unmet = move.unmet.length
       ? h("ul", { class: "muted unmet" }, ...move.unmet.map((line) => h("li", {}, line)))
