@@ -193,7 +193,7 @@ def _end(low: float, high: float, seen: bool, profile: Profile, own: float, cell
     least = max(params.clear * own, params.least_gradient)
     begins = _plane_from(low, high, profile, cell_m)
     if begins is not None:
-        return _step_near(begins, gradient, least, cell_m), True
+        return _step_near(*begins, gradient, least, cell_m), True
     first = max(round(low - params.outside_m / cell_m), 1)
     last = min(round(start + params.inside_m / cell_m) + 1, len(gradient) - 1)
     while last - first > 3 and gradient[last - 1] > gradient[last - 2]:
@@ -273,8 +273,12 @@ def _dark_from(first: int, last: int, light: np.ndarray, cell_m: float) -> float
     return float(begins + inside[0]) if near[:3].any() and len(inside) else 0.0
 
 
-def _plane_from(low: float, high: float, profile: Profile, cell_m: float) -> int | None:
-    """Where depth shows a panel to begin beside a recessed channel: a strip behind its plane, between two on it; else None."""
+def _plane_from(low: float, high: float, profile: Profile, cell_m: float) -> tuple[int, int] | None:
+    """Between which positions depth shows a panel to begin beside a recessed channel; None where there is none.
+
+    A channel is a strip behind the plane, between two on it. What cameras above see in it lies below where they see it on the
+    plane: a part of the channel under the front over it has no depth.
+    """
     params, first = tuned(Params), round(low)
     inside = slice(first, round(high))
     height = profile.height - _median_seen(profile.height[inside])
@@ -285,14 +289,17 @@ def _plane_from(low: float, high: float, profile: Profile, cell_m: float) -> int
     if len(behind) * cell_m < params.recess_m or height[behind].min() > -params.thick_m:
         return None
     beyond = slice(max(int(behind[0]) - reach, 0), int(behind[0]))
-    return int(behind[-1]) + 1 if (known & (height > -params.behind_m / 2))[beyond].any() else None
+    on_plane, ends = known & (height > -params.behind_m / 2), int(behind[-1]) + 1
+    if not on_plane[beyond].any():
+        return None
+    return ends, ends + int(np.argmax(on_plane[ends : ends + reach]))
 
 
-def _step_near(begins: int, gradient: np.ndarray, least: float, cell_m: float) -> float:
-    """The innermost clear step of colour from where depth shows a panel to begin, or else the clearest one there."""
+def _step_near(earliest: int, latest: int, gradient: np.ndarray, least: float, cell_m: float) -> float:
+    """The innermost clear step of colour about where depth shows a panel to begin, or else the clearest one there."""
     params = tuned(Params)
     off = round(params.depth_off_m / cell_m)
-    first, last = begins - off, begins + off + 1
+    first, last = earliest - off, latest + off + 1
     peaks = _peaks(gradient[first - 1 : last + 1], least)
     return (first - 1 + peaks[-1] if peaks else first + int(np.argmax(gradient[first:last]))) + 0.5
 
@@ -325,7 +332,8 @@ def _under_lip(top: float, bottom: float, profile: Profile, rim_m: float, cell_m
     if not len(below) or strip[peak] < params.behind_m:
         return top
     least = max(params.clear * _own(top, bottom, profile), params.least_gradient)
-    return _step_near(start + peak + int(below[0]), profile.gradient, least, cell_m)
+    begins = start + peak + int(below[0])
+    return _step_near(begins, begins, profile.gradient, least, cell_m)
 
 
 def _lip_over(top: float, profile: Profile, cell_m: float) -> bool:

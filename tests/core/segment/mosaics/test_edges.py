@@ -156,6 +156,13 @@ def test_a_front_above_a_recessed_channel_ends_where_depth_leaves_its_plane() ->
     assert edges(image, Cell(60, 60, 260, 307), PANEL, *depth)[3] == pytest.approx(300, abs=1.5)
 
 
+def test_a_front_hides_the_top_of_a_channel_below_it_from_depth_and_ends_over_it_all_the_same() -> None:
+    recess, lower = Cell(60, 300, 260, 313), Cell(60, 313, 260, 360)
+    image = mosaic((PANEL, BLUE), (recess, (150, 150, 150)), (lower, BLUE), (Cell(60, 306, 260, 308), (60, 60, 60)))
+    depth = ((Cell(60, 307, 260, 313), -0.022), (lower, 0.0))
+    assert edges(image, Cell(60, 60, 260, 301), PANEL, *depth)[3] == pytest.approx(300, abs=1.5)
+
+
 def test_depth_that_falls_off_at_a_free_end_moves_no_edge() -> None:
     image = mosaic((PANEL, BLUE))
     flying = (Cell(60, 60, 260, 66), -0.015)  # depth of an edge is mixed with that of what is behind it
