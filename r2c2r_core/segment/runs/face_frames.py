@@ -14,6 +14,7 @@ from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief
 from r2c2r_core.segment.runs.contrast import CORNER, SIDES, Contrast, edges_of
+from r2c2r_core.segment.runs.panels import cut_panels
 from r2c2r_core.segment.runs.xy_cut import LineField, across
 from r2c2r_core.tuning import param, tuned
 
@@ -67,7 +68,12 @@ def inset_fronts(contrast: Contrast, relief: Relief, odds: PanelOdds, cells: Seq
         front = _inset(contrast, field, cell, cell_m) if field.is_front(cell) else None
         if front is not None and _is_sunk(relief, front, cell, cell_m):
             front = None
-        found += [cell] if front is None else [front, *_around(front, cell)]
+        if front is None:
+            found.append(cell)
+            continue
+        within = cut_panels(odds, front, cell_m)  # lines from side to side of a front may end before the frame's borders
+        found += [front] if len(within) == 1 else inset_fronts(contrast, relief, odds, within, cell_m)
+        found += _around(front, cell)
     return found
 
 
@@ -157,7 +163,7 @@ def _is_sunk(relief: Relief, front: Cell, cell: Cell, cell_m: float) -> bool:
     params = tuned(Params)
     near, far = (size / cell_m for size in params.border_m)
     border = _mean_level(relief, _shrunk(front, near), _shrunk(front, far))
-    frame = _mean_level(relief, cell, _shrunk(front, -near / 2))
+    frame = _mean_level(relief, cell, _within(_shrunk(front, -near / 2), cell))
     return border is not None and frame is not None and border < frame - params.flush_m
 
 
@@ -169,6 +175,12 @@ def _mean_level(relief: Relief, outer: Cell, inner: Cell) -> float | None:
 
 def _shrunk(cell: Cell, by: float) -> Cell:
     return Cell(cell.left + by, cell.top + by, cell.right - by, cell.bottom - by)
+
+
+def _within(cell: Cell, outer: Cell) -> Cell:
+    return Cell(
+        max(cell.left, outer.left), max(cell.top, outer.top), min(cell.right, outer.right), min(cell.bottom, outer.bottom)
+    )
 
 
 def _is_inset(contrast: Contrast, front: Cell, cell: Cell, moved: Sequence[bool], doubted: Sequence[bool]) -> bool:

@@ -96,6 +96,21 @@ def test_a_panel_that_lies_behind_what_is_round_it_is_a_frames_and_no_front() ->
     assert len(inset_fronts(mosaic(FRONT), relief(0.012, sunk), odds(), [inset], CELL_M)) > 1
 
 
+def test_what_lies_behind_beside_a_cell_makes_no_front_in_it_sunk() -> None:
+    plinth = Cell(FRONT.left, FRONT.bottom, FRONT.right, FRONT.bottom + 20)
+    cells = inset_fronts(mosaic(FRONT), relief(0.05, plinth), odds(), [grown(top=RAIL)], CELL_M)
+    assert edges(cells[0]) == pytest.approx(edges(FRONT), abs=CLOSE)
+
+
+def test_lines_that_end_at_the_stiles_of_a_frame_part_what_is_between_them() -> None:
+    seen, row = odds(-6.0), 180
+    seen.level[row // STEP, round(FRONT.left) // STEP : round(FRONT.right) // STEP] = 4.0
+    gaps = mosaic(FRONT, Cell(FRONT.left, row, FRONT.right, row))
+    cells = inset_fronts(gaps, relief(), seen, [grown(left=2 * RAIL, right=2 * RAIL)], CELL_M)
+    fronts = sorted(edges(cell) for cell in cells if cell.width > 4 * RAIL)
+    assert [front[1::2] for front in fronts] == [pytest.approx((60, row), abs=CLOSE), pytest.approx((row, 300), abs=CLOSE)]
+
+
 def test_a_shadow_across_a_front_is_none_of_a_frame() -> None:
     shadow = Cell(-5, -5, 325, FRONT.top + RAIL)  # from wall to wall
     assert inset_fronts(mosaic(FRONT, shadow), relief(), odds(), [FRONT], CELL_M) == [FRONT]
