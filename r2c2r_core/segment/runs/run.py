@@ -99,7 +99,7 @@ def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int,
     if not tiles:
         return None
     relief = measure_relief(grid, scene, views.chosen(params.relief_frames))
-    return run_on(region, grid, roll, tiles, relief, views.evidence(frame_count))
+    return run_on(region, grid, roll, tiles, relief, views.evidence(frame_count), frame_count)
 
 
 def run_on(
@@ -109,6 +109,7 @@ def run_on(
     tiles: list[Tile],
     relief: Relief,
     lines: tuple[Evidence, Evidence],
+    frame_count: int,
     cells: tuple[Cell, ...] | None = None,
 ) -> Run:
     """What is known of a plane from its tiles, its relief and colours' upright and level lines; cut where no panels are given.
@@ -119,7 +120,7 @@ def run_on(
     if poses_agree:
         for tile in tiles:
             tile.shift = (0.0, 0.0)
-    mosaic = blend(tiles)
+    mosaic = blend(tiles, max(frame_count // 2, 8))
     seams = seam_odds(mosaic, relief)
     odds = edge_odds(seams, mosaic, relief, *lines)
     vertical, horizontal = (_with_edges(found, relief, axis, grid) for axis, found in enumerate(lines))
