@@ -36,11 +36,18 @@ class Params:
         (3.0, 2.0), "count", "of bins of yaw, and of offset, that histograms are smoothed by"
     )
     yaw_share: float = param(0.02, "share", "of the strongest yaw, for another one")
+    scatter_deg: float = param(6.0, "deg", "off a peak of yaw, from where a face counts half in its mean", gt=0)
     yaws: int = param(12, "count", "that planes are looked for in", ge=1)
     apart_m: float = param(0.03, "m", "between parallel planes")
     peak_m2: float = param(0.004, "m²", "at one offset, for a plane")
-    fit_m: float = param(0.008, "m", "off a plane, from where a face counts half in its fit")
+    fit_m: float = param(0.004, "m", "off a plane, from where a face counts half in its fit")
     fit_deg: float = param(12.0, "deg", "from its peak, that a fit may turn: a narrow sliver does not tell its yaw")
+    face_bin_m: float = param(0.0025, "m", "of offsets that are counted together for one face", gt=0)
+    face_line_m: float = param(0.1, "m", "of a row or column that a face goes through", gt=0)
+    face_share: float = param(
+        0.01, "share", "of a row's or column's area that is at a face's offset, in a bin, for it to go through"
+    )
+    face_through: float = param(0.8, "share", "of rows, and of columns, that a face goes through", gt=0, le=1)
     left_m: float = param(0.015, "m", "off a plane, within which a face is that plane's: what is left is looked at once more")
     beside_m: float = param(0.02, "m", "from the seen part, within which it is")
     twin_deg: float = param(25.0, "deg", "between planes that may be one: neighbouring yaws find the same run")
@@ -138,7 +145,7 @@ def _regions(centres: Points, normals: Points, areas: np.ndarray) -> list[PlaneR
         aligned = normals @ outward > params.normal_cos
         for offset in _peaks(centres[aligned] @ outward, areas[aligned]):
             member = aligned & (np.abs(centres @ outward - offset) < params.thickness_m)
-            regions += _split(centres[member], areas[member], outward, params.bridge_m)
+            regions += _split(centres[member], areas[member], outward, offset, params.bridge_m)
     return regions
 
 
@@ -148,7 +155,8 @@ def _regrown(region: PlaneRegion, centres: Points, normals: Points, areas: np.nd
     off = np.abs((centres - region.world_from_plane.translation) @ region.outward)
     near = np.flatnonzero((off < params.thickness_m) & (normals @ region.outward > params.normal_cos))
     member = near[(off[near] < params.left_m) | region.supports(centres[near], 0.0)]
-    parts = _split(centres[member], areas[member], region.outward, params.adjoins_m)
+    offset = float(region.world_from_plane.translation @ region.outward)
+    parts = _split(centres[member], areas[member], region.outward, offset, params.adjoins_m)
     if not parts:
         return region
     grown = max(parts, key=lambda part: part.supports(seen, params.beside_m).mean())
@@ -214,7 +222,7 @@ def _vertical_faces(surface: SceneSurface) -> tuple[Points, Points, np.ndarray]:
 
 
 def _dominant_yaws(normals: Points, areas: np.ndarray) -> list[float]:
-    """Peaks of the area histogram over yaw."""
+    """Peaks of the area histogram over yaw, each as the mean of the faces about it."""
     params = tuned(Params)
     yaw = np.arctan2(normals[:, 1], normals[:, 0]) % (2 * np.pi)
     bins = np.bincount((yaw / (2 * np.pi) * params.yaw_bins).astype(int) % params.yaw_bins, areas, params.yaw_bins)
@@ -222,7 +230,17 @@ def _dominant_yaws(normals: Points, areas: np.ndarray) -> list[float]:
     peaks = [i for i in range(params.yaw_bins) if smooth[i] == smooth[np.arange(i - 8, i + 9) % params.yaw_bins].max()]
     enough = max(params.yaw_share * smooth.max(), 1e-4)
     strong = sorted((i for i in peaks if smooth[i] > enough), key=lambda i: -smooth[i])
-    return [(i + 0.5) / params.yaw_bins * 2 * np.pi for i in strong[: params.yaws]]
+    return [_mean_yaw((i + 0.5) / params.yaw_bins * 2 * np.pi, yaw, areas) for i in strong[: params.yaws]]
+
+
+def _mean_yaw(yaw: float, yaws: np.ndarray, areas: np.ndarray) -> float:
+    """The mean yaw of the faces about a peak, by Welsch weights: half a degree smears planes 2 cm apart into one."""
+    width = np.radians(tuned(Params).scatter_deg)
+    for _ in range(4):
+        off = (yaws - yaw + np.pi) % (2 * np.pi) - np.pi
+        weights = areas * np.exp2(-((off / width) ** 2))
+        yaw += float(np.average(off, weights=weights))
+    return yaw
 
 
 def _peaks(offsets: np.ndarray, areas: np.ndarray) -> list[float]:
@@ -239,7 +257,7 @@ def _peaks(offsets: np.ndarray, areas: np.ndarray) -> list[float]:
     return [low + (i - 12 + 0.5) * params.offset_bin_m for i in peaks]
 
 
-def _split(centres: Points, areas: np.ndarray, outward: Vector3, bridge_m: float) -> list[PlaneRegion]:
+def _split(centres: Points, areas: np.ndarray, outward: Vector3, offset: float, bridge_m: float) -> list[PlaneRegion]:
     """Connected parts of one plane, holes so wide bridged."""
     params = tuned(Params)
     rotation = front_rotation(outward)
@@ -254,13 +272,13 @@ def _split(centres: Points, areas: np.ndarray, outward: Vector3, bridge_m: float
     for label in range(1, count):
         member = labels[row, column] == label
         if areas[member].sum() > params.smallest_m2:
-            regions.append(_region(centres[member], areas[member], outward))
+            regions.append(_region(centres[member], areas[member], outward, offset))
     return regions
 
 
-def _region(centres: Points, areas: np.ndarray, outward: Vector3) -> PlaneRegion:
+def _region(centres: Points, areas: np.ndarray, outward: Vector3, offset: float) -> PlaneRegion:
     params = tuned(Params)
-    normal, anchor = _fit(centres, areas, outward)
+    normal, anchor = _fit(centres, areas, outward, offset)
     rotation = front_rotation(normal)
     local = (centres - anchor) @ rotation
     near = np.abs(local[:, 1]) < params.thickness_m
@@ -278,22 +296,49 @@ def _region(centres: Points, areas: np.ndarray, outward: Vector3) -> PlaneRegion
     return PlaneRegion(Rigid3(rotation, middle), float(width), float(height), support, params.cell_m, float(areas[near].sum()))
 
 
-def _fit(centres: Points, areas: np.ndarray, outward: Vector3) -> tuple[Vector3, Vector3]:
-    """Trimmed total least squares in plan: a vertical plane's normal and a point on it."""
-    params, weights = tuned(Params), areas.copy()
-    plan = centres[:, :2]
-    normal = outward[:2]
+def _fit(centres: Points, areas: np.ndarray, outward: Vector3, offset: float) -> tuple[Vector3, Vector3]:
+    """M-estimate in plan, with Welsch weights: a vertical plane's normal and a point on it.
+
+    Begun at the mean of all that is near, it would lie between a face frame and its panels, or tilt between a run and what
+    stands 2 cm before a part of it.
+    """
+    params, plan = tuned(Params), centres[:, :2]
+    normal, off = outward[:2], centres @ outward - _outer_face(centres, areas, outward, offset)
     for _ in range(4):
+        weights = areas * np.maximum(np.exp2(-((off / params.fit_m) ** 2)), 1e-9)
         middle = np.average(plan, axis=0, weights=weights)
         spread = plan - middle
         _, vectors = np.linalg.eigh((spread * weights[:, None]).T @ spread)
         normal = vectors[:, 0] * np.sign(vectors[:, 0] @ outward[:2])
         if normal @ outward[:2] < np.cos(np.radians(params.fit_deg)):  # too narrow a sliver to measure its yaw
             normal = outward[:2]
-        distance = np.abs(spread @ normal)
-        weights = areas / (1 + (distance / params.fit_m) ** 2)
-    middle = np.average(plan, axis=0, weights=weights)
+        off = spread @ normal
     return np.array([normal[0], normal[1], 0.0]), np.array([middle[0], middle[1], centres[:, 2].mean()])
+
+
+def _outer_face(centres: Points, areas: np.ndarray, outward: Vector3, offset: float) -> float:
+    """The offset of the outermost of the parallel faces near a plane that go through most of its rows and columns.
+
+    Stiles and rails of a frame do; a worktop's edge is in few rows, a refrigerator in few columns. Of faces that lie beside
+    each other, the largest counts.
+    """
+    params = tuned(Params)
+    off = centres @ outward - offset
+    near = np.abs(off) < params.thickness_m
+    if near.sum() < 10:
+        return offset
+    bins = int(2 * params.thickness_m / params.face_bin_m)
+    at = ((off[near] + params.thickness_m) / params.face_bin_m).astype(int).clip(0, bins - 1)
+    through = np.ones(bins)
+    for along in (centres[near] @ np.array([-outward[1], outward[0], 0.0]), centres[near, 2]):
+        line = ((along - along.min()) / params.face_line_m).astype(int)
+        mass = np.bincount(line * bins + at, areas[near], (line.max() + 1) * bins).reshape(-1, bins)
+        mass = ndimage.gaussian_filter1d(mass[mass.sum(axis=1) > 0], 1.0, axis=1)
+        through = np.minimum(through, (mass > params.face_share * mass.sum(axis=1, keepdims=True)).mean(axis=0))
+    total = ndimage.gaussian_filter1d(np.bincount(at, areas[near], bins), 1.0)
+    peaks = np.flatnonzero((total == ndimage.maximum_filter1d(total, 3)) & (through > params.face_through))
+    face = peaks[-1] if len(peaks) else np.argmax(total)
+    return offset + float(face + 0.5) * params.face_bin_m - params.thickness_m
 
 
 def _faces_cameras(region: PlaneRegion, camera_centres_world: Points) -> bool:
@@ -329,22 +374,36 @@ def _with_panels(regions: list[PlaneRegion]) -> list[PlaneRegion]:
 
 
 def _is_sunk_in(panel: PlaneRegion, frame: PlaneRegion) -> bool:
-    """Whether a region lies a little behind another one that goes on at all four sides of it."""
+    """Whether most of a region lies a little behind another one that goes on at all four sides of each of its parts."""
     params = tuned(Params)
-    behind = frame.world_from_plane.inverse.apply(panel.points)[:, 1]
+    points, alone = panel.points, panel.support.astype(np.uint8)
+    behind = frame.world_from_plane.inverse.apply(points)[:, 1]
     if frame.outward @ panel.outward < np.cos(np.radians(params.fit_deg)) or not 0 < np.median(behind) < params.sunk_m:
         return False
-    near, far = (params.rim_m[k] for k in (0, 1))
-    margin = int(np.ceil(far / panel.cell_m)) + 1
-    area = cv2.morphologyEx(np.pad(panel.support.astype(np.uint8), margin), cv2.MORPH_CLOSE, _disk(margin))
-    rim = cv2.dilate(area, _disk(far / panel.cell_m)) - cv2.dilate(area, _disk(near / panel.cell_m))
-    row, column = np.nonzero(rim)
+    alone[panel.support] = ~frame.supports(points, 0.0)
+    margin = int(np.ceil(params.rim_m[1] / panel.cell_m)) + 1
+    seen = np.pad(alone, margin)
+    parts, _ = ndimage.label(cv2.morphologyEx(seen, cv2.MORPH_CLOSE, _disk(1)))
+    parts *= seen
+    framed = sum(
+        (parts[box] == label).sum()
+        for label, box in enumerate(ndimage.find_objects(parts), 1)
+        if box is not None and _is_framed(parts == label, box, margin, panel, frame)
+    )
+    return bool(framed > seen.sum() / 2)
+
+
+def _is_framed(part: np.ndarray, box: tuple[slice, slice], margin: int, panel: PlaneRegion, frame: PlaneRegion) -> bool:
+    """Whether a frame's plane was seen at all four sides of a part of a panel: `part` (bool) is padded by `margin` cells."""
+    params = tuned(Params)
+    area = cv2.morphologyEx(part.astype(np.uint8), cv2.MORPH_CLOSE, _disk(margin))
+    near, far = (cv2.dilate(area, _disk(reach / panel.cell_m)) for reach in params.rim_m)
+    row, column = np.nonzero(far - near)
     x = (column - margin + 0.5) * panel.cell_m - panel.width_m / 2
     z = panel.height_m / 2 - (row - margin + 0.5) * panel.cell_m
-    points = panel.world_from_plane.apply(np.stack([x, np.zeros(len(x)), z], axis=1))
-    on = frame.supports(points, params.cell_m / 2)
-    right, up = np.abs(x) > panel.width_m / 2, np.abs(z) > panel.height_m / 2
-    sides = (right & (x > 0), right & (x < 0), up & (z > 0), up & (z < 0))
+    on = frame.supports(panel.world_from_plane.apply(np.stack([x, np.zeros(len(x)), z], axis=1)), params.cell_m / 2)
+    rows, columns = box
+    sides = (row < rows.start, row >= rows.stop, column < columns.start, column >= columns.stop)
     return all(on[side].mean() > params.rim_share if side.any() else False for side in sides)
 
 

@@ -97,6 +97,40 @@ def test_a_panel_sunk_deep_in_a_frame_is_of_the_frames_plane() -> None:
     assert region.supports(np.array([[0.3, 0.032, 0.55]]), 0.0)[0]  # a click in the middle of the panel
 
 
+def framed_run(sunk_m: float) -> SceneSurface:
+    """Three bays of 0.6 by 0.5 m, 8 cm apart, with panels that far behind their frame."""
+    bay = frame(0.04), front(0.0, sunk_m, 0.3, 0.6, 0.5)
+    return together(*(surface(part.vertices_world + np.array([0.68 * k, 0, 0]), part.faces) for k in range(3) for part in bay))
+
+
+def test_sunk_panels_are_of_their_frames_plane_though_the_plinth_below_is_at_their_depth() -> None:
+    run = together(framed_run(0.031), front(-0.04, 0.031, 0.21, 2.0, 0.05))
+    regions = find_planes(run, CAMERAS)
+    for middle in (0.3, 0.98, 1.66):
+        region = region_at(regions, np.array([middle, 0.031, 0.55]))
+        assert region is not None
+        assert abs(region.world_from_plane.translation[1]) < 0.004
+
+
+def test_the_plane_of_a_framed_run_is_its_frames_though_its_panels_are_larger() -> None:
+    run = framed_run(0.011)
+    noise = np.random.default_rng(4).normal(scale=[0, 0.0015, 0], size=run.vertices_world.shape)
+    region = find_planes(surface(run.vertices_world + noise, run.faces), CAMERAS)[0]
+    assert abs(region.world_from_plane.translation[1]) < 0.001
+    assert region.width_m == pytest.approx(2.04, abs=2 * CELL_M)
+
+
+@pytest.mark.parametrize("before_m", [0.018, 0.03])
+def test_a_refrigerator_before_one_end_of_a_run_does_not_turn_its_plane(before_m: float) -> None:
+    run, tall = front(width=1.9, height=0.7), front(x=1.9, y=-before_m, z=0.05, width=0.7, height=1.7)
+    shown, turn = together(run, tall), rotation_about_z(np.deg2rad(0.45))  # between two bins of yaw
+    noise = np.random.default_rng(5).normal(scale=[0, 0.002, 0], size=shown.vertices_world.shape)
+    regions = find_planes(surface((shown.vertices_world + noise) @ turn.T, shown.faces), CAMERAS)
+    ends = np.array([[0.0, 0.0, 0.6], [1.9, 0.0, 0.6]]) @ turn.T
+    off = [np.abs(region.world_from_plane.inverse.apply(ends)[:, 1]).max() for region in regions]
+    assert min(off) < 0.002
+
+
 @pytest.mark.parametrize("parts", [(frame(0.06), 0.07), (frame(0.02), 0.032), (front(-0.6, 0.0, 0.3, 0.6, 0.5), 0.032)])
 def test_what_lies_deeper_or_has_no_stiles_round_it_is_a_plane_of_its_own(parts: tuple[SceneSurface, float]) -> None:
     around, behind_m = parts
