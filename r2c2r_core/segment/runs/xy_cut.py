@@ -112,6 +112,7 @@ class LineField:
     def __init__(self, odds: PanelOdds, cell_m: float) -> None:
         self.params, self.cell_m = (params := tuned(Params)), cell_m * STEP
         self.odds = (odds.upright, odds.level.T)
+        self.front_odds = (odds.front, odds.front.T)
         self.front = (odds.front > 0, (odds.front > 0).T)
         reach = 2 * round(params.beside_m / self.cell_m) + 1
         self.handles = _centres(odds.handle > 0, params.handle_cells)
@@ -125,7 +126,10 @@ class LineField:
         return max((line for axis in (0, 1) if (line := self._best(cell, axis)) is not None), default=None)
 
     def end_of_fronts(self, cell: Cell) -> Line | None:
-        """The likeliest line where fronts end within a cell: an edge must be there, however faint, if the border is none."""
+        """The likeliest line where fronts end within a cell: an edge must be there, however faint, if the border is none.
+
+        What is beyond it must be less likely a front than the line is no edge.
+        """
         margin, reach = max(2, round(self.params.apart_m / self.cell_m)), max(1, round(self.params.end_m / self.cell_m))
         found = []
         for axis in (0, 1):
@@ -138,11 +142,11 @@ class LineField:
             for end, border in ((end, border) for end, border in ends if margin <= end <= len(on) - margin):
                 near = max(end - reach, 1), min(end + reach, len(on) - 1)
                 line = self.best_between(cell, axis, (start + near[0]) * STEP, (start + near[1]) * STEP)
-                if (
-                    line is not None
-                    and low + STEP <= line.position <= high - STEP
-                    and line.odds > self._border(cell, axis, border)
-                ):
+                if line is None or not low + STEP <= line.position <= high - STEP:
+                    continue
+                beyond = slice(start + end, stop) if border == high else slice(start, start + end)
+                front = float(self.front_odds[axis][self._span(cell, axis), beyond].mean())
+                if line.odds > max(self._border(cell, axis, border), front):
                     found.append(line)
         return max(found, default=None)
 

@@ -110,6 +110,13 @@ def test_an_unlikely_line_is_found_where_somebody_says_that_there_is_one() -> No
     assert line.odds == pytest.approx(-1.0)
 
 
+@pytest.mark.parametrize(("front_odds", "cells"), [(-0.5, 1), (-3.5, 2)])
+def test_a_front_ends_at_an_unlikely_line_only_before_what_is_surely_none(front_odds: float, cells: int) -> None:
+    seen = odds(240, 288, [], [(180, 0, 240)], sure=-2.0)
+    seen.front[90:] = front_odds
+    assert len(cut_panels(seen, Cell(0, 0, 240, 288), CELL_M)) == cells
+
+
 def test_a_click_on_an_ovens_window_means_the_oven() -> None:
     window, frame = Cell(36, 96, 204, 240), Cell(0, 0, 240, 288)
     cells = (window, Cell(0, 0, 240, 96), Cell(0, 240, 240, 288), Cell(0, 96, 36, 240), Cell(204, 96, 240, 240))
