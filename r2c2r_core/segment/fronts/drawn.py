@@ -76,7 +76,7 @@ def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
     lines = [scored(tile, grid.cell_m) for tile in tiles]
     evidence = gather(lines, 0, grid.cell_m), gather(lines, 1, grid.cell_m)
     roll = float(np.arcsin(np.clip(grid.world_from_plane.rotation[2, 0], -1.0, 1.0)))
-    return run_on(region, grid, roll, tiles, relief, evidence, frame_count, (cell,))
+    return run_on(region, grid, roll, tiles, relief, evidence, (cell,))
 
 
 def _region(grid: PlaneGrid, cell: Cell) -> PlaneRegion:

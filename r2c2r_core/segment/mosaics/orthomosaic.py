@@ -266,16 +266,15 @@ def opened_cells(grid: PlaneGrid, scene: Scene, frame: Frame) -> np.ndarray:
     return np.asarray(hole[row[:, None], column] > 0)
 
 
-def blend(tiles: list[Tile], count: int) -> Image:
-    """RGB mosaic of the best `count` tiles, each moved by its own shift; what few of them show counts little.
+def blend(tiles: list[Tile]) -> Image:
+    """RGB mosaic of tiles, each moved by its own shift; what few of them show counts little.
 
     A drawer that is open in some frames, or something that passed by, must not leave a shade on the mosaic.
     """
-    params, best = tuned(Params), tiles[:count]
-    usual = _usual(best)
+    params, usual = tuned(Params), _usual(tiles)
     total = np.zeros((*tiles[0].weight.shape, 3), np.float32)
     weights = np.zeros(tiles[0].weight.shape, np.float32)
-    for tile in best:
+    for tile in tiles:
         colour, weight = _moved(tile)
         lab = colour.astype(np.float32)
         lightness, a, b = cv2.split(cv2.absdiff(lab, usual))

@@ -99,7 +99,7 @@ def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int,
     if not tiles:
         return None
     relief = measure_relief(grid, scene, views.chosen(params.relief_frames))
-    return run_on(region, grid, roll, tiles, relief, views.evidence(frame_count), frame_count)
+    return run_on(region, grid, roll, tiles, relief, views.evidence(frame_count))
 
 
 def run_on(
@@ -109,18 +109,17 @@ def run_on(
     tiles: list[Tile],
     relief: Relief,
     lines: tuple[Evidence, Evidence],
-    frame_count: int,
     cells: tuple[Cell, ...] | None = None,
 ) -> Run:
     """What is known of a plane from its tiles, its relief and colours' upright and level lines; cut where no panels are given.
 
-    Where the poses agree, the tiles lie where they are.
+    Where the poses agree, the tiles lie where they are; where not, the mosaic is of the best half of them: more would blur it.
     """
     poses_agree = bool(np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles]) <= STEADY_CELLS)
     if poses_agree:
         for tile in tiles:
             tile.shift = (0.0, 0.0)
-    mosaic = blend(tiles, max(frame_count // 2, 8))
+    mosaic = blend(tiles if poses_agree else tiles[: max(len(tiles) // 2, 8)])
     seams = seam_odds(mosaic, relief)
     odds = edge_odds(seams, mosaic, relief, *lines)
     vertical, horizontal = (_with_edges(found, relief, axis, grid) for axis, found in enumerate(lines))
