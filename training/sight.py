@@ -36,15 +36,15 @@ def seen(e: Elevation) -> Sight:
     if rng.random() < 0.2:
         image += _reflections(rng, shape)[..., None]
     image = np.clip(image * rng.uniform(0.5, 1.3), 0, 1)
-    if rng.random() < 0.5:  # frames that lie a few millimetres off each other
-        most = rng.choice([0.6, 1.5, 3.0])
-        copies = [_moved(image, rng.normal(0, most, 2)) for _ in range(rng.integers(2, 5))]
+    if rng.random() < 0.75:  # frames that lie a few millimetres off each other
+        most = rng.choice([0.2, 0.6, 1.5, 3.0])
+        near, filmed = rng.uniform(0.35, 1.0), rng.random() < 0.7
+        copies = [
+            _moved(_filmed(rng, image, near * rng.uniform(0.7, 1.0)) if filmed else image, rng.normal(0, most, 2))
+            for _ in range(rng.integers(2, 5))
+        ]
         image = np.mean(copies, axis=0)
-    image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.3, 2.0))
-    if rng.random() < 0.3:  # far away
-        scale = rng.uniform(0.3, 0.9)
-        small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-        image = cv2.resize(small, shape[::-1], interpolation=cv2.INTER_LINEAR)
+    image = cv2.GaussianBlur(image, (0, 0), rng.choice([rng.uniform(0.3, 0.8), rng.uniform(0.3, 2.0)]))
     image = np.clip(image, 0, 1) ** (1 / rng.uniform(1.8, 2.4))
     if rng.random() < 0.6:
         image *= _exposures(rng, shape)[..., None]
@@ -109,6 +109,17 @@ def _exposures(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
         cv2.fillPoly(frame, [np.round(box).astype(np.int32)], 1.0)
         light *= 1 + rng.choice([0.01, 0.03, 0.08]) * rng.uniform(-1, 1) * frame
     return light
+
+
+def _filmed(rng: np.random.Generator, image: np.ndarray, scale: float) -> np.ndarray:
+    """As a camera's pixels show it, `scale` to a cell, sampled back onto the cells: narrow gaps look like rows of beads."""
+    size = image.shape[1::-1]
+    there = cv2.getRotationMatrix2D((size[0] / 2, size[1] / 2), rng.normal(0, 2.0), scale)
+    there[:, 2] += rng.uniform(-0.5, 0.5, 2)
+    blurred = cv2.GaussianBlur(image, (0, 0), max(rng.uniform(0.2, 0.5) / scale, 0.1))
+    pixels = cv2.warpAffine(blurred, there, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    back = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return cv2.warpAffine(pixels, there, size, flags=back, borderMode=cv2.BORDER_REPLICATE)
 
 
 def _moved(image: np.ndarray, by: np.ndarray) -> np.ndarray:
