@@ -17,7 +17,7 @@ class Params:
     """Where on a panel its handle is."""
 
     parallax_m: float = param(0.02, "m", "beside its true place that a mosaic shows it", source="4 cm seen from 25 degrees off")
-    alike: float = param(0.97, "share", "of most of its depth points, of places that hold about as many")
+    seen: float = param(0.25, "share", "of the usual count of depth points, from which a handle is at a place", gt=0)
     parted_m: float = param(0.04, "m", "between parts of one handle", source="glare parts bars, a cup pull's rim its middle")
 
 
@@ -71,10 +71,15 @@ def find_handle(odds: PanelOdds, relief: Relief, cell: Cell) -> GridHandle | Non
 
 
 def _shift(raised: np.ndarray, rows: np.ndarray, columns: np.ndarray, reach: int) -> tuple[float, float]:
-    """How far (rows, columns) depth's points of a handle lie from where the mosaic, which is flat, shows it."""
-    height, width = int(np.ptp(rows)) + 1, int(np.ptp(columns)) + 1
-    padded = np.pad(raised.astype(np.float32), ((reach, reach + height), (reach, reach + width)))
-    held = cv2.boxFilter(padded, -1, (width, height), anchor=(0, 0), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    near = held[rows[0] : rows[0] + 2 * reach + 1, columns[0] : columns[0] + 2 * reach + 1]
-    down, across = np.nonzero(near >= tuned(Params).alike * near.max()) if near.max() > 0 else ([reach], [reach])
-    return float(np.mean(down)) - reach, float(np.mean(across)) - reach
+    """How far (rows, columns) the middle of a handle's depth points lies from where the mosaic, which is flat, shows it."""
+    top, left = max(rows[0] - reach, 0), max(columns[0] - reach, 0)
+    near = raised[top : rows[-1] + reach + 1, left : columns[-1] + reach + 1]
+    if not near.any():
+        return 0.0, 0.0
+    down, across = (_middle(near.sum(axis=1 - k)) for k in (0, 1))
+    return top + down - (rows[0] + rows[-1]) / 2, left + across - (columns[0] + columns[-1]) / 2
+
+
+def _middle(points: np.ndarray) -> float:
+    """The middle of the positions that depth saw about as often as their median: nearer ends of a handle have more points."""
+    return float(np.flatnonzero(points > tuned(Params).seen * np.median(points[points > 0])).mean())

@@ -61,3 +61,12 @@ def test_a_handle_is_where_depth_has_it_not_where_the_flat_mosaic_shows_it() -> 
     handle = find_handle(*found((*seen, 3.0), raised=stands), PANEL)
     assert handle is not None
     assert (handle.left, handle.right, handle.top, handle.bottom) == (57 * STEP, 61 * STEP, 22 * STEP, 52 * STEP)
+
+
+def test_the_middle_of_a_handle_is_not_drawn_to_the_end_that_depth_saw_more_often() -> None:
+    bar, recognised = (slice(20, 24), slice(30, 62)), (slice(20, 24), slice(33, 62))
+    odds, relief = found((*recognised, 3.0), raised=bar)
+    relief.count[:, 30:46] = 3
+    handle = find_handle(odds, relief, PANEL)
+    assert handle is not None
+    assert (handle.left + handle.right) / 2 == 46 * STEP
