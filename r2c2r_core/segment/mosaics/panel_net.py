@@ -59,8 +59,9 @@ def panel_odds(mosaic: Image, count: np.ndarray, raised: np.ndarray, level_m: np
     inputs = features(mosaic, count, raised, level_m)
     rows, columns = inputs.shape[1:]
     padded = np.pad(inputs, ((0, 0), (0, -rows % _MULTIPLE), (0, -columns % _MULTIPLE)))
-    odds = np.mean([_forward(network, padded) for network in _networks()], axis=0)
-    upright, level, handle, front = np.clip(odds[:, :rows, :columns], -SUREST, SUREST)
+    odds = np.stack([np.clip(_forward(network, padded), -SUREST, SUREST) for network in _networks()])[:, :, :rows, :columns]
+    chance = np.mean(1 / (1 + np.exp(-odds)), axis=0)
+    upright, level, handle, front = np.log(chance / (1 - chance))
     return PanelOdds(upright, level, handle, front)
 
 
