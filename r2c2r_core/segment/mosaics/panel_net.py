@@ -1,7 +1,8 @@
 """Log-odds of fronts' edges and handles on an orthomosaic, by small networks trained on elevations drawn at random.
 
-An ensemble of two (`panel_net_*.onnx`, U-Nets of 0.57 million weights, trained by `training/train.py`): where only one of
-them is sure, nothing is. No kitchen generator that the benchmarks use has a part in what they are trained on.
+An ensemble of two (`panel_net_*.onnx`, U-Nets of 0.57 million weights, trained by `training/train.py` on unlike images): the
+mean of their probabilities, so that one that sees a faint gap is not outvoted by one that holds it impossible. No kitchen
+generator that the benchmarks use has a part in what they are trained on.
 """
 
 import threading
