@@ -116,6 +116,8 @@ def _add_joint(model: ET.Element, body: Body) -> None:
         ET.SubElement(limit, key).text = numbers(getattr(joint, key))
     for key in ("damping", "friction"):
         ET.SubElement(dynamics, key).text = numbers(getattr(joint, key))
+    for key in ("spring_reference", "spring_stiffness"):  # required by SDFormat, though their default is 0
+        ET.SubElement(dynamics, key).text = "0"
 
 
 def _add_pose(element: ET.Element, pose: Rigid3) -> None:

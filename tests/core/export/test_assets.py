@@ -168,6 +168,13 @@ def test_sdf_has_a_model_for_each_object_and_files_that_are_there(good_folder: P
     assert bottle.find("joint") is None  # it falls when it is pushed
 
 
+def test_sdf_gives_every_joint_the_dynamics_that_the_format_requires(good_folder: Path) -> None:
+    dynamics = list(ET.parse(good_folder / "scene.sdf").getroot().iter("dynamics"))
+    assert dynamics
+    for joint in dynamics:
+        assert [joint.findtext(key) for key in ("spring_reference", "spring_stiffness")] == ["0", "0"]
+
+
 @pytest.mark.parametrize(
     "name", ["assets/cabinet_1/cabinet_1.usda", "assets/cabinet_1/cabinet_1.xml", "assets/cabinet_1/cabinet_1.urdf"]
 )
