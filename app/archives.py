@@ -2,9 +2,10 @@
 
 import stat
 import zipfile
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 
 from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.foreign import refuse_foreign
 
 MAX_DIRECTORY_BYTES = 64 * 1024 * 1024  # of the archive's own table of contents
 MAX_RATIO = 200.0  # unpacked to packed, over the whole archive; images and depth do not compress like this
@@ -16,6 +17,7 @@ MIN_SUSPICIOUS = 64 * 1024 * 1024  # bytes unpacked below which no ratio is susp
 
 def check_archive(path: Path, name: str, *, max_bytes: int, max_files: int) -> None:
     """Raise CaptureError, in one line, unless the file is a complete zip that is safe to read; it is called `name`."""
+    refuse_foreign(PurePath(name))
     with path.open("rb") as handle:
         if handle.read(4) != b"PK\x03\x04":
             raise CaptureError(

@@ -8,7 +8,7 @@ import contextlib
 import secrets
 import time
 from collections.abc import AsyncIterator
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import anyio
 from sqlmodel import Session, col, select
@@ -22,12 +22,14 @@ from app.files import delete_folder, project_files, require_free, safe_name
 from app.services import imports, probing, project_import, projects, quotas
 from app.services.context import Context
 from r2c2r_core.errors import CaptureError, InputError
+from r2c2r_core.ingest.foreign import refuse_foreign
 
 SPARE = 2.5  # a recording needs its own size again when it is read, and some more
 
 
 def begin(context: Context, body: schemas.UploadIn) -> schemas.Upload:
-    """Announce a file; refused at once when it is too large for the limit or the disk."""
+    """Announce a file; refused at once when its name tells that it is no recording, or it is too large for limit or disk."""
+    refuse_foreign(PurePath(body.file_name))
     _refuse_size(context, body.size)
     require_free(context.settings.data_dir, int(body.size * SPARE), context.settings.min_free_bytes)
     row = Upload(id=secrets.token_hex(6), who=context.who, created=time.time(), **body.model_dump())

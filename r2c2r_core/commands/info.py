@@ -44,7 +44,7 @@ def info(options: argparse.Namespace) -> int:
         write_json(options.json, report.to_json())
     if options.picture:
         _write_picture(options.picture, draw_scan(capture))
-    print(table(("figure", "value"), report.rows()))
+    print(table(("figure", "value"), [("format", report.format), *report.rows()]))
     for line in (*report.reasons, *report.notices):
         print(shown(f"- {line}"))
     print(shown(f"{source}: {report.verdict}"))

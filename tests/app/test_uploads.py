@@ -109,6 +109,15 @@ def test_a_file_that_will_not_fit_is_refused_before_it_is_sent(start: Callable[.
         assert web.post("/api/uploads", {"file_name": "a", "size": 1}, 507)["kind"] == "no-space"
 
 
+@pytest.mark.parametrize(("name", "words"), [("Kitchen.usdz", "a finished 3D model"), ("room.bag", "RealSense bag")])
+def test_a_file_whose_name_tells_that_it_is_no_recording_is_refused_before_it_is_sent(
+    web: Running, name: str, words: str
+) -> None:
+    refused = web.post("/api/uploads", {"file_name": name, "size": 10}, 422)
+    assert (refused["kind"], words in refused["message"], bool(refused["hint"])) == ("capture", True, True)
+    assert web.get("/api/uploads") == []
+
+
 def test_an_upload_is_its_senders_alone(start: Callable[..., Any]) -> None:
     with start() as web:
         accounts.add(web.context.engine, "eve", "reviewer", "three plain words")

@@ -47,6 +47,7 @@ def examine(capture: Capture, recording: Recording | None = None) -> CaptureRepo
     unit = likely_unit(capture, recording, recorded_m, rng) if odd and recording and recorded_m else None
     remarks = judge(figures, convention, scale, registration, unit)
     return CaptureReport(
+        format=capture.format,
         verdict=worst(remarks),
         remarks=remarks,
         figures=figures,

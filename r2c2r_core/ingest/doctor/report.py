@@ -96,6 +96,7 @@ class Moment:
 class CaptureReport:
     """The doctor's report."""
 
+    format: str  # of the recording
     verdict: Verdict
     remarks: tuple[Remark, ...]  # worst first
     figures: CaptureFigures

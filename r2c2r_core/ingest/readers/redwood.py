@@ -1,13 +1,16 @@
 """Redwood and Open3D: color/N.jpg (or image/, rgb/), depth/N.png, trajectory.log and a camera's JSON, or one of these two.
 
 trajectory.log holds, for each frame, a line "i j k" and a 4x4 camera-to-world matrix with OpenCV axes; depth is uint16
-millimetres registered to colour; without a calibration the camera is a PrimeSense (525, 525, 319.5, 239.5); pixel centres lie
-at integers; nothing tells which way is up.
+millimetres registered to colour, or in the unit that the camera's JSON names; without a calibration the camera is a PrimeSense
+(525, 525, 319.5, 239.5); pixel centres lie at integers; nothing tells which way is up. Open3D's RGBDVideoReader.save_frames
+writes the same without trajectory.log from a RealSense or Azure Kinect recording, its `depth_scale` in units a metre (an L515's
+is 4000); scripts around librealsense write metres a unit.
 """
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +26,14 @@ from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, rea
 _COLOUR, _DEPTH = r"(?:color|image|rgb)/(\d+)(?:-\d+)?\.(?:jpe?g|png)", r"depth/(\d+)(?:-\d+)?\.png"
 _LOG = r"(?:scene/)?trajectory\.log"
 _ROW = 3 + 16  # numbers of one frame
+_MILLIMETRES = 1000.0  # units a metre
+_FINEST = (1e2, 1e6)  # units a metre that a uint16 depth image may be in: 655 m to 65 mm at most
+
+
+class _Calibration(NamedTuple):
+    camera: Intrinsics
+    units_per_metre: float
+    name: str | None  # of its file; None: assumed
 
 
 def open_redwood(files: Files) -> Recording:
@@ -34,21 +45,23 @@ def open_redwood(files: Files) -> Recording:
     if _starts_one_earlier(poses, colour.keys()):
         poses = {number + 1: pose for number, pose in poses.items()}
         notices.append(f"images are numbered from 1, {log} from 0: pose i belongs to image i + 1")
-    camera, camera_name = _camera(files, first_size(files, colour.values(), "colour image"))
-    depth_camera = camera.resized(*first_size(files, depth.values(), "depth image"))
-    if camera_name is None:
+    calibration = _calibration(files, first_size(files, colour.values(), "colour image"))
+    depth_camera = calibration.camera.resized(*first_size(files, depth.values(), "depth image"))
+    if calibration.name is None:
         notices.append("no calibration was found: a PrimeSense's 525 px is assumed")
+    if calibration.units_per_metre != _MILLIMETRES:
+        notices.append(f"depth is read in steps of {1000 / calibration.units_per_metre:g} mm, as {calibration.name} says")
     found = Found(colour=colour, depth=depth, poses=poses)
-    frames, left_out = joined_frames(files, found, lambda _: camera, lambda _: depth_camera)
+    frames, left_out = joined_frames(files, found, lambda _: calibration.camera, lambda _: depth_camera)
     return Recording(
         format="Redwood / Open3D",
         files=files,
         frames=frames,
         colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0),
+        depth_of=partial(depth_file, files, calibration.units_per_metre),
         up_capture=None,
         notices=(*notices, *left_out),
-        other_names=tuple(name for name in (log, camera_name) if name),
+        other_names=tuple(name for name in (log, calibration.name) if name),
     )
 
 
@@ -66,7 +79,7 @@ def _starts_one_earlier(poses: Collection[int], images: Collection[int]) -> bool
     return bool(images and poses) and min(poses) == 0 and min(images) == 1 and max(poses) + 1 <= max(images)
 
 
-def _camera(files: Files, size: tuple[int, int]) -> tuple[Intrinsics, str | None]:
+def _calibration(files: Files, size: tuple[int, int]) -> _Calibration:
     """From a JSON in Open3D's form (intrinsic_matrix column-major, width, height), else a PrimeSense's."""
     for name in sorted(n for n in files.names() if "/" not in n and n.endswith(".json")):
         document = read_json_object(files, name)
@@ -77,8 +90,18 @@ def _camera(files: Files, size: tuple[int, int]) -> tuple[Intrinsics, str | None
         except (TypeError, ValueError, OverflowError):
             continue
         if np.isfinite(k).all() and min(full.fx, full.fy, full.width, full.height) > 0:
-            return full.resized(*size), name
-    return integer_centred(525.0, 525.0, 319.5, 239.5, (640, 480)).resized(*size), None
+            return _Calibration(full.resized(*size), _units_per_metre(document), name)
+    assumed = integer_centred(525.0, 525.0, 319.5, 239.5, (640, 480)).resized(*size)
+    return _Calibration(assumed, _MILLIMETRES, None)
+
+
+def _units_per_metre(document: Mapping[str, Any]) -> float:
+    """What `depth_scale` says, in units a metre or metres a unit; millimetres where it says neither."""
+    said = document.get("depth_scale")
+    if not isinstance(said, int | float) or not said > 0:
+        return _MILLIMETRES
+    found = (units for units in (float(said), 1.0 / said) if _FINEST[0] <= units <= _FINEST[1])
+    return round(next(found, _MILLIMETRES), 3)  # a depth scale of float32
 
 
 READER = Reader(

@@ -6,6 +6,7 @@ from pathlib import Path
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.above import WithAbove, borrowed_by, with_folder_above
 from r2c2r_core.ingest.files import Files, SubFiles, open_files, top_folders
+from r2c2r_core.ingest.foreign import foreign_among, refuse_foreign
 from r2c2r_core.ingest.readers import (
     arkitscenes,
     arti4d,
@@ -17,6 +18,7 @@ from r2c2r_core.ingest.readers import (
     rtabmap,
     scanner_app,
     scannet,
+    scannetpp,
     seven_scenes,
     stray,
     threedmatch,
@@ -35,6 +37,7 @@ READERS: tuple[Reader, ...] = (
     scanner_app.READER,
     arkitscenes.READER,
     scannet.READER,
+    scannetpp.READER,
     seven_scenes.READER,
     threedmatch.READER,
     tum.READER,
@@ -55,6 +58,8 @@ def readers() -> tuple[Reader, ...]:
 
 def open_recording(source: Path) -> Recording:
     """The recording at `source`, its format recognised from what it holds; raises CaptureError."""
+    if source.is_file():
+        refuse_foreign(source)
     files = open_files(source)
     outer, inner = _roots(with_folder_above(files, source))
     for root in outer:
@@ -86,6 +91,9 @@ def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
     if not nearest and archives:
         inside = f"{source}: holds {archives[0]}, which may be a recording itself"
         return CaptureError(inside, hint="choose that file; take it out first if it lies in another archive")
+    if not nearest and (instead := foreign_among(files.names())):
+        name, kind = instead
+        return kind.refusal(str(source), name)
     if not nearest:
         return CaptureError(f"{source}: {_found(files)}; no known recording format", hint=f"one of {_formats()}")
     reader, missing = nearest[0]

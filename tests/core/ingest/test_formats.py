@@ -21,6 +21,7 @@ from .tiny_formats import (
     write_redwood,
     write_rtabmap,
     write_scannet,
+    write_scannetpp,
     write_threedmatch,
 )
 
@@ -75,6 +76,28 @@ def test_scannets_calibration_follows_images_that_were_made_smaller(tmp_path):
     assert told(recording, "calibration is for 1296x968")
 
 
+# ScanNet++
+
+
+def test_scannetpps_frames_that_were_not_extracted_are_no_loss(tmp_path):
+    recording = open_recording(write_scannetpp(tmp_path / "s", SMALL))
+    assert [f.index for f in recording.frames] == [0, 10, 20, 30]
+    assert not told(recording, "left out")
+
+
+def test_scannetpp_that_was_not_aligned_is_opened_without_poses(tmp_path):
+    recording = open_recording(write_scannetpp(tmp_path / "s", SMALL, aligned=False))
+    assert [frame.capture_from_camera for frame in recording.frames] == [None] * 4
+    assert told(recording, "none of 4 poses")
+
+
+def test_scannetpps_cameras_without_numbers_are_named_with_what_was_expected(tmp_path):
+    folder = write_scannetpp(tmp_path / "s", SMALL)
+    (folder / "pose_intrinsic_imu.json").write_text('{"frame_000000": {"intrinsic": [[1, 0], 2]}}')
+    with pytest.raises(CaptureError, match="'intrinsic' of 3x3 numbers"):
+        open_recording(folder)
+
+
 # 3DMatch and 7-Scenes
 
 
@@ -111,6 +134,22 @@ def test_redwood_without_a_camera_is_a_primesense(tmp_path):
     recording = open_recording(write_redwood(tmp_path / "r", room, calibrated=False))
     assert (recording.frames[0].rgb_camera.fx, recording.frames[0].rgb_camera.cy) == (525.0, 240.0)
     assert told(recording, "PrimeSense")
+
+
+@pytest.mark.parametrize(
+    ("said", "metres_per_unit"),
+    [(4000.0, 0.00025), (0.0001, 0.0001), (3999.999810010195, 0.00025), (1.0, 0.001), ("?", 0.001), (-1, 0.001)],
+)
+def test_depth_that_open3d_saved_of_a_film_is_read_in_the_unit_its_calibration_names(said, metres_per_unit, tmp_path):
+    folder = write_redwood(tmp_path / "r", SMALL)
+    (folder / "trajectory.log").unlink()
+    camera = json.loads((folder / "camera.json").read_text()) | {"depth_scale": said, "device_name": "Intel RealSense L515"}
+    (folder / "camera.json").unlink()
+    (folder / "intrinsic.json").write_text(json.dumps(camera))
+    recording = open_recording(folder)
+    stored = cv2.imread(str(folder / recording.frames[1].depth_name), cv2.IMREAD_UNCHANGED)
+    assert np.allclose(recording.depth_of(recording.frames[1]).metres, stored * metres_per_unit, rtol=1e-5)
+    assert told(recording, "as intrinsic.json says") == (metres_per_unit != 0.001)
 
 
 # nerfstudio
@@ -316,6 +355,44 @@ def test_an_unknown_folder_is_told_the_two_nearest_formats_and_what_each_lacks(t
     assert "looks like 7-Scenes folder, but intrinsics_color.txt is missing" in str(caught.value)
     assert "it would be Redwood / Open3D with trajectory.log or a camera's .json" in caught.value.hint
     assert len(f"{caught.value}{caught.value.hint}") < 500
+
+
+@pytest.mark.parametrize(
+    ("name", "what", "bring"),
+    [
+        ("Kitchen.USDZ", "a finished 3D model", "Raw data"),
+        ("scan.ply", "a finished 3D model", "Raw data"),
+        ("2026-11-02.bag", "RealSense bag", "save_frames"),
+        ("rosbag2_0.mcap", "a ROS 2 bag", "color/ and depth/"),
+        ("k4a.mkv", "Azure Kinect", "save_frames"),
+        ("rtabmap.db", "a database of RTAB-Map", "rtabmap-export"),
+        ("scene0000_00.sens", "ScanNet's packed stream", "SensReader"),
+        ("HD720.svo2", "a ZED camera", "16-bit depth"),
+        ("scan.tar", "another kind than zip", "as a zip"),
+        ("IMG_0042.MOV", "a film without depth", "the whole folder"),
+        ("IMG_0042.HEIC", "a picture", "with depth"),
+    ],
+)
+def test_a_file_that_is_no_recording_is_told_what_it_is_and_what_to_bring(name, what, bring, tmp_path):
+    (tmp_path / "alone").mkdir()
+    alone = tmp_path / "alone" / name
+    alone.write_bytes(b"x")
+    beside = tmp_path / "beside"
+    beside.mkdir()
+    for one in (name, "notes.txt", "cover.jpg"):
+        (beside / one).write_bytes(b"x")
+    for source in (alone, beside, zip_folder(beside, tmp_path / "sent.zip", top="beside/")):
+        with pytest.raises(CaptureError) as caught:
+            open_recording(source)
+        assert what in str(caught.value)
+        assert str(caught.value).count(name) == 1
+        assert bring in caught.value.hint
+
+
+def test_a_model_that_an_app_packed_beside_its_recording_does_not_stop_the_recording(tmp_path):
+    folder = write_polycam(tmp_path / "p", SMALL)
+    (folder / "raw.glb").write_bytes(b"glTF")
+    assert open_recording(folder).format == "Polycam raw export"
 
 
 @pytest.mark.parametrize(

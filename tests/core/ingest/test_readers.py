@@ -22,6 +22,7 @@ from .tiny_formats import (
     write_rtabmap,
     write_scanner_app,
     write_scannet,
+    write_scannetpp,
     write_stray,
     write_threedmatch,
 )
@@ -56,6 +57,7 @@ WRITERS = {
     "scanner-app": write_scanner_app,
     "arkitscenes": write_arkitscenes,
     "scannet": write_scannet,
+    "scannetpp": write_scannetpp,
     "nerfstudio": write_nerfstudio,
     "3dmatch": write_threedmatch,
     "redwood": write_redwood,

@@ -149,6 +149,24 @@ def write_scannet(folder: Path, room: TinyRoom, *, lost: tuple[int, ...] = ()) -
     return folder
 
 
+def write_scannetpp(folder: Path, room: TinyRoom, *, aligned: bool = True) -> Path:
+    """ScanNet++'s iPhone folder in sensor orientation: the JSON also has frames of the film that were not extracted."""
+    for name in ("rgb", "depth"):
+        (folder / name).mkdir(parents=True)
+    camera, entries = integer_centred(sensor_camera(room.camera).resized(1920, 1440)), {}
+    for k, pose in enumerate(room.poses()):
+        phone, number = sensor_pose(pose), 10 * k
+        sensor = np.ascontiguousarray(np.rot90(room.image(pose, room.camera), -1))
+        (folder / "rgb" / f"frame_{number:06d}.jpg").write_bytes(jpeg(sensor))
+        depth = np.rot90(room.depth(pose, room.depth_camera), -1)
+        cv2.imwrite(str(folder / "depth" / f"frame_{number:06d}.png"), millimetres(depth))
+        for later in (number, number + 1):
+            entry = {"timestamp": 402.5 + later / 60, "intrinsic": camera.tolist(), "pose": (TILTED @ phone).matrix.tolist()}
+            entries[f"frame_{later:06d}"] = entry | ({"aligned_pose": phone.matrix.tolist()} if aligned else {})
+    (folder / "pose_intrinsic_imu.json").write_text(json.dumps(entries))
+    return folder
+
+
 def write_threedmatch(folder: Path, room: TinyRoom, *, intrinsics: bool = True, sequences: int = 1) -> Path:
     """A 3DMatch scene: sequences below, their calibration above; rotations are off by 2e-4."""
     for s in range(sequences):

@@ -1,0 +1,94 @@
+"""Files that people bring for a recording and that are none: what each is, and how a recording is had from it."""
+
+from collections.abc import Iterable
+from pathlib import PurePath
+from typing import NamedTuple
+
+from r2c2r_core.errors import CaptureError
+
+
+class Foreign(NamedTuple):
+    """A kind of file that is no recording."""
+
+    what: str
+    bring: str  # what to do instead
+
+    def refusal(self, where: str, name: str) -> CaptureError:
+        """The error for that file; `where` names it, or the folder or zip that it was found in."""
+        found = f"{where}: {self.what}" if where.endswith(name) else f"{where}: found {name}, {self.what}"
+        return CaptureError(found, hint=self.bring)
+
+
+_OPEN3D = "Open3D saves its frames: `open3d.t.io.RGBDVideoReader.create(FILE).save_frames(FOLDER)`; bring that folder"
+_RAW = "Polycam's Raw data, 3D Scanner App's All data, or record with Record3D or Stray Scanner"
+
+# In the order in which they are named where a folder holds several kinds.
+_KINDS: tuple[tuple[Foreign, tuple[str, ...]], ...] = (
+    (
+        Foreign("a ROS or RealSense bag", f"{_OPEN3D} (a .bag of a RealSense), or export color/, depth/ and camera.json"),
+        (".bag",),
+    ),
+    (
+        Foreign("a ROS 2 bag", "export its images to color/ and depth/ with a camera.json, or record it with RTAB-Map"),
+        (".db3", ".mcap"),
+    ),
+    (
+        Foreign("a Matroska film, such as an Azure Kinect's recording", f"{_OPEN3D}; a film without depth cannot be used"),
+        (".mkv",),
+    ),
+    (
+        Foreign("a database of RTAB-Map", "export it: `rtabmap-export --images --poses_camera FILE`; bring that folder"),
+        (".db",),
+    ),
+    (
+        Foreign(
+            "ScanNet's packed stream",
+            "unpack it with ScanNet's SensReader (color images, depth images, poses and intrinsics); bring that folder",
+        ),
+        (".sens",),
+    ),
+    (
+        Foreign(
+            "a recording of a ZED camera",
+            "export left images and 16-bit depth to color/ and depth/ with a camera.json, by the ZED SDK's SVO export",
+        ),
+        (".svo", ".svo2"),
+    ),
+    (
+        Foreign("an archive of another kind than zip", "unpack it and send the recording's folder as a zip"),
+        (".rar", ".7z", ".tar", ".gz", ".tgz", ".bz2", ".xz", ".zst"),
+    ),
+    (
+        Foreign("a finished 3D model or point cloud, not the recording it was made from", f"export the recording: {_RAW}"),
+        (
+            *(".usdz", ".usd", ".usdc", ".usda", ".glb", ".gltf", ".obj", ".ply", ".stl", ".fbx", ".dae"),
+            *(".e57", ".las", ".laz", ".pts", ".xyz", ".pcd", ".splat", ".spz"),
+        ),
+    ),
+    (
+        Foreign("a film without depth", f"bring the whole folder of a recording with depth: {_RAW}"),
+        (".mp4", ".mov", ".m4v", ".avi", ".webm"),
+    ),
+    (
+        Foreign("a picture, without depth beside it", f"bring a recording with depth: {_RAW}"),
+        (".heic", ".heif", ".dng"),
+    ),
+)
+
+
+def foreign(name: PurePath) -> Foreign | None:
+    """What a file of that name is, if it is known to be no recording."""
+    return next((kind for kind, endings in _KINDS if name.suffix.lower() in endings), None)
+
+
+def refuse_foreign(name: PurePath) -> None:
+    """Raise CaptureError for a file that its name tells to be no recording."""
+    if kind := foreign(name):
+        raise kind.refusal(str(name), name.name)
+
+
+def foreign_among(names: Iterable[str]) -> tuple[str, Foreign] | None:
+    """The file among these that best tells what a folder holds instead of a recording."""
+    found = [(name, kind) for name in sorted(names) if (kind := foreign(PurePath(name)))]
+    rank = [kind for kind, _ in _KINDS]
+    return min(found, key=lambda pair: rank.index(pair[1]), default=None)

@@ -1,0 +1,92 @@
+"""ScanNet++'s iPhone captures: rgb/frame_N.jpg, depth/frame_N.png and pose_intrinsic_imu.json, as its toolkit extracts them.
+
+The JSON holds {"frame_N": {"timestamp", "pose", "aligned_pose", "intrinsic", ...}}: 4x4 camera-to-world with OpenCV axes and a
+3x3 calibration of the colour image. `aligned_pose` is in the metric world of the laser scan, with z up; `pose` is ARKit's own
+and is not read. The calibration is that of the film, also where the extracted images were made smaller. Depth is uint16
+millimetres; pixel centres lie at integers. (scannetpp/scannetpp, README.md.)
+"""
+
+import re
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from r2c2r_core.errors import CaptureError
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers.frames import Found, joined_frames
+from r2c2r_core.ingest.readers.images import MOST_FRAMES, colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
+from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object
+
+_COLOUR, _DEPTH = r"rgb/frame_(\d+)\.(?:jpe?g|png)", r"depth/frame_(\d+)\.png"
+_CAMERAS = "pose_intrinsic_imu.json"
+_FILM_SIZE = (1920, 1440)
+
+
+def open_scannetpp(files: Files) -> Recording:
+    """The recording in the `iphone` folder of a ScanNet++ scene; raises CaptureError."""
+    colour, depth = numbered(files.names(), _COLOUR), numbered(files.names(), _DEPTH)
+    entries = {n: entry for n, entry in _entries(files).items() if n in colour or n in depth}  # of every frame of the film
+    size, depth_size = first_size(files, colour.values(), "colour image"), first_size(files, depth.values(), "depth image")
+    cameras = {number: camera for number, entry in entries.items() if (camera := _camera(entry, size))}
+    if not cameras:
+        raise CaptureError(
+            f"{files.source}/{_CAMERAS}: no frame of the {len(colour)} colour images has an 'intrinsic' of 3x3 numbers",
+            hint="extract the scene with ScanNet++'s toolkit again",
+        )
+    poses = {number: _pose(entries[number].get("aligned_pose")) for number in cameras}
+    times = {number: time_s for number in cameras if (time_s := _number(entries[number].get("timestamp"))) is not None}
+    found = Found(colour=colour, depth=depth, poses=poses, times_s=times)
+    frames, notices = joined_frames(files, found, cameras.__getitem__, lambda n: cameras[n].resized(*depth_size))
+    return Recording(
+        format="ScanNet++ iPhone",
+        files=files,
+        frames=frames,
+        colour_of=partial(colour_file, files),
+        depth_of=partial(depth_file, files, 1000.0),
+        up_capture=np.array([0.0, 0.0, 1.0]),
+        notices=tuple(notices),
+        other_names=(_CAMERAS,),
+    )
+
+
+def _entries(files: Files) -> dict[int, Mapping[str, Any]]:
+    """What the JSON says of each frame, by its number."""
+    named = ((re.fullmatch(r"frame_(\d{1,8})", key), value) for key, value in read_json_object(files, _CAMERAS).items())
+    numbers = ((int(match.group(1)), value) for match, value in named if match and isinstance(value, dict))
+    return {number: value for number, value in numbers if number < MOST_FRAMES}
+
+
+def _camera(entry: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics | None:
+    matrix = _matrix(entry.get("intrinsic"), (3, 3))
+    if matrix is None or not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1]) <= 0:
+        return None
+    return integer_centred(matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], _FILM_SIZE).resized(*size)
+
+
+def _pose(value: Any) -> Rigid3 | None:
+    matrix = _matrix(value, (4, 4))
+    return None if matrix is None else pose_of_matrix(matrix)
+
+
+def _matrix(value: Any, shape: tuple[int, int]) -> np.ndarray | None:
+    try:
+        matrix = np.asarray(value, np.float64)
+    except (TypeError, ValueError):  # rows of different lengths, words
+        return None
+    return matrix if matrix.shape == shape else None
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float) and np.isfinite(value) else None
+
+
+READER = Reader(
+    name="ScanNet++ iPhone",
+    parts=(Part("rgb/frame_N.jpg", _COLOUR), Part("depth/frame_N.png", _DEPTH), Part(_CAMERAS, _CAMERAS)),
+    open=open_scannetpp,
+)
