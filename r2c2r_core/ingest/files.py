@@ -17,6 +17,8 @@ from r2c2r_core.errors import CaptureError
 _MAX_MEMBERS = 400_000  # three files a frame, 60 frames/s: 37 minutes
 _MAX_MEMBER_BYTES = 256 * 2**20  # the largest honest member is a 12-megapixel PNG
 _VIDEOS = (".mp4", ".mov", ".m4v")  # are streamed, so they may be larger
+_LFS_POINTER = b"version https://git-lfs.github.com/spec/"  # what Git has in the place of a large file that was not fetched
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
 _MAX_RATIO, _RATIO_MATTERS_BYTES = 300, 256 * 2**20  # deflate reaches 1000 on zeros only
 
 
@@ -77,7 +79,7 @@ class FolderFiles:
                 raise CaptureError(
                     f"{self.source / name}: {size >> 20} MiB, 256 MiB at most are expected", hint="is it an image?"
                 )
-            return stream.read()
+            return _fetched(stream.read(), str(self.source / name))
 
     def open(self, name: str) -> BinaryIO:
         """The content as a stream; raises CaptureError when it cannot be read."""
@@ -133,7 +135,7 @@ class ZipFiles:
     def read(self, name: str) -> bytes:
         """The content; raises CaptureError when the member is damaged."""
         try:
-            return self._zip.read(self._members.get(name, name))
+            return _fetched(self._zip.read(self._members.get(name, name)), f"{self.source}: member '{name}'")
         except (
             zipfile.BadZipFile,
             zlib.error,
@@ -173,6 +175,12 @@ class ZipFiles:
                 raise self._hostile(f"member '{info.filename}' is a symbolic link")
             if info.flag_bits & 0x1:
                 raise self._hostile(f"member '{info.filename}' is encrypted")
+            if info.compress_type not in _METHODS:
+                raise CaptureError(
+                    f"{self.source}: member '{info.filename}' is packed by method {info.compress_type} (Windows packs large "
+                    "folders by 9, Deflate64), which is not read",
+                    hint="pack the folder with 7-Zip as zip, method Deflate, or give the folder itself",
+                )
             if info.file_size > _MAX_MEMBER_BYTES and path.suffix.lower() not in _VIDEOS:
                 raise self._hostile(
                     f"member '{info.filename}' unpacks to {info.file_size >> 20} MiB, 256 MiB at most are expected"
@@ -222,6 +230,15 @@ class SubFiles:
 def top_folders(files: Files) -> tuple[str, ...]:
     """Names of the folders at the top, sorted."""
     return tuple(sorted({n.split("/", 1)[0] for n in files.names() if "/" in n}))
+
+
+def _fetched(content: bytes, where: str) -> bytes:
+    """The content of a file; raises CaptureError where Git has only a pointer to it."""
+    if content.startswith(_LFS_POINTER):
+        raise CaptureError(
+            f"{where}: a pointer of Git LFS, not the file itself", hint="run `git lfs pull` in the repository that it came from"
+        )
+    return content
 
 
 def _is_clutter(name: str) -> bool:

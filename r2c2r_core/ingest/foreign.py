@@ -71,7 +71,7 @@ _KINDS: tuple[tuple[Foreign, tuple[str, ...]], ...] = (
     ),
     (
         Foreign("a picture, without depth beside it", f"bring a recording with depth: {_RAW}"),
-        (".heic", ".heif", ".dng"),
+        (".heic", ".heif", ".dng", ".jpg", ".jpeg"),
     ),
 )
 
@@ -88,7 +88,10 @@ def refuse_foreign(name: PurePath) -> None:
 
 
 def foreign_among(names: Iterable[str]) -> tuple[str, Foreign] | None:
-    """The file among these that best tells what a folder holds instead of a recording."""
-    found = [(name, kind) for name in sorted(names) if (kind := foreign(PurePath(name)))]
+    """The file among these that best tells what a folder holds instead of a recording; None where there may be depth."""
+    names = sorted(names)
+    if any("depth" in name.lower() for name in names):
+        return None
+    found = [(name, kind) for name in names if (kind := foreign(PurePath(name)))]
     rank = [kind for kind, _ in _KINDS]
     return min(found, key=lambda pair: rank.index(pair[1]), default=None)

@@ -23,8 +23,8 @@ from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _TRAJECTORY = "lowres_wide.traj"
 _STAMP = r"(?:[^/]*_)?(\d{1,12}\.\d{1,12})"  # seconds
-_COLOUR, _DEPTH = rf"lowres_wide/{_STAMP}\.png", rf"lowres_depth/{_STAMP}\.png"
-_CONFIDENCE, _PINCAM = rf"confidence/{_STAMP}\.png", rf"lowres_wide_intrinsics/{_STAMP}\.pincam"
+_COLOUR, _DEPTH = rf"lowres_wide/{_STAMP}\.(?i:png)", rf"lowres_depth/{_STAMP}\.(?i:png)"
+_CONFIDENCE, _PINCAM = rf"confidence/{_STAMP}\.(?i:png)", rf"lowres_wide_intrinsics/{_STAMP}\.pincam"
 _APART_S = 0.009  # half a frame at 60 Hz: interpolating all through the 0.1 s between two poses would smooth the hand away
 _GAP_S = 0.15
 _SAME_S = 0.0015  # names are rounded to a millisecond, not always alike

@@ -23,7 +23,7 @@ from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_quaternion, read_json_object, read_numbers
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
-_COLOUR, _DEPTH = r"rgb/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.jpe?g", r"depth/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.png"
+_COLOUR, _DEPTH = r"rgb/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.(?i:jpe?g)", r"depth/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.(?i:png)"
 _ODOMETRY, _CALIBRATION = r"odom/[^/]+\.csv", r"[^/]*tf[^/]*\.json"
 _APART_S, _GAP_S = 0.05, 0.1  # a Kinect's frames are 33 ms apart, and its trackers' poses closer
 _COLUMNS = ("timestamp", "x", "y", "z", "qx", "qy", "qz", "qw")

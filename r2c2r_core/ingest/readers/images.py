@@ -11,6 +11,7 @@ import numpy as np
 from r2c2r_core.arrays import Image
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.files import Files
+from r2c2r_core.ingest.readers import npy
 from r2c2r_core.ingest.readers.protocol import Colour, RawDepth, RawFrame, UnreadableFrame
 
 MAX_PIXELS = 64_000_000
@@ -49,12 +50,12 @@ def depth_file(
     *,
     confidence_levels: tuple[int, int] = (1, 2),
 ) -> RawDepth:
-    """Depth of a 16-bit PNG, and confidence 0..2 of an 8-bit one where the frame has it. Raises UnreadableFrame.
+    """Depth of a 16-bit PNG or .npy, and confidence 0..2 of an 8-bit PNG where the frame has it. Raises UnreadableFrame.
 
     `confidence_levels` are the file's least values that mean medium and high.
     """
     size = (frame.depth_camera.width, frame.depth_camera.height)
-    stored = decode_png(files.read(frame.depth_name), frame.depth_name, np.dtype(np.uint16), size)
+    stored = _decode_depth(files.read(frame.depth_name), frame.depth_name, size)
     metres = stored.astype(np.float32) / np.float32(units_per_metre)
     metres[stored == 65535] = 0
     if frame.confidence_name is None:
@@ -64,14 +65,26 @@ def depth_file(
     return RawDepth(metres, (marks >= medium).astype(np.uint8) + (marks >= high))
 
 
+def _decode_depth(content: bytes, name: str, size: tuple[int, int]) -> np.ndarray:
+    if not name.endswith(npy.SUFFIX):
+        return decode_png(content, name, np.dtype(np.uint16), size)
+    stored = npy.read_array(content, name, MAX_PIXELS)
+    if stored.shape != size[::-1]:
+        raise UnreadableFrame(f"{name}: {stored.shape[1]}x{stored.shape[0]} numbers, {size[0]}x{size[1]} expected")
+    return stored
+
+
 def decode_png(content: bytes, name: str, dtype: np.dtype, size: tuple[int, int]) -> np.ndarray:
     """The (h, w) values of a PNG with one channel of that type; `size` is (width, height). Raises UnreadableFrame."""
     found = image_size(content, name)
     if found != size:
         raise UnreadableFrame(f"{name}: {found[0]}x{found[1]} pixels, {size[0]}x{size[1]} expected")
     stored = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if stored is None or stored.ndim != 2 or stored.dtype != dtype:
-        raise UnreadableFrame(f"{name}: not a readable image of one channel of {dtype.name}")
+    if stored is None:
+        raise UnreadableFrame(f"{name}: damaged image ({len(content)} bytes)")
+    if stored.ndim != 2 or stored.dtype != dtype:
+        channels = 1 if stored.ndim == 2 else stored.shape[2]
+        raise UnreadableFrame(f"{name}: {channels} x {stored.dtype.name} a pixel, one {dtype.name} expected")
     return np.asarray(stored)
 
 
@@ -99,13 +112,20 @@ def numbered(names: Iterable[str], pattern: str, *, below: int = MOST_FRAMES) ->
 
 
 def first_size(files: Files, names: Iterable[str], what: str) -> tuple[int, int]:
-    """(width, height) of the first readable image; raises CaptureError when none of them is."""
+    """(width, height) of the first readable image or .npy array; raises CaptureError when none of them is."""
     problem: UnreadableFrame | None = None
     for name in names:
         try:
-            return image_size(files.read(name), name)
+            return _size_of(files.read(name), name)
         except UnreadableFrame as failure:
             problem = problem or failure
     raise CaptureError(
         f"{files.source}: no readable {what}: {problem or 'there is none'}", hint="export the recording again"
     ) from problem
+
+
+def _size_of(content: bytes, name: str) -> tuple[int, int]:
+    if not name.endswith(npy.SUFFIX):
+        return image_size(content, name)
+    height, width = npy.read_array(content, name, MAX_PIXELS).shape
+    return width, height

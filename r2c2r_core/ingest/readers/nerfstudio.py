@@ -6,12 +6,10 @@ from the corner of the first pixel, as ours do. k1, k2, p1, p2, k3 are taken out
 docs/quickstart/data_conventions.md.)
 """
 
-import io
 import posixpath
 import re
 from collections.abc import Mapping
 from functools import partial
-from tokenize import TokenError
 from typing import Any
 
 import cv2
@@ -22,9 +20,9 @@ from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3
 from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import MAX_PIXELS, colour_file, colour_pixels, depth_file, first_size
+from r2c2r_core.ingest.readers.images import colour_file, colour_pixels, depth_file, first_size
 from r2c2r_core.ingest.readers.lens import Lens, undistorted
-from r2c2r_core.ingest.readers.protocol import Colour, Part, RawDepth, RawFrame, Reader, Recording, UnreadableFrame
+from r2c2r_core.ingest.readers.protocol import Colour, Part, RawDepth, RawFrame, Reader, Recording
 from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_json_object
 
 _TRANSFORMS = "transforms.json"
@@ -45,7 +43,7 @@ def open_nerfstudio(files: Files) -> Recording:
             f"{files.source}/{_TRANSFORMS}: {said} of {len(entries)} frames name a depth image, none of them exists",
             hint="export with depth: each frame needs a depth_file_path",
         )
-    size, depth_size = first_size(files, colour.values(), "colour image"), _depth_size(files, depth)
+    size, depth_size = first_size(files, colour.values(), "colour image"), first_size(files, depth.values(), "depth image")
     settings = {number: {**document, **entry} for number, entry in entries.items()}
     cameras = {number: _camera(files, setting, size) for number, setting in settings.items()}
     lenses = {number: lens for number, setting in settings.items() if any(lens := _lens(setting))}
@@ -139,10 +137,7 @@ def _colour_of(files: Files, lenses: Mapping[int, Lens], frame: RawFrame) -> Col
 def _depth_of(
     files: Files, units_per_metre: float, lenses: Mapping[int, Lens], masks: Mapping[int, str], frame: RawFrame
 ) -> RawDepth:
-    if frame.depth_name.endswith(".npy"):
-        metres = (_array(files, frame.depth_name) / units_per_metre).astype(np.float32)
-    else:
-        metres = depth_file(files, units_per_metre, frame).metres
+    metres = depth_file(files, units_per_metre, frame).metres
     if frame.index in masks:
         metres = np.where(_mask(files, masks[frame.index], metres.shape), metres, np.float32(0))
     if frame.index in lenses:
@@ -153,44 +148,6 @@ def _depth_of(
 def _mask(files: Files, name: str, shape: tuple[int, ...]) -> np.ndarray:
     white = colour_pixels(files.read(name), name).max(axis=2)
     return np.asarray(cv2.resize(white, shape[::-1], interpolation=cv2.INTER_NEAREST) > 0)
-
-
-def _depth_size(files: Files, depth: Mapping[int, str]) -> tuple[int, int]:
-    if not any(name.endswith(".npy") for name in depth.values()):
-        return first_size(files, depth.values(), "depth image")
-    try:
-        height, width = _array(files, min(depth.values())).shape
-    except UnreadableFrame as problem:
-        raise CaptureError(f"{files.source}: {problem}", hint="export the recording again") from problem
-    return width, height
-
-
-def _array(files: Files, name: str) -> np.ndarray:
-    """A (h, w) array of numbers from a .npy file, its header believed only when the bytes are there."""
-    content = files.read(name)
-    stream = io.BytesIO(content)
-    try:
-        version = np.lib.format.read_magic(stream)
-        read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read_header(stream)
-        if len(shape) == 3 and shape[2] == 1:
-            shape = shape[:2]
-        if len(shape) != 2 or min(shape) < 1 or shape[0] * shape[1] > MAX_PIXELS or dtype.kind not in "fiu":
-            raise ValueError(f"{dtype} of shape {shape}")
-        return np.load(io.BytesIO(content), allow_pickle=False).reshape(shape)
-    # the header is a Python literal, and numpy lets through whatever its parser raises
-    except (
-        ValueError,
-        EOFError,
-        OSError,
-        SyntaxError,
-        TypeError,
-        KeyError,
-        MemoryError,
-        RecursionError,
-        TokenError,
-    ) as problem:
-        raise UnreadableFrame(f"{name}: not a readable depth array ({problem})") from problem
 
 
 READER = Reader(name="nerfstudio transforms.json", parts=(Part(_TRANSFORMS, re.escape(_TRANSFORMS)),), open=open_nerfstudio)

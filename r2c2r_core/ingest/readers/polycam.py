@@ -20,8 +20,8 @@ from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object
 
-_IMAGES, _CAMERAS = r"images/(\d+)\.(?:jpe?g|png)", r"cameras/(\d+)\.json"
-_DEPTH, _CONFIDENCE = r"keyframes/depth/(\d+)\.png", r"keyframes/confidence/(\d+)\.png"
+_IMAGES, _CAMERAS = r"images/(\d+)\.(?i:jpe?g|png)", r"cameras/(\d+)\.json"
+_DEPTH, _CONFIDENCE = r"keyframes/depth/(\d+)\.(?i:png)", r"keyframes/confidence/(\d+)\.(?i:png)"
 _CONFIDENCE_LEVELS = (64, 192)  # between 0, 127 and 255
 
 

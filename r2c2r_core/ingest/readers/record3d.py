@@ -24,7 +24,7 @@ def open_record3d(files: Files) -> Recording:
     """The recording in a .r3d; raises CaptureError."""
     metadata = parse_metadata(files.read(_METADATA), f"{files.source}, member '{_METADATA}'")
     names = files.names()
-    colour = numbered(names, r"rgbd/(\d+)\.(?:jpe?g|png)")
+    colour = numbered(names, r"rgbd/(\d+)\.(?i:jpe?g|png)")
     depth = numbered(names, r"rgbd/(\d+)\.depth")
     confidence = numbered(names, r"rgbd/(\d+)\.conf")
     if not colour and not depth:

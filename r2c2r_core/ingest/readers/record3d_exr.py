@@ -16,7 +16,7 @@ from r2c2r_core.ingest.readers.record3d import record3d_frames
 from r2c2r_core.ingest.readers.record3d_metadata import parse_metadata
 
 _METADATA = "metadata.json"
-_COLOUR, _DEPTH = r"rgb/(\d+)\.(?:jpe?g|png)", r"depth/(\d+)\.exr"
+_COLOUR, _DEPTH = r"rgb/(\d+)\.(?i:jpe?g|png)", r"depth/(\d+)\.exr"
 
 
 def open_record3d_exr(files: Files) -> Recording:

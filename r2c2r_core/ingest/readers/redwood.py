@@ -23,7 +23,7 @@ from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object, read_numbers
 
-_COLOUR, _DEPTH = r"(?:color|image|rgb)/(\d+)(?:-\d+)?\.(?:jpe?g|png)", r"depth/(\d+)(?:-\d+)?\.png"
+_COLOUR, _DEPTH = r"(?:color|image|rgb)/(\d+)(?:-\d+)?\.(?i:jpe?g|png)", r"depth/(\d+)(?:-\d+)?\.(?i:png)"
 _LOG = r"(?:scene/)?trajectory\.log"
 _ROW = 3 + 16  # numbers of one frame
 _MILLIMETRES = 1000.0  # units a metre

@@ -24,7 +24,7 @@ from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_m
 
 _NODE = r"\d+(?:\.\d+)?"
 _COLOUR, _DEPTH, _CALIBRATION = (
-    rf"[^/]+_{kind}/{_NODE}\.{ending}" for kind, ending in (("rgb", "jpe?g"), ("depth", "png"), ("calib", "ya?ml"))
+    rf"[^/]+_{kind}/{_NODE}\.(?i:{ending})" for kind, ending in (("rgb", "jpe?g"), ("depth", "png"), ("calib", "ya?ml"))
 )
 _OF_CAMERA, _OF_DEVICE = r"[^/]+_camera_poses\.txt", r"[^/]+(?<!_camera)(?<!_scan)_poses\.txt"
 _SAME_S = 1e-4  # a file's name has six digits of its time

@@ -20,8 +20,8 @@ from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object
 
-_PHOTO, _CAMERA = r"frame_(\d+)\.jpe?g", r"frame_(\d+)\.json"
-_DEPTH, _CONFIDENCE = r"depth_(\d+)\.png", r"conf_(\d+)\.png"
+_PHOTO, _CAMERA = r"frame_(\d+)\.(?i:jpe?g)", r"frame_(\d+)\.json"
+_DEPTH, _CONFIDENCE = r"depth_(\d+)\.(?i:png)", r"conf_(\d+)\.(?i:png)"
 
 
 def open_scanner_app(files: Files) -> Recording:

@@ -15,7 +15,7 @@ from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import read_calibration
 
-_COLOUR, _DEPTH, _POSE = r"color/(\d+)\.(?:jpe?g|png)", r"depth/(\d+)\.png", r"pose/(\d+)\.txt"
+_COLOUR, _DEPTH, _POSE = r"color/(\d+)\.(?i:jpe?g|png)", r"depth/(\d+)\.(?i:png)", r"pose/(\d+)\.txt"
 _INTRINSIC_COLOUR, _INTRINSIC_DEPTH = "intrinsic/intrinsic_color.txt", "intrinsic/intrinsic_depth.txt"
 _SENSOR_SIZE = (1296, 968)  # of the colour images that intrinsic_color.txt is for
 

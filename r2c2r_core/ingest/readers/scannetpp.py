@@ -22,7 +22,7 @@ from r2c2r_core.ingest.readers.images import MOST_FRAMES, colour_file, depth_fil
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object
 
-_COLOUR, _DEPTH = r"rgb/frame_(\d+)\.(?:jpe?g|png)", r"depth/frame_(\d+)\.png"
+_COLOUR, _DEPTH = r"rgb/frame_(\d+)\.(?i:jpe?g|png)", r"depth/frame_(\d+)\.(?i:png)"
 _CAMERAS = "pose_intrinsic_imu.json"
 _FILM_SIZE = (1920, 1440)
 

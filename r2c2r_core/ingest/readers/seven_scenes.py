@@ -18,8 +18,8 @@ from r2c2r_core.ingest.readers.texts import read_calibration, read_numbers
 
 _INTRINSICS = "intrinsics_color.txt"
 _GRAVITY = "gravity-direction.txt"
-_COLOUR = r"color/(?:frame-)?(\d+)(?:\.color)?\.(?:jpe?g|png)"
-_DEPTH = r"depth/(?:frame-)?(\d+)(?:\.depth)?\.png"
+_COLOUR = r"color/(?:frame-)?(\d+)(?:\.color)?\.(?i:jpe?g|png)"
+_DEPTH = r"depth/(?:frame-)?(\d+)(?:\.depth)?\.(?i:png)"
 _POSE = r"pose/(?:frame-)?(\d+)(?:\.pose)?\.txt"
 
 

@@ -1,9 +1,9 @@
 """Stray Scanner: rgb.mp4 (HEVC, landscape, never rotated), depth/N.png, confidence/N.png, camera_matrix.csv, odometry.csv.
 
-Depth is uint16 millimetres, confidence 0..2, both for the whole colour image at a lower resolution. Poses are camera-to-world
-with OpenCV camera axes in ARKit's y-up world; newer files carry fx, fy, cx, cy per frame, which are preferred to
-camera_matrix.csv (the last frame's). Columns go by name, frames by number; pixel centres lie at integers.
-(StrayRobots/scanner, docs/format.md and OdometryEncoder.swift.)
+Depth is uint16 millimetres (older versions write depth/N.npy), confidence 0..2, both for the whole colour image at a lower
+resolution. Poses are camera-to-world with OpenCV camera axes in ARKit's y-up world; newer files carry fx, fy, cx, cy per frame,
+which are preferred to camera_matrix.csv (the last frame's). Columns go by name, frames by number; pixel centres lie at
+integers. (StrayRobots/scanner, docs/format.md and OdometryEncoder.swift.)
 """
 
 import csv
@@ -21,7 +21,7 @@ from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_q
 from r2c2r_core.ingest.readers.video import Video
 
 _VIDEO, _MATRIX, _ODOMETRY = "rgb.mp4", "camera_matrix.csv", "odometry.csv"
-_COLOUR, _DEPTH, _CONFIDENCE = r"rgb/(\d+)\.(?:jpe?g|png)", r"depth/(\d+)\.png", r"confidence/(\d+)\.png"
+_COLOUR, _DEPTH, _CONFIDENCE = r"rgb/(\d+)\.(?i:jpe?g|png)", r"depth/(\d+)\.(?i:png|npy)", r"confidence/(\d+)\.(?i:png)"
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _CAMERA = ("fx", "fy", "cx", "cy")
 

@@ -48,6 +48,10 @@ READERS: tuple[Reader, ...] = (
 )
 """The project's own; `readers()` also has those of other packages."""
 
+_BRING = (
+    "bring colour, depth and poses: an .r3d of Record3D, a Stray Scanner folder, Polycam's Raw data or 3D Scanner App's "
+    "All data; docs/recordings.md names every format"
+)
 _DEEPEST, _WIDEST = 6, 50  # folders that are looked into
 
 
@@ -95,12 +99,14 @@ def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
         name, kind = instead
         return kind.refusal(str(source), name)
     if not nearest:
-        return CaptureError(f"{source}: {_found(files)}; no known recording format", hint=f"one of {_formats()}")
+        return CaptureError(f"{source}: {_found(files)}; no known recording format", hint=_BRING)
     reader, missing = nearest[0]
     others = "".join(f"; it would be {other.name} with {' and '.join(lacking)}" for other, lacking in nearest[1:])
     lacks = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
+    has_depth = any("depth" in name.lower() for name in files.names())
+    flat = "" if has_depth else "; what was captured without depth, as in a photo mode, cannot be used"
     return CaptureError(
-        f"{source}: {_found(files)}; looks like {reader.name}, but {lacks}", hint=f"it holds {reader.expects}{others}"
+        f"{source}: {_found(files)}; looks like {reader.name}, but {lacks}", hint=f"it holds {reader.expects}{flat}{others}"
     )
 
 
@@ -127,7 +133,3 @@ def _found(files: Files) -> str:
         return "holds no file"
     listed = ", ".join(names[:4])
     return f"found {listed}" + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-
-
-def _formats() -> str:
-    return ", ".join(reader.name for reader in readers())

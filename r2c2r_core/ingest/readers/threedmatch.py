@@ -17,7 +17,7 @@ from r2c2r_core.ingest.readers.texts import integer_centred, read_calibration
 
 _INTRINSICS = "camera-intrinsics.txt"
 _FOLDER = r"(?:[^/]+/)?"
-_COLOUR, _DEPTH, _POSE = (rf"frame-(\d+)\.{kind}" for kind in (r"color\.(?:jpe?g|png)", r"depth\.png", r"pose\.txt"))
+_COLOUR, _DEPTH, _POSE = (rf"frame-(\d+)\.{kind}" for kind in (r"color\.(?i:jpe?g|png)", r"depth\.(?i:png)", r"pose\.txt"))
 
 
 def open_threedmatch(files: Files) -> Recording:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.readers.protocol import UnreadableFrame
 from r2c2r_core.ingest.readers.table import open_recording
 
 from .tiny import TinyRoom, integer_centred, write_seven_scenes, write_tum, zip_folder
@@ -445,6 +446,47 @@ def test_a_recording_without_any_pose_is_opened_without_poses(write, poses, tmp_
         path.unlink()
     recording = open_recording(folder)
     assert [f.capture_from_camera for f in recording.frames] == [None] * 4
+
+
+def test_files_whose_endings_are_in_capitals_are_read(tmp_path):
+    folder = write_redwood(tmp_path / "r", SMALL)
+    for path in [*(folder / "color").iterdir(), *(folder / "depth").iterdir()]:
+        path.rename(path.with_suffix(path.suffix.upper()))
+    assert len(open_recording(folder).frames) == 4
+
+
+@pytest.mark.parametrize("name", ["color/0.jpg", "depth/0.png", "intrinsic/intrinsic_color.txt"])
+def test_a_pointer_of_git_lfs_in_the_place_of_a_file_is_named(name, tmp_path):
+    folder = write_scannet(tmp_path / "s", SMALL)
+    (folder / name).write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
+    for source in (folder, zip_folder(folder, tmp_path / "s.zip", top="s/")):
+        with pytest.raises(CaptureError, match=f"{name}.*Git LFS") as caught:
+            open_recording(source)
+        assert "git lfs pull" in caught.value.hint
+
+
+def test_a_zip_packed_by_a_method_that_is_not_read_says_how_to_pack_it(tmp_path):
+    """Windows packs large folders by Deflate64."""
+    zipped = zip_folder(write_scannet(tmp_path / "s", SMALL), tmp_path / "s.zip", top="s/")
+    content = bytearray(zipped.read_bytes())
+    with zipfile.ZipFile(zipped) as archive:
+        last = archive.infolist()[-1]
+    entry = content.rindex(b"PK\x01\x02")
+    for at in (entry + 10, last.header_offset + 8):  # the method, in the table of contents and before the member
+        content[at] = 9
+    zipped.write_bytes(content)
+    with pytest.raises(CaptureError, match="Deflate64") as caught:
+        open_recording(zipped)
+    assert "method Deflate" in caught.value.hint
+
+
+def test_depth_of_eight_bits_is_told_what_was_expected(tmp_path):
+    folder = write_redwood(tmp_path / "r", SMALL)
+    for path in (folder / "depth").iterdir():
+        cv2.imwrite(str(path), (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) // 16).astype(np.uint8))
+    recording = open_recording(folder)
+    with pytest.raises(UnreadableFrame, match="1 x uint8 a pixel, one uint16 expected"):
+        recording.depth_of(recording.frames[0])
 
 
 def test_lone_outer_folders_are_looked_through(tmp_path):

@@ -188,7 +188,13 @@ def array_file(header: str, body: bytes = b"") -> bytes:
 )
 def test_a_bad_depth_array_is_explained(content: bytes, tmp_path: Path) -> None:
     folder = write_nerfstudio(tmp_path / "scan", ROOM, npy=True)
-    min((folder / "depths").glob("*.npy")).write_bytes(content)
+    arrays = sorted((folder / "depths").glob("*.npy"))
+    arrays[0].write_bytes(content)
+    recording = open_recording(folder)  # the others are read
+    with pytest.raises(UnreadableFrame, match="not a readable depth array"):
+        recording.depth_of(recording.frames[0])
+    for path in arrays:
+        path.write_bytes(content)
     with pytest.raises(CaptureError, match="not a readable depth array"):
         open_recording(folder)
 

@@ -1,6 +1,7 @@
 """What is particular to what phone apps export, and its traps: Stray Scanner, its film, Polycam, 3D Scanner App."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import cv2
@@ -41,6 +42,20 @@ def test_stray_frames_without_depth_are_left_out_and_the_film_stays_in_step(tmp_
     assert told(recording, "2 of 12 frames were left out: 2 a depth image missing")
     picture = ROOM.image(ROOM.poses()[7], ROOM.camera)[..., ::-1].astype(int)
     assert np.abs(recording.colour_of(recording.frames[5]) - picture).mean() < 6.0
+
+
+def test_strays_older_versions_store_depth_as_arrays(tmp_path):
+    expected = open_recording(write_stray(tmp_path / "png", SMALL))
+    folder = write_stray(tmp_path / "npy", SMALL)
+    for path in list((folder / "depth").iterdir()):
+        np.save(path.with_suffix(".npy"), cv2.imread(str(path), cv2.IMREAD_UNCHANGED))
+        path.unlink()
+    recording = open_recording(folder)
+    for found, same in zip(recording.frames, expected.frames, strict=True):
+        assert np.array_equal(recording.depth_of(found).metres, expected.depth_of(same).metres)
+    np.save(folder / "depth" / "000002.npy", np.zeros((3, 4), np.uint16))
+    with pytest.raises(UnreadableFrame, match="4x3 numbers"):
+        recording.depth_of(recording.frames[2])
 
 
 def test_stray_without_its_camera_is_named_as_the_nearest_miss(tmp_path):
@@ -131,6 +146,15 @@ def test_a_film_damaged_inside_costs_frames_only(tmp_path):
 
 
 # Polycam
+
+
+def test_polycams_photo_mode_is_told_to_be_without_depth(tmp_path):
+    folder = write_polycam(tmp_path / "p", SMALL)
+    for name in ("depth", "confidence"):
+        shutil.rmtree(folder / "keyframes" / name)
+    with pytest.raises(CaptureError, match=r"looks like Polycam raw export, but keyframes/depth") as caught:
+        open_recording(folder)
+    assert "photo mode" in caught.value.hint
 
 
 def test_polycams_confidence_has_three_levels(tmp_path):

@@ -341,7 +341,7 @@ BAD = {
     "absent": (lambda p: p / "nothing.r3d", "no such file"),
     "foreign": (foreign, "not a readable zip"),
     "truncated": (truncated, "not a readable zip"),
-    "other zip": (other_zip, r"found holiday/beach\.jpg; no known recording format"),
+    "other zip": (other_zip, r"found holiday/beach\.jpg, a picture, without depth"),
     "empty folder": (lambda p: (p / "empty").mkdir() or p / "empty", "holds no file"),
     "zip slip": (escaping("../../evil"), "points outside"),
     "absolute": (escaping("/etc/evil"), "points outside"),
