@@ -1,20 +1,24 @@
 """A first look at what was uploaded, in a process of its own: `python -m app.jobs.probe recording|mesh FILE NAME`.
 
-It opens a recording as the import will and decodes a few of its frames, or makes a candidate of a mesh as a run will, so that
-what cannot be used is refused while its sender is still there. NAME is the sender's name of it, for messages.
+It opens a recording as the import will and decodes a few of its frames, or makes a candidate of a mesh as a run will and says
+what it looks like ({"seen": ...}), so that what cannot be used is refused while its sender is still there. NAME is the sender's
+name of it, for messages.
 """
 
 import argparse
+import base64
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from app.jobs.messages import run_stage
+from app.jobs.messages import run_stage, say
 from r2c2r_core.errors import CaptureError, InputError
 from r2c2r_core.limits import free_memory, limit_this_process
 
 LOOKED_AT = 8  # frames
+_Y_UP = (".glb", ".obj")  # glTF's axes are +Y up, and most programs write OBJ so
+_DRAWN_FROM_Y_UP = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 MEMORY_SHARE = 0.7  # of what is free when it starts: it decodes other people's files
 
 
@@ -64,10 +68,22 @@ def probe_recording(file: Path) -> None:
 
 
 def probe_mesh(file: Path) -> None:
-    """Raise OverrideError unless a closed candidate can be made of the mesh."""
-    from r2c2r_core.generate.upload import read_upload
+    """Say what a person is to see of the mesh; raise OverrideError unless a closed candidate can be made of it."""
+    import numpy as np
 
-    read_upload(file, "probe", "probe")
+    from app.drawing import mesh_picture
+    from r2c2r_core.generate.upload import read_mended
+
+    mesh, notes = read_mended(file)
+    up = _DRAWN_FROM_Y_UP if file.suffix.lower() in _Y_UP else np.eye(3)
+    say(
+        seen={
+            "size": sorted(np.ptp(mesh.vertices, axis=0).tolist(), reverse=True),
+            "triangles": len(mesh.faces),
+            "notes": notes,
+            "picture": base64.b64encode(mesh_picture(mesh, np.array(up))).decode(),
+        }
+    )
 
 
 LOOKS = {"recording": Look(probe_recording, cpu_s=60), "mesh": Look(probe_mesh, cpu_s=240)}

@@ -48,6 +48,12 @@ async def upload_candidate(
     return await mesh_uploads.upload(context, project, object, filename, request.stream(), rerun, version)
 
 
+@router.post("/objects/{object}/mesh-look", operation_id="lookAtMesh", max_body_size=STREAMED)
+async def look_at_mesh(context: ReviewerCtx, request: Request, project: str, object: RowId, filename: str) -> schemas.MeshLook:
+    """What a mesh (the request's body: GLB, OBJ, PLY or STL) would be used as; nothing of it is kept."""
+    return await mesh_uploads.look(context, project, object, filename, request.stream())
+
+
 @router.patch("/scene/{name}/override", operation_id="correctMade")
 def correct_made(context: ReviewerCtx, project: str, name: Name, body: schemas.OverridePatch) -> schemas.Reviewed:
     """Correct a worktop or plinth that was made from the scan; what depends on it runs again."""

@@ -59,6 +59,17 @@ class Difference(Shape):
     most: float  # of the other's longest side
 
 
+class MeshLook(Shape):
+    """A mesh that a person sent, as it would be used: mended, but neither placed nor scaled."""
+
+    name: str
+    size: list[float]  # of its box along the file's axes, longest first, in the file's unit
+    object_size_m: list[float] | None  # of what the masks show, along the world's axes, longest first; None: nothing
+    triangles: int
+    notes: list[str]  # what was repaired, dropped, united or is missing; none: it is taken as it is
+    picture: str  # base64 of a PNG
+
+
 class Crop(Shape):
     """A frame that candidates were made from, and where the object is in it."""
 

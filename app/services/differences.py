@@ -10,13 +10,14 @@ from scipy.spatial import cKDTree
 from app import schemas
 from app.db import queries
 from app.db.engine import reading
+from app.drawing import turntable
 from app.errors import NotReady
 from app.files import ProjectFiles, inside
 from app.services import views
 from app.services.candidates import candidate_mesh, generate_key
 from app.services.context import Context
 from app.services.media import kept_file
-from app.services.meshes import turntable, upright
+from app.services.meshes import upright
 from r2c2r_core.arrays import Mask, Points, Vector3
 from r2c2r_core.model.track import MaskTrack
 

@@ -156,7 +156,8 @@ def _glb(files: ProjectFiles, name: str, candidate: str) -> bytes:
 
 
 def _picture(files: ProjectFiles, name: str, candidate: str) -> bytes:
-    from app.services.meshes import mesh_picture, upright
+    from app.drawing import mesh_picture
+    from app.services.meshes import upright
 
     asset = candidate_mesh(files, name, candidate)
     return mesh_picture(asset.mesh, upright(files, name, candidate))

@@ -4,7 +4,9 @@ import contextlib
 import re
 import secrets
 from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import anyio
 from starlette.requests import ClientDisconnect
@@ -14,7 +16,7 @@ from app.db import history, queries
 from app.db.engine import reading
 from app.errors import TooLarge
 from app.files import receiving, require_free, safe_name
-from app.services import probing, reviews
+from app.services import clouds, probing, reviews
 from app.services.context import Context
 from r2c2r_core.errors import OverrideError
 from r2c2r_core.generate.meshfile import MOST_BYTES, SUFFIXES
@@ -30,19 +32,43 @@ async def upload(
     version: int | None = None,
 ) -> schemas.Reviewed:
     """The object's candidate from a mesh file; nothing of it stays when it is refused or breaks off."""
-    name = safe_name(filename, "mesh")
-    suffix = Path(name).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise OverrideError(f"{filename!r} is not a mesh this app reads", hint=f"send one of {', '.join(SUFFIXES)}")
+    name = _mesh_name(filename)
     context.gates.looks.check(context.who)  # before a byte is received
     folder = await anyio.to_thread.run_sync(_folder_for, context, project_id, object_id, version)
-    stem, token = re.sub(r"[^A-Za-z0-9_]+", "_", Path(name).stem)[:40] or "mesh", secrets.token_hex(4)
-    received, target = receiving(context.settings.uploads, f"{token}{suffix}"), folder / f"{stem}-{token}{suffix}"
-    wish = schemas.OverridePatch.model_construct(candidate=str(target), rerun=rerun, version=version)  # ours, however long
+    stem = re.sub(r"[^A-Za-z0-9_]+", "_", Path(name).stem)[:40] or "mesh"
+    async with _received(context, name, stream) as (received, _):
+        target = folder / f"{stem}-{secrets.token_hex(4)}{received.suffix}"
+        wish = schemas.OverridePatch.model_construct(candidate=str(target), rerun=rerun, version=version)  # ours, however long
+        return await anyio.to_thread.run_sync(_adopt, context, project_id, object_id, received, wish)
+
+
+async def look(
+    context: Context, project_id: str, object_id: int, filename: str, stream: AsyncIterator[bytes]
+) -> schemas.MeshLook:
+    """What a mesh file would be used as, beside the size of what the object's masks show; nothing of it is kept."""
+    name = _mesh_name(filename)
+    context.gates.looks.check(context.who)
+    await anyio.to_thread.run_sync(_folder_for, context, project_id, object_id, None)
+    size_m = (await anyio.to_thread.run_sync(clouds.object_points, context, project_id, object_id)).size_m
+    async with _received(context, name, stream) as (_, seen):
+        return schemas.MeshLook(name=name, object_size_m=sorted(size_m, reverse=True) if any(size_m) else None, **seen)
+
+
+def _mesh_name(filename: str) -> str:
+    """The file's name, made safe; raises OverrideError for what is no mesh by its ending."""
+    name = safe_name(filename, "mesh")
+    if Path(name).suffix.lower() not in SUFFIXES:
+        raise OverrideError(f"{filename!r} is not a mesh this app reads", hint=f"send one of {', '.join(SUFFIXES)}")
+    return name
+
+
+@asynccontextmanager
+async def _received(context: Context, name: str, stream: AsyncIterator[bytes]) -> AsyncIterator[tuple[Path, dict[str, Any]]]:
+    """The file while it is used, and what was seen of it; what is still there afterwards is deleted."""
+    received = receiving(context.settings.uploads, f"{secrets.token_hex(4)}{Path(name).suffix.lower()}")
     try:
         await _receive(stream, received)
-        await context.gates.looks.run(context.who, probing.look_at, context, "mesh", received, name)
-        return await anyio.to_thread.run_sync(_adopt, context, project_id, object_id, received, wish)
+        yield received, await context.gates.looks.run(context.who, probing.look_at, context, "mesh", received, name)
     except ClientDisconnect as error:
         raise OverrideError("the sender left before the last byte", hint="upload it again") from error
     finally:

@@ -3,7 +3,7 @@
 import os
 import queue
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from app import archives
 from app.errors import Unavailable, told_body
@@ -27,8 +27,10 @@ def check_whole(context: Context, path: Path, name: str) -> None:
     archives.check_archive(path, name, max_bytes=settings.max_unpacked_bytes, max_files=settings.max_unpacked_files)
 
 
-def look_at(context: Context, kind: Kind, path: Path, name: str) -> None:
-    """Raise CaptureError or OverrideError, in one line, for a file that the core could not use; it is called `name`.
+def look_at(context: Context, kind: Kind, path: Path, name: str) -> Any:
+    """What is seen of a file, which is called `name`: of a mesh its size, triangles, notes and picture, of a recording nothing.
+
+    Raises CaptureError or OverrideError, in one line, for a file that the core could not use.
 
     It waits for a process: call it behind the gate of looks. Raises Unavailable when the server stops meanwhile, which says
     nothing about the file.
@@ -45,6 +47,7 @@ def look_at(context: Context, kind: Kind, path: Path, name: str) -> None:
         raise _REFUSAL[kind](f"{name} cannot be read: looking at it took too long or too much memory", hint="export it again")
     if "error" in line:
         raise _refusal(kind, name, line["error"])
+    return line.get("seen")
 
 
 def _refusal(kind: Kind, name: str, told: dict[str, str]) -> InputError:

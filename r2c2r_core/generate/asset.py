@@ -21,11 +21,10 @@ def centred(
     return TexturedMesh(vertices=unit[source], faces=faces, uv=uv, texture=texture), Similarity3(longest, np.eye(3), middle)
 
 
-def unposed(
-    vertices: Points, source: np.ndarray, faces: Faces, uv: TextureCoords, texture: Image, rng: np.random.Generator
-) -> TexturedMesh:
+def unposed(mesh: TexturedMesh, rng: np.random.Generator) -> TexturedMesh:
     """The mesh in a frame of its own: randomly turned about any axis, centred, its largest side 1 (as TRELLIS returns)."""
-    return centred(vertices @ random_rotation(rng).T, source, faces, uv, texture)[0]
+    places, source = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    return centred(places @ random_rotation(rng).T, source.reshape(-1), mesh.faces, mesh.uv, mesh.texture)[0]
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:

@@ -5,7 +5,7 @@ import zlib
 import numpy as np
 
 from r2c2r_core.errors import GenerationFailed, OverrideError
-from r2c2r_core.generate.asset import shape_metrics
+from r2c2r_core.generate.asset import shape_metrics, unposed
 from r2c2r_core.generate.meshfile import MeshPart
 from r2c2r_core.generate.repair import mended
 from r2c2r_core.geometry.meshes import is_watertight, join_vertices
@@ -31,9 +31,10 @@ def delivered_asset(
     """
     rng = np.random.default_rng([zlib.crc32(object_name.encode()), zlib.crc32(candidate_id.encode()), seed])
     try:
-        mesh, notes = mended(parts, f"{generator} {candidate_id}", rng)
+        closed, notes = mended(parts, f"{generator} {candidate_id}")
     except OverrideError as error:
         raise GenerationFailed(f"{object_name}: {error.message}", hint="another sample or generator may do better") from error
+    mesh = unposed(closed, rng)
     return MeshAsset(
         object_name=object_name,
         candidate_id=candidate_id,

@@ -8,7 +8,6 @@ import numpy as np
 
 from r2c2r_core.arrays import Faces, Points
 from r2c2r_core.errors import OverrideError
-from r2c2r_core.generate.asset import unposed
 from r2c2r_core.generate.charts import unwrapped_atlas
 from r2c2r_core.generate.meshfile import MeshPart, colours_at
 from r2c2r_core.geometry.meshes import (
@@ -47,13 +46,13 @@ class Params:
 
 
 class Mended(NamedTuple):
-    """The mesh in an arbitrary frame and unit, and what was done to it; no note means it was taken as it is."""
+    """The mesh in the frame and unit of its parts, and what was done to it; no note means it was taken as it is."""
 
     mesh: TexturedMesh
     notes: tuple[str, ...]
 
 
-def mended(parts: list[MeshPart], label: str, rng: np.random.Generator) -> Mended:
+def mended(parts: list[MeshPart], label: str) -> Mended:
     """The parts as one closed textured mesh; raises OverrideError, naming `label`, for what no repair can save.
 
     Closed bodies with one texture keep both. Anything else is closed, and its colours are carried over to a new texture.
@@ -61,19 +60,19 @@ def mended(parts: list[MeshPart], label: str, rng: np.random.Generator) -> Mende
     vertices, faces = join_vertices(*_stacked([(part.vertices, part.faces) for part in parts]))
     _check_sane(label, vertices, faces)
     try:
-        return _closed_and_coloured(parts, label, vertices, faces, rng)
+        return _closed_and_coloured(parts, label, vertices, faces)
     except (ValueError, ArithmeticError, LookupError) as error:  # of the libraries, at shapes that they have not met
         raise OverrideError(f"{label}: the mesh cannot be mended ({error})", hint="close it in a mesh editor") from error
 
 
-def _closed_and_coloured(parts: list[MeshPart], label: str, vertices: Points, faces: Faces, rng: np.random.Generator) -> Mended:
+def _closed_and_coloured(parts: list[MeshPart], label: str, vertices: Points, faces: Faces) -> Mended:
     notes = ["it has no colours: shown grey"] if all(part.is_plain for part in parts) else []
     faces = _once_each(faces, notes)
     bodies = _bodies(vertices, faces, notes)
     if _keeps_its_skin(parts, bodies):
-        return Mended(_with_own_texture(parts[0], notes, rng), tuple(notes))
+        return Mended(_with_own_texture(parts[0], notes), tuple(notes))
     vertices, faces = _closed(label, bodies, notes)
-    return Mended(_recoloured(vertices, faces, parts, rng), tuple(notes))
+    return Mended(_recoloured(vertices, faces, parts), tuple(notes))
 
 
 def _once_each(faces: Faces, notes: list[str]) -> Faces:
@@ -134,7 +133,7 @@ def _is_solid(vertices: Points, faces: Faces) -> bool:
     return is_watertight(vertices, faces) and is_manifold(vertices, faces)
 
 
-def _with_own_texture(part: MeshPart, notes: list[str], rng: np.random.Generator) -> TexturedMesh:
+def _with_own_texture(part: MeshPart, notes: list[str]) -> TexturedMesh:
     """A closed part as it is, wound outwards."""
     params = tuned(Params)
     assert part.uv is not None
@@ -148,8 +147,7 @@ def _with_own_texture(part: MeshPart, notes: list[str], rng: np.random.Generator
         texture = np.asarray(cv2.resize(texture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), dtype=np.uint8)
         notes.append(f"its texture was reduced to {texture.shape[1]} x {texture.shape[0]} pixels")
     used, faces = np.unique(faces, return_inverse=True)  # a vertex that no face uses would count for the mesh's size
-    unique, source = np.unique(part.vertices[used], axis=0, return_inverse=True)
-    return unposed(unique, source.reshape(-1), faces.reshape(-1, 3), part.uv[used], texture, rng)
+    return TexturedMesh(vertices=part.vertices[used], faces=faces.reshape(-1, 3), uv=part.uv[used], texture=texture)
 
 
 def _closed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
@@ -245,11 +243,11 @@ def _stacked(bodies: list[Surface]) -> Surface:
     return np.concatenate([body[0] for body in bodies]), np.concatenate(faces)
 
 
-def _recoloured(vertices: Points, faces: Faces, parts: list[MeshPart], rng: np.random.Generator) -> TexturedMesh:
+def _recoloured(vertices: Points, faces: Faces, parts: list[MeshPart]) -> TexturedMesh:
     """A new texture for a changed surface: each texel takes the nearest colour of the original."""
     atlas = unwrapped_atlas(vertices, faces, tuned(Params).texture_px)
     colours = colours_at(parts, atlas.points)
     texture = np.zeros((*atlas.size, 3), np.uint8)
     texture[:] = np.median(colours, axis=0).astype(np.uint8)
     texture.reshape(-1, 3)[atlas.texel] = colours
-    return unposed(vertices, atlas.source, atlas.faces, atlas.uv, texture, rng)
+    return TexturedMesh(vertices=vertices[atlas.source], faces=atlas.faces, uv=atlas.uv, texture=texture)

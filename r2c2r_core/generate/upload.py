@@ -5,22 +5,27 @@ from pathlib import Path
 
 import numpy as np
 
-from r2c2r_core.generate.asset import shape_metrics
+from r2c2r_core.generate.asset import shape_metrics, unposed
 from r2c2r_core.generate.meshfile import missing_files, read_parts
-from r2c2r_core.generate.repair import mended
+from r2c2r_core.generate.repair import Mended, mended
 from r2c2r_core.geometry.meshes import is_watertight, join_vertices
 from r2c2r_core.model.mesh import MeshAsset
 
 
-def read_upload(path: Path, object_name: str, candidate_id: str) -> MeshAsset:
-    """The file as a candidate: closed, textured, in an arbitrary frame; raises OverrideError when it cannot be used.
+def read_mended(path: Path) -> Mended:
+    """The file as one closed, textured mesh in its own frame and unit, with a note for all that was done to it (repair.py).
 
-    The warnings say what was done to it (repair.py).
+    Raises OverrideError when it cannot be used.
     """
-    parts = read_parts(path)
-    rng = np.random.default_rng([zlib.crc32(object_name.encode()), zlib.crc32(candidate_id.encode())])
-    mesh, notes = mended(parts, path.name, rng)
+    mesh, notes = mended(read_parts(path), path.name)
     absent = [f"{name} was not given with it" for name in missing_files(path)]
+    return Mended(mesh, (*absent, *notes))
+
+
+def read_upload(path: Path, object_name: str, candidate_id: str) -> MeshAsset:
+    """The file as a candidate: closed, textured, in an arbitrary frame; raises OverrideError when it cannot be used."""
+    found, notes = read_mended(path)
+    mesh = unposed(found, np.random.default_rng([zlib.crc32(object_name.encode()), zlib.crc32(candidate_id.encode())]))
     return MeshAsset(
         object_name=object_name,
         candidate_id=candidate_id,
@@ -30,6 +35,6 @@ def read_upload(path: Path, object_name: str, candidate_id: str) -> MeshAsset:
         watertight=is_watertight(mesh.vertices, mesh.faces),
         frames=(),
         metrics=shape_metrics(*join_vertices(mesh.vertices, mesh.faces)),
-        parameters={"file_faces": float(sum(len(part.faces) for part in parts))},
-        warnings=tuple(f"{path.name}: {note}" for note in (*absent, *notes)),
+        parameters={},
+        warnings=tuple(f"{path.name}: {note}" for note in notes),
     )

@@ -673,6 +673,16 @@ export interface MembersIn {
   members?: string[];
 }
 
+/** A mesh that a person sent, as it would be used: mended, but neither placed nor scaled. */
+export interface MeshLook {
+  name: string;
+  size: number[];
+  object_size_m: number[] | null;
+  triangles: number;
+  notes: string[];
+  picture: string;
+}
+
 /** A token that was just made: its secret is told this once. */
 export interface NewApiToken {
   id: number;
@@ -1801,6 +1811,8 @@ export interface Operations {
   leaveFrame: { parameters: { project: string; object: number; frame: number }; body: undefined; answer: SceneObject };
   /** PUT /api/projects/{project}/objects/{object}/frames/{frame} */
   setFrame: { parameters: { project: string; object: number; frame: number }; body: FrameIn; answer: SceneObject };
+  /** POST /api/projects/{project}/objects/{object}/mesh-look */
+  lookAtMesh: { parameters: { project: string; object: number; filename: string }; body: undefined; answer: MeshLook };
   /** GET /api/projects/{project}/objects/{object}/override */
   getOverride: { parameters: { project: string; object: number }; body: undefined; answer: OverrideData };
   /** PATCH /api/projects/{project}/objects/{object}/override */

@@ -2,7 +2,7 @@
 
 /** @import {
  *   SystemInfo, FolderListing, FrameCamera, Opening, Project, ProjectSummary, FrameInfo, SceneObject, Lane, Proposals, Elevations, FoundFront, FrameMask, LiveStatus, Job, JobEvent,
- *   CandidateGroup, Differences, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
+ *   CandidateGroup, Differences, MeshLook, Reviewed, SceneSummary, Certificate, Bundle, ObjectPoints, ReviewStatus, ReviewStep, Comment,
  *   Figures, ObjectPhotos, ViewerPicked, ViewerPlaced, ViewerSession, ViewerShown, ViewerShow, BundleChange, BundleCheck, BundleInside, RunRequest,
  *   HistoryEntry, Inbox, News, Deleted, Trashed, ErrorBody, SampleRequest, Upload, AccountInfo, AccountIn, AccountPatch, AuditPage,
  *   TrueLengthIn, TrueLengths, UnknownFolder, ProjectMembers, MembersIn, ReadingIn, Seats,
@@ -317,6 +317,12 @@ export const uploadCandidate = async (id, seen, file) => {
   const query = new URLSearchParams({ filename: file.name, version: String(seen.version) });
   const path = `${of(id)}/objects/${seen.object}/candidates?${query}`;
   return (await takenOn(() => call(path, { method: "POST", body: file }))).json();
+};
+
+/** @param {string} id @param {number} object @param {File} file @param {AbortSignal} signal @returns {Promise<MeshLook>} */
+export const lookAtMesh = async (id, object, file, signal) => {
+  const path = `${of(id)}/objects/${object}/mesh-look?${new URLSearchParams({ filename: file.name })}`;
+  return (await takenOn(() => call(path, { method: "POST", body: file, signal }))).json();
 };
 
 /** @param {string} id @param {number} object @param {string} against a candidate @returns {Promise<Differences>} */

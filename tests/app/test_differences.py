@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.services.meshes import TURN_SIZE, TURNS, turntable
+from app.drawing import TURN_SIZE, TURNS, turntable
 from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
 from r2c2r_core.workspace import Workspace
 from tests.app.conftest import Running

@@ -53,6 +53,22 @@ def test_it_is_kept_under_a_name_of_its_own(shared: Reviewed) -> None:
         assert path.is_relative_to(web.settings.data_dir / "projects" / project / "uploads")
 
 
+def test_it_is_looked_at_before_it_is_used_and_not_kept(shared: Reviewed) -> None:
+    web, project, number = shared
+    before = left_behind(web, project)
+    at = f"/api/projects/{project}/objects/{number}"
+    override = web.get(f"{at}/override")
+    look = web.post(f"{at}/mesh-look?filename=mine.glb", content=b"glTF")
+    assert (look["name"], look["size"], look["triangles"]) == ("mine.glb", [1.0, 0.6, 0.4], 12)
+    assert look["notes"] == ["small holes were filled"]
+    size_m = sorted(web.get(f"{at}/cloud")["size_m"], reverse=True)
+    assert look["object_size_m"] == (size_m if any(size_m) else None)
+    assert "no triangles found" in web.post(f"{at}/mesh-look?filename=x.glb", content=b"unreadable", status=422)["message"]
+    assert "not a mesh" in web.post(f"{at}/mesh-look?filename=x.gltf", content=b"{}", status=422)["message"]
+    assert left_behind(web, project) == before
+    assert web.get(f"{at}/override") == override
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
@@ -93,10 +109,11 @@ def test_one_that_somebody_overtook_is_refused_and_leaves_nothing(shared: Review
     seen = web.get(f"{at}/candidates")["version"]
     look = mesh_uploads.probing.look_at
 
-    def meanwhile(*given: Any) -> None:
+    def meanwhile(*given: Any) -> Any:
         """Somebody else corrects the object while the mesh is looked at."""
-        look(*given)
+        seen = look(*given)
         web.patch(f"{at}/override", {"hinge": "left", "rerun": False})
+        return seen
 
     with monkeypatch.context() as patch:
         patch.setattr(mesh_uploads.probing, "look_at", meanwhile)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from app.services.meshes import mesh_glb, mesh_picture, turned_like
+from app.drawing import mesh_picture
+from app.services.meshes import mesh_glb, turned_like
 from r2c2r_core.model.mesh import TexturedMesh
 from tests.app.nouns import BOX, FACES
 

@@ -202,7 +202,7 @@ def test_whatever_may_be_sent_again_changes_nothing_the_second_time(start: Calla
 
 CHANGES_NOTHING_STORED = {"openLive", "segmentObject", "cancelSegment", "cancelJob", "deleteVariants"} | {
     "openViewer", "showInViewer", "setJoints", "placeInViewer",
-    "assignProject", "markSeen",  # nobody has an account here
+    "lookAtMesh", "assignProject", "markSeen",  # nobody has an account here
 }  # fmt: skip
 
 
@@ -241,6 +241,7 @@ def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
     yield "giveVerdict", "POST", f"{on}/verdicts", {"candidate": "c1", "verdict": "accepted", "rerun": False}
     yield "setOverride", "PATCH", f"{on}/override", {"hinge": "left", "rerun": False}
     yield "correctMade", "PATCH", f"{at}/scene/drawer_1/override", {"joint_upper": 0.3, "rerun": False}
+    yield "lookAtMesh", "POST", f"{on}/mesh-look?filename=mine.glb", b"glTF"
     yield "uploadCandidate", "POST", f"{on}/candidates?filename=mine.glb&rerun=false", b"glTF"
     yield "addComment", "POST", f"{at}/comments", {"text": "look"}
     yield "changeComment", "PATCH", f"{at}/comments/1", {"resolved": True}

@@ -15,7 +15,7 @@ from app.services import accounts
 from tests.app.conftest import COOKIE, ORIGIN, SOCKETS, Running
 from tests.app.people import PASSWORD, browser, signed_in, with_accounts
 
-REVIEWER = {"uploadCandidate", "giveVerdict", "setOverride", "correctMade"}
+REVIEWER = {"uploadCandidate", "lookAtMesh", "giveVerdict", "setOverride", "correctMade"}
 ADMIN = {
     "importProject",
     "deleteProject",

@@ -1,11 +1,13 @@
 """The real look at a file, in its own process: what a run would refuse is refused at once, in the sender's words."""
 
+import base64
 import json
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
@@ -37,6 +39,13 @@ def test_a_mesh_is_refused_when_no_candidate_can_be_made_of_it(tmp_path: Path, c
     last = json.loads(said.stdout.splitlines()[-1])
     assert last.get("error", {"message": ""})["message"].startswith(words)
     assert ("done" in last) == (words == "")
+    if words == "":
+        seen = json.loads(said.stdout.splitlines()[0])["seen"]
+        assert seen["size"] == pytest.approx([1.0, 0.6, 0.4])
+        assert (seen["triangles"], seen["notes"]) == (12, ["it has no colours: shown grey"])
+        drawn = cv2.imdecode(np.frombuffer(base64.b64decode(seen["picture"]), np.uint8), cv2.IMREAD_UNCHANGED)
+        rows, columns = np.nonzero(drawn[..., 3])
+        assert np.ptp(columns) > np.ptp(rows) > 50  # wide as it is long, and upright as glTF means it
     assert str(tmp_path) not in said.stdout
 
 

@@ -39,6 +39,11 @@ export function counted(count, noun) {
   return `${count} ${noun}${count === 1 ? "" : "s"}`;
 }
 
+/** Lengths of a box's sides. @param {number[]} lengths */
+export function sides(lengths) {
+  return lengths.map((length) => String(Number(length.toPrecision(3)))).join(" × ");
+}
+
 /** @param {number} metres */
 export function centimetres(metres) {
   return (100 * metres).toFixed(1);

@@ -3,9 +3,10 @@
  * Says "stored" {object, job} for every answer, job being the run that follows from it, and "undone" when something was taken back.
  */
 
-import { startRun, uploadCandidate } from "../api.js";
+import { lookAtMesh, startRun, uploadCandidate } from "../api.js";
 import { changeFront, changeMade, changeOverride, giveVerdict, undoRedo } from "../changes.js";
 import { askForText } from "../elements/ask-dialog.js";
+import { askToUseMesh } from "../elements/mesh-dialog.js";
 import { say, sayError } from "../elements/toasts.js";
 import { copiedWords } from "../lib/copied.js";
 import { withMark } from "../lib/opening-marks.js";
@@ -158,10 +159,12 @@ export class Decisions extends EventTarget {
     else say(`No further candidates of ${group.name} are made: choose among these or upload a mesh`);
   }
 
-  /** A mesh of one's own. @param {File} file */
-  upload(file) {
+  /** A mesh of one's own, used once it was looked at. @param {File} file */
+  async upload(file) {
     const { group } = this.#objects;
-    if (group) this.#report(uploadCandidate(this.#project, group, file));
+    if (!group || !this.#may()) return;
+    const look = (/** @type {AbortSignal} */ signal) => lookAtMesh(this.#project, group.object, file, signal);
+    if (await askToUseMesh(file, group.name, look)) await this.#report(uploadCandidate(this.#project, group, file));
   }
 
   /**

@@ -92,7 +92,11 @@ function heading(group, decisions, judges) {
  */
 function others(group, decisions, { comment }, judges) {
   const mesh = h("input", { type: "file", accept: ".glb,.obj,.ply,.stl", hidden: true, "aria-label": "Mesh file" });
-  mesh.addEventListener("change", () => mesh.files?.[0] && decisions.upload(mesh.files[0]));
+  mesh.addEventListener("change", () => {
+    const [file] = mesh.files ?? [];
+    mesh.value = ""; // the same file may be chosen again
+    if (file) decisions.upload(file);
+  });
   /** @type {[string, string, () => void, string][]} */
   const buttons = [
     [
