@@ -30,6 +30,7 @@ const ELEMENTS = {
   "r2c2r-photo-check": async () => (await import("./elements/photo-check.js")).PhotoCheck,
   "r2c2r-projects": async () => (await import("./pages/projects.js")).ProjectsPage,
   "r2c2r-proposal-list": async () => (await import("./elements/proposal-list.js")).ProposalList,
+  "r2c2r-review-state": async () => (await import("./elements/review-state.js")).ReviewState,
   "r2c2r-review": async () => (await import("./pages/review.js")).ReviewPage,
   "r2c2r-run": async () => (await import("./pages/run.js")).RunPage,
   "r2c2r-seat-list": async () => (await import("./elements/seat-list.js")).SeatList,
@@ -62,7 +63,7 @@ const PARTS = {
     "viewer",
   ],
   projects: ["folder-dialog", "trash-list", "unknown-list", "upload-card"],
-  review: ["photo-check", "comments", "viewer", "candidate-compare"],
+  review: ["photo-check", "comments", "viewer", "candidate-compare", "review-state"],
   run: ["job"],
 };
 

@@ -4,7 +4,6 @@ import { merged } from "./conflict.js";
 import { AppShell } from "./elements/app-shell.js";
 import { CommandPalette } from "./elements/command-palette.js";
 import { HelpOverlay } from "./elements/help-overlay.js";
-import { ReviewState } from "./elements/review-state.js";
 import { Toasts } from "./elements/toasts.js";
 import { WhoIsIn } from "./elements/who.js";
 import { outbox } from "./outbox.js";
@@ -16,7 +15,6 @@ customElements.define("r2c2r-who", WhoIsIn);
 customElements.define("r2c2r-presence", Presence);
 customElements.define("r2c2r-help", HelpOverlay);
 customElements.define("r2c2r-palette", CommandPalette);
-customElements.define("r2c2r-review-state", ReviewState);
 customElements.define("r2c2r-app", AppShell);
 
 outbox.merge = merged;

@@ -12,7 +12,7 @@ import { Presence } from "../presence.js";
 import { go } from "../router.js";
 import { CommandPalette } from "./command-palette.js";
 import { HelpOverlay } from "./help-overlay.js";
-import { stateChip } from "./review-state.js";
+import { stateChip } from "../state-chip.js";
 import { say, sayError, sayWaiting, Toasts } from "./toasts.js";
 import { WhoIsIn } from "./who.js";
 

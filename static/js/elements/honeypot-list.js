@@ -3,7 +3,7 @@
 import { listAccounts, listHoneypots, listProjects, scoreHoneypot, slipHoneypot } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
 import { ago } from "../lib/format.js";
-import { stateChip } from "./review-state.js";
+import { stateChip } from "../state-chip.js";
 import { say, sayError } from "./toasts.js";
 
 /** @typedef {import("../api-types").Honeypot} Honeypot */

@@ -6,7 +6,7 @@ import { Answers } from "../lib/answers.js";
 import { counted } from "../lib/format.js";
 import { live } from "../live.js";
 import { go } from "../router.js";
-import { stateChip } from "./review-state.js";
+import { stateChip } from "../state-chip.js";
 import { say, sayError } from "./toasts.js";
 
 /** @typedef {import("../api-types").Opinion} Opinion */

@@ -2,7 +2,7 @@
 
 import { h } from "../dom.js";
 import { ago, bytes, counted } from "../lib/format.js";
-import { stateChip as stateOf } from "./review-state.js";
+import { stateChip as stateOf } from "../state-chip.js";
 
 /** @typedef {import("../api-types").ProjectSummary} Project */
 /** @typedef {"rename" | "tag" | "duplicate" | "export" | "archive" | "delete"} Act */

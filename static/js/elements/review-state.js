@@ -6,6 +6,7 @@ import { Answers } from "../lib/answers.js";
 import { ago, duration } from "../lib/format.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
+import { stateChip } from "../state-chip.js";
 import { askForText } from "./ask-dialog.js";
 import { say, sayError } from "./toasts.js";
 
@@ -13,14 +14,8 @@ import { say, sayError } from "./toasts.js";
 /** @typedef {import("../api-types").ReviewMove} ReviewMove */
 /** @typedef {import("../api-types").Figures} Figures */
 
-const TONES = { draft: "", ready: "", "in review": "warn", "changes requested": "bad", approved: "good" };
 /** How far on the way to approval each is. */
 const PLACES = { draft: 0, "changes requested": 0, ready: 1, "in review": 2, approved: 3 };
-
-/** @param {ReviewStatus["state"]} state */
-export function stateChip(state) {
-  return h("span", { class: `chip ${TONES[state]}` }, state);
-}
 
 export class ReviewState extends LiveElement {
   project = "";

@@ -2,7 +2,7 @@
 
 import { assignObject, getInbox, resolveComment } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
-import { stateChip } from "../elements/review-state.js";
+import { stateChip } from "../state-chip.js";
 import { sayError } from "../elements/toasts.js";
 import { Answers } from "../lib/answers.js";
 import { ago } from "../lib/format.js";
