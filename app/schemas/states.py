@@ -18,6 +18,7 @@ class ReviewMove(Shape):
     text: str  # what its button says
     role: Literal["annotator", "reviewer"]
     unmet: list[str]
+    notes: list[str]  # worth a look before; the step may be taken all the same
     needs_reason: bool
 
 

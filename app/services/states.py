@@ -15,12 +15,13 @@ from app.db.computing import computing_s
 from app.db.engine import reading, writing
 from app.db.tables import Comment, Event, Project, Verdict
 from app.errors import Conflict
-from app.services import masks, projects
+from app.services import masks, projects, scenes
 from app.services.context import Context
 
 _log = logging.getLogger(__name__)
 
 SCOPE = "state"
+NAMED = 6  # joints, in the note about defaults
 LEAST_FRAMES = 3  # an object seen from fewer places has no shape to speak of
 
 Check = Callable[[Context, Session, Project], list[str]]
@@ -33,6 +34,7 @@ class Transition:
     text: str
     role: Literal["annotator", "reviewer"]
     check: Check | None = None
+    notes: Callable[[Context, Project], list[str]] | None = None
     says_why: bool = False
 
 
@@ -110,12 +112,23 @@ def _approvable(context: Context, session: Session, project: Project) -> list[st
     return unmet + ([f"{count} open comment{'s' if count > 1 else ''}"] if count else [])
 
 
+def _by_default(context: Context, project: Project) -> list[str]:
+    """The joints of the newest scene that hold a value which nothing in the recording tells."""
+    scene = scenes.fitted(context.files(project))
+    joints = [joint for item in scene["objects"] for joint in item["joints"]] if scene else []
+    guessed = [joint["name"] for joint in joints if "default" in joint["sources"].values()]
+    if not guessed:
+        return []
+    more = f" and {len(guessed) - NAMED} more" if len(guessed) > NAMED else ""
+    return [f"{len(guessed)} of {len(joints)} joints hold a default: {', '.join(guessed[:NAMED])}{more}"]
+
+
 TRANSITIONS: dict[tuple[str, str], Transition] = {
     ("draft", "ready"): Transition(text="Send to review", role="annotator", check=_ready_to_review),
     ("ready", "draft"): Transition(text="Take back", role="annotator"),
     ("ready", "in review"): Transition(text="Start the review", role="reviewer"),
     ("in review", "changes requested"): Transition(text="Request changes", role="reviewer", says_why=True),
-    ("in review", "approved"): Transition(text="Approve", role="reviewer", check=_approvable),
+    ("in review", "approved"): Transition(text="Approve", role="reviewer", check=_approvable, notes=_by_default),
     ("changes requested", "ready"): Transition(text="Send to review again", role="annotator", check=_ready_to_review),
     ("approved", "changes requested"): Transition(text="Reopen", role="reviewer", says_why=True),
 }
@@ -130,6 +143,7 @@ def _status(context: Context, session: Session, project: Project) -> schemas.Rev
             text=transition.text,
             role=transition.role,
             unmet=transition.check(context, session, project) if transition.check else [],
+            notes=transition.notes(context, project) if transition.notes else [],
             needs_reason=transition.says_why,
         )
         for (came, to), transition in TRANSITIONS.items()

@@ -90,6 +90,7 @@ def test_approving_needs_a_certificate_that_passed_or_a_reason(under_review: Rev
     certified(web, project, passed=True)
     (approve,) = [m for m in web.get(f"/api/projects/{project}/review")["moves"] if m["to"] == "approved"]
     assert approve["unmet"] == []
+    assert approve["notes"] == ["1 of 1 joints hold a default: drawer_1_slide"]
     assert step(web, project, "approved")["state"] == "approved"
 
 

@@ -23,6 +23,13 @@ def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Serve
     expect(names).to_have_text(["Cellar"])
     page.get_by_label("Find projects").fill("")
 
+    page.get_by_role("button", name="Rename: Cellar").click()
+    say(page, "Rename", "Wine\n cellar ")
+    expect(names.filter(has_text="Wine cellar")).to_have_count(1)
+    page.get_by_role("button", name="Rename: Wine cellar").click()
+    expect(page.get_by_label("Name of the project")).to_have_value("Wine cellar")
+    say(page, "Rename", "Cellar")
+
     page.get_by_role("button", name="Duplicate: Cellar").press("Enter")
     expect(names).to_have_count(3)
     expect(names.filter(has_text="Cellar (copy)")).to_have_count(1)

@@ -183,6 +183,17 @@ def test_a_button_held_down_while_its_list_changes_is_still_clicked(new_context:
     assert page.evaluate("clicked") == "Held down"
 
 
+def test_an_error_stays_until_another_page_is_opened(new_context: NewContext, finished: tuple[str, str]) -> None:
+    page = signed_in(new_context, finished[0])
+    error = page.locator(".toast.bad")
+    said = """import("/static/js/elements/toasts.js").then(({ say }) => say("it broke", { kind: "bad" }))"""
+    for leave in (page.get_by_role("link", name="Inbox").click, page.go_back):
+        page.evaluate(said)
+        expect(error).to_have_text("it broke")
+        leave()
+        expect(error).to_have_count(0)
+
+
 def test_a_change_made_without_a_connection_is_stored_when_it_is_back(
     changed: tuple[str, str], new_context: NewContext
 ) -> None:

@@ -146,8 +146,9 @@ export class AppShell extends LiveElement {
    */
   #leave({ project, why }) {
     if (this.#route?.project !== project) return;
-    say(`${this.#where.textContent || "This project"} ${why}.`, { kind: "bad" });
+    const name = this.#where.textContent || "This project";
     go("/");
+    say(`${name} ${why}.`, { kind: "bad" });
   }
 
   /** Lost connections are said, with what still waits; it is sent by itself once the server answers. */

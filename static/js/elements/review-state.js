@@ -63,9 +63,8 @@ export class ReviewState extends LiveElement {
     const button = h("button", { type: "button", class: onward ? "primary" : "" }, move.text);
     button.dataset.at = `move:${move.to}`;
     button.addEventListener("click", () => this.#step(status, move));
-    const unmet = move.unmet.length
-      ? h("ul", { class: "muted unmet" }, ...move.unmet.map((line) => h("li", {}, line)))
-      : null;
+    const lines = [...move.unmet, ...move.notes];
+    const unmet = lines.length ? h("ul", { class: "muted unmet" }, ...lines.map((line) => h("li", {}, line))) : null;
     return h("div", {}, button, unmet);
   }
 

@@ -1,4 +1,4 @@
-/** Short messages in the corner; errors stay until closed. Announced to assistive technology. */
+/** Short messages in the corner; errors stay until closed or until another page is opened. Announced to assistive technology. */
 
 import { ApiError } from "../api.js";
 import { h, icon } from "../dom.js";
@@ -11,6 +11,8 @@ export class Toasts extends HTMLElement {
   connectedCallback() {
     this.setAttribute("role", "status");
     this.setAttribute("aria-live", "polite");
+    for (const type of ["r2c2r-go", "popstate"])
+      window.addEventListener(type, () => this.querySelectorAll(".toast.bad").forEach((toast) => toast.remove()));
   }
 
   /**

@@ -131,8 +131,13 @@ export class ProjectsPage extends LiveElement {
 
   /** A new project, with the objects of the template that is chosen. @param {{ id: string }} project */
   async #made({ id }) {
-    if (this.#template.value) await setChecklist(id, Number(this.#template.value)).catch(sayError);
+    const taken = this.#template.value ? setChecklist(id, Number(this.#template.value)) : null;
+    const refused = await taken?.then(
+      () => null,
+      (error) => error,
+    );
     go(`/p/${id}`);
+    if (refused) sayError(refused);
   }
 
   /** @param {import("../api-types").SystemInfo} system */
@@ -282,7 +287,8 @@ export class ProjectsPage extends LiveElement {
   /** @type {Record<import("../elements/project-card.js").Act, (project: Project) => Promise<unknown>>} */
   #acts = {
     rename: async ({ id, name }) => {
-      const wanted = prompt("Name of the project", name)?.trim();
+      const given = await askForText(`Rename ${name}`, "Name of the project", { button: "Rename", value: name });
+      const wanted = given?.replace(/\s+/g, " ");
       if (wanted && wanted !== name) await changeProject(id, { name: wanted });
     },
     tag: async ({ id, name, tags }) => {

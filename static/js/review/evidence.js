@@ -24,7 +24,7 @@ export function placement(placement, item) {
     ["Silhouette", `${(100 * placement.mask_iou).toFixed(0)} % overlap`],
     ["Keypoints", `${placement.inliers} of ${placement.matches} agree`],
     ["Uncertainty", held(placement.spread)],
-    ["Runner-up", runnerUp(placement)],
+    ["Next orientation", nextOrientation(placement)],
   ];
   if (item) rows.push(["W × D × H", `${item.dimensions_m.map(centimetres).join(" × ")} cm`]);
   if (item?.warp_residual_m)
@@ -47,8 +47,8 @@ function held(spread) {
 }
 
 /** How near the best other orientation came. @param {Placement} placement */
-function runnerUp({ runner_up, runner_up_turn_deg }) {
-  if (runner_up === null) return "none";
+function nextOrientation({ runner_up, runner_up_turn_deg }) {
+  if (runner_up === null) return "no other one fits";
   const turned = runner_up_turn_deg === null ? "" : `, turned ${runner_up_turn_deg.toFixed(0)}°`;
   return `${(100 * runner_up).toFixed(0)} % as good${turned}`;
 }
