@@ -335,7 +335,7 @@ def _add_error_handlers(app: FastAPI) -> None:
     async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"] if part != "body") or "the body"
-        return JSONResponse(errors.body("invalid", f"{where}: {first['msg']}", "see /api/openapi.json"), 422)
+        return JSONResponse(errors.body("invalid", f"{where}: {_in_words(first)}", "see /api/openapi.json"), 422)
 
     @app.exception_handler(HTTPException)
     async def refused(_: Request, error: HTTPException) -> JSONResponse:
@@ -352,6 +352,13 @@ def _add_error_handlers(app: FastAPI) -> None:
     async def unexpected(request: Request, error: Exception) -> JSONResponse:
         _log.exception("%s %s", request.method, request.url.path, exc_info=error)
         return JSONResponse(errors.body("internal", "the server met an unexpected error", "it is in the server's log"), 500)
+
+
+def _in_words(problem: dict[str, Any]) -> str:
+    """What is wrong with a value; of text that was too long its characters, which pydantic calls items."""
+    if problem["type"] in ("too_long", "string_too_long") and isinstance(problem.get("input"), str):
+        return f"{len(problem['input'])} characters, at most {problem['ctx']['max_length']} expected"
+    return str(problem["msg"])
 
 
 def _full_disk() -> JSONResponse:

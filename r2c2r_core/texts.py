@@ -13,10 +13,19 @@ IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 """A name that every format takes: USD prims, and Isaac's importers, refuse a leading digit, the others any other character."""
 
 
+DEVICE = re.compile("(?i:con|prn|aux|nul|com[0-9]|lpt[0-9])")
+"""What Windows keeps for devices: it unpacks no folder of that name, and an object's files lie in one of its own."""
+
+
+def is_object_name(text: str) -> bool:
+    """Whether an object may be called that in every format and file system."""
+    return IDENTIFIER.fullmatch(text) is not None and DEVICE.fullmatch(text) is None
+
+
 def identifier(text: str) -> str:
-    """An identifier made of a text; "object" where nothing of it can stay."""
+    """An object's name made of a text; "object" where nothing of it can stay."""
     plain = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_") or "object"
-    return f"item_{plain}" if plain[0].isdigit() else plain
+    return plain if is_object_name(plain) else f"item_{plain}"
 
 
 def shown(text: str) -> str:

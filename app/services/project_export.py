@@ -71,7 +71,7 @@ def _gathered(context: Context, project_id: str, *, recording: bool) -> Export:
         about = _about(session, project, files, kept)
     documents = {PROMPTS: to_json(prompts, indent=1), OVERRIDES: to_json(overrides, indent=1)}
     return Export(
-        file_name=f"{safe_name(project.name, 'project')}.r2c2r.zip",
+        file_name=f"{safe_name(project.name.replace('/', '-'), 'project')}.r2c2r.zip",
         documents={ABOUT: about.model_dump_json(exclude_none=True, indent=1).encode(), **documents},
         meshes=meshes,
         recording=kept,

@@ -1148,6 +1148,7 @@ export interface ReviewMove {
   text: string;
   role: "annotator" | "reviewer";
   unmet: string[];
+  notes: string[];
   needs_reason: boolean;
 }
 

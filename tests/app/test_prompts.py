@@ -118,6 +118,9 @@ def test_names_are_unique_and_usable_in_simulators(web: Running) -> None:
     assert web.patch(f"/api/projects/{project}/objects/{number}", {"name": "a b"}, 422)["kind"] == "prompt"
     web.post(f"/api/projects/{project}/objects", {"name": "MUG_1"}, 422)
     assert "item_1st_drawer" in web.patch(f"/api/projects/{project}/objects/{number}", {"name": "1st_drawer"}, 422)["hint"]
+    assert "item_Aux" in web.patch(f"/api/projects/{project}/objects/{number}", {"name": "Aux"}, 422)["hint"]
+    long = web.patch(f"/api/projects/{project}/objects/{number}", {"name": "x" * 300}, 422)["message"]
+    assert long == "name: 300 characters, at most 60 expected"
     made = web.post(f"/api/projects/{project}/objects", {"category": "2-door cabinet"})
     assert made["name"] == "item_2_door_cabinet_1"  # its category stays as it was typed
     assert made["category"] == "2-door cabinet"

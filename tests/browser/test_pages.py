@@ -185,9 +185,10 @@ def test_a_button_held_down_while_its_list_changes_is_still_clicked(new_context:
 
 def test_an_error_stays_until_another_page_is_opened(new_context: NewContext, finished: tuple[str, str]) -> None:
     page = signed_in(new_context, finished[0])
+    page.get_by_role("link", name="kitchen").wait_for()
     error = page.locator(".toast.bad")
     said = """import("/static/js/elements/toasts.js").then(({ say }) => say("it broke", { kind: "bad" }))"""
-    for leave in (page.get_by_role("link", name="Inbox").click, page.go_back):
+    for leave in (page.get_by_role("link", name="kitchen").click, page.go_back):
         page.evaluate(said)
         expect(error).to_have_text("it broke")
         leave()

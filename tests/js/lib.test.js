@@ -721,6 +721,8 @@ test("a name is joined to one that simulators accept", () => {
     ["drawer_1", "drawer_1"],
     ["架子", ""],
     ["2-door cabinet", "item_2_door_cabinet"],
+    ["CON", "item_CON"], // Windows unpacks no folder of that name
+    ["console", "console"],
   ])
     assert.equal(usableName(typed ?? ""), name);
 });

@@ -62,5 +62,6 @@ export function jointValue(type, value) {
 export function usableName(typed) {
   const plain = typed.trim().normalize("NFKD").replaceAll(/\p{M}/gu, "");
   const joined = plain.replaceAll(/\W+/g, "_").replaceAll(/^_|_$/g, "");
-  return /^\d/.test(joined) ? `item_${joined}` : joined; // simulators take no name that begins with a digit
+  const refused = /^(\d|(con|prn|aux|nul|com\d|lpt\d)$)/i; // by simulators; by Windows, which keeps these for devices
+  return refused.test(joined) ? `item_${joined}` : joined;
 }

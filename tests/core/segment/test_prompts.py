@@ -138,3 +138,12 @@ def test_a_name_that_begins_with_a_digit_is_refused_with_one_that_would_do(boxes
     with pytest.raises(PromptError, match="begins with a digit") as caught:
         check_prompts(boxes[0], Prompts(objects=(numbered,)))
     assert "item_2_door_cabinet_1" in caught.value.hint
+
+
+@pytest.mark.parametrize(("names", "words"), [(("Con",), "device of Windows"), (("door_1", "Door_1"), "two objects named")])
+def test_names_that_a_file_system_takes_for_another_are_refused(
+    boxes: tuple[Capture, Truth], names: tuple[str, ...], words: str
+) -> None:
+    point = PromptPoint(frame=60, x=10.0, y=10.0, label=1)
+    with pytest.raises(PromptError, match=words):
+        check_prompts(boxes[0], Prompts(objects=tuple(prompt(name, "cabinet", point) for name in names)))
