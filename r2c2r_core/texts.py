@@ -17,15 +17,19 @@ DEVICE = re.compile("(?i:con|prn|aux|nul|com[0-9]|lpt[0-9])")
 """What Windows keeps for devices: it unpacks no folder of that name, and an object's files lie in one of its own."""
 
 
-def is_object_name(text: str) -> bool:
-    """Whether an object may be called that in every format and file system."""
-    return IDENTIFIER.fullmatch(text) is not None and DEVICE.fullmatch(text) is None
+def name_fault(text: str) -> str:
+    """What keeps an object from being called that in every format and file system, after "it"; empty: nothing."""
+    if DEVICE.fullmatch(text):
+        return "is a device of Windows, which unpacks no folder of that name"
+    if text[:1].isdecimal():
+        return "begins with a digit: USD and Isaac's importers refuse it"
+    return "" if IDENTIFIER.fullmatch(text) else "holds more than letters, digits and underscores: simulators accept no more"
 
 
 def identifier(text: str) -> str:
     """An object's name made of a text; "object" where nothing of it can stay."""
     plain = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_") or "object"
-    return plain if is_object_name(plain) else f"item_{plain}"
+    return f"item_{plain}" if name_fault(plain) else plain
 
 
 def shown(text: str) -> str:

@@ -4,7 +4,6 @@ import contextlib
 import re
 import secrets
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +61,7 @@ def _mesh_name(filename: str) -> str:
     return name
 
 
-@asynccontextmanager
+@contextlib.asynccontextmanager
 async def _received(context: Context, name: str, stream: AsyncIterator[bytes]) -> AsyncIterator[tuple[Path, dict[str, Any]]]:
     """The file while it is used, and what was seen of it; what is still there afterwards is deleted."""
     received = receiving(context.settings.uploads, f"{secrets.token_hex(4)}{Path(name).suffix.lower()}")

@@ -16,7 +16,7 @@ from app.services import assigning, masks
 from app.services.context import Context
 from app.services.in_frames import check_point, check_said, table_of
 from r2c2r_core.errors import PromptError
-from r2c2r_core.texts import identifier, is_object_name
+from r2c2r_core.texts import identifier, name_fault
 from r2c2r_core.workspace import noun_path
 
 
@@ -233,9 +233,8 @@ def create_in(context: Context, session: Session, project: Project, body: schema
 
 def require_usable(name: str) -> None:
     """Raise PromptError for a name that simulators or file systems do not accept."""
-    if not is_object_name(name):
-        hint = f"use letters, digits and underscores, no digit first, such as {identifier(name)}: simulators accept no more"
-        raise PromptError(f"the name '{name}' is not usable", hint=hint)
+    if fault := name_fault(name):
+        raise PromptError(f"the name '{name}' is not usable", hint=f"it {fault}; use a name such as {identifier(name)}")
 
 
 def object_shape(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:

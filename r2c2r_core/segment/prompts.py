@@ -13,7 +13,7 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, Prompts
 from r2c2r_core.schema.document import checked
 from r2c2r_core.schema.prompts import PromptsFile, PromptsFileMask
-from r2c2r_core.texts import DEVICE, identifier, is_object_name
+from r2c2r_core.texts import identifier, name_fault
 
 _NAME = re.compile(r"[A-Za-z0-9_]+")
 _HINT = "see `r2c2r sample` for one"
@@ -109,11 +109,10 @@ def _check_names(objects: tuple[ObjectPrompt, ...]) -> None:
     seen: set[str] = set()
     for prompt in objects:
         _check_name(prompt.name)
-        if not is_object_name(prompt.name):  # clicks on it are drawn all the same: it may have been named long ago
-            why = "begins with a digit: USD and Isaac's importers refuse it"
-            if DEVICE.fullmatch(prompt.name):
-                why = "is a device of Windows, which unpacks no bundle with it"
-            raise PromptError(f"name '{prompt.name}' found, which {why}", hint=f"rename it, such as {identifier(prompt.name)}")
+        if fault := name_fault(prompt.name):  # clicks on it are drawn all the same: it may have been named long ago
+            raise PromptError(
+                f"name '{prompt.name}' found, which {fault}", hint=f"rename it, such as {identifier(prompt.name)}"
+            )
         if prompt.name.casefold() in seen:  # Windows and macOS put the files of 'Door' and 'door' into one folder
             raise PromptError(f"two objects named '{prompt.name}' found, unique names expected", hint="rename one of them")
         seen.add(prompt.name.casefold())

@@ -18,7 +18,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_frames
 from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object
+from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, pose_of_matrix, read_json_object
 
 _IMAGES, _CAMERAS = r"images/(\d+)\.(?i:jpe?g|png)", r"cameras/(\d+)\.json"
 _DEPTH, _CONFIDENCE = r"keyframes/depth/(\d+)\.(?i:png)", r"keyframes/confidence/(\d+)\.(?i:png)"
@@ -76,11 +76,7 @@ def _pose(document: dict[str, Any]) -> Rigid3 | None:
 
 
 def _numbers(document: dict[str, Any], keys: tuple[str, ...]) -> np.ndarray | None:
-    try:
-        numbers = np.array([float(document[key]) for key in keys])
-    except (KeyError, TypeError, ValueError):
-        return None
-    return numbers if np.isfinite(numbers).all() else None
+    return finite_numbers([document.get(key) for key in keys], (len(keys),))
 
 
 READER = Reader(

@@ -18,7 +18,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_frames
 from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object
+from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, pose_of_matrix, read_json_object
 
 _PHOTO, _CAMERA = r"frame_(\d+)\.(?i:jpe?g)", r"frame_(\d+)\.json"
 _DEPTH, _CONFIDENCE = r"depth_(\d+)\.(?i:png)", r"conf_(\d+)\.(?i:png)"
@@ -36,7 +36,9 @@ def open_scanner_app(files: Files) -> Recording:
         depth=depth,
         poses={number: _pose(documents[number]) if number in rgb_cameras else None for number in documents},
         confidence=confidence,
-        times_s={number: float(t[0]) for number, d in documents.items() if (t := _numbers(d, "time", 1)) is not None},
+        times_s={
+            number: float(t[0]) for number, d in documents.items() if (t := finite_numbers(d.get("time"), (1,))) is not None
+        },
     )
     frames, notices = joined_frames(files, found, rgb_cameras.__getitem__, lambda n: rgb_cameras[n].resized(*depth_size))
     return Recording(
@@ -52,24 +54,15 @@ def open_scanner_app(files: Files) -> Recording:
 
 
 def _camera(document: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics | None:
-    matrix = _numbers(document, "intrinsics", 9)
+    matrix = finite_numbers(document.get("intrinsics"), (9,))
     if matrix is None or min(matrix[0], matrix[4]) < 1:
         return None
     return integer_centred(matrix[0], matrix[4], matrix[2], matrix[5], size)
 
 
 def _pose(document: Mapping[str, Any]) -> Rigid3 | None:
-    matrix = _numbers(document, "cameraPoseARFrame", 16)
+    matrix = finite_numbers(document.get("cameraPoseARFrame"), (16,))
     return None if matrix is None else pose_of_matrix(matrix.reshape(4, 4), CAMERA_CV_FROM_GL)
-
-
-def _numbers(document: Mapping[str, Any], key: str, count: int) -> np.ndarray | None:
-    """The finite numbers under a key; None when they are not that many."""
-    try:
-        numbers = np.atleast_1d(np.array(document[key], dtype=np.float64))
-    except (KeyError, TypeError, ValueError, OverflowError):
-        return None
-    return numbers if numbers.shape == (count,) and np.isfinite(numbers).all() else None
 
 
 READER = Reader(

@@ -20,7 +20,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_frames
 from r2c2r_core.ingest.readers.images import MOST_FRAMES, colour_file, depth_file, first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object
+from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, pose_of_matrix, read_json_object
 
 _COLOUR, _DEPTH = r"rgb/frame_(\d+)\.(?i:jpe?g|png)", r"depth/frame_(\d+)\.(?i:png)"
 _CAMERAS = "pose_intrinsic_imu.json"
@@ -38,8 +38,8 @@ def open_scannetpp(files: Files) -> Recording:
             f"{files.source}/{_CAMERAS}: no frame of the {len(colour)} colour images has an 'intrinsic' of 3x3 numbers",
             hint="extract the scene with ScanNet++'s toolkit again",
         )
-    poses = {number: _pose(entries[number].get("aligned_pose")) for number in cameras}
-    times = {number: time_s for number in cameras if (time_s := _number(entries[number].get("timestamp"))) is not None}
+    poses = {number: _pose(entries[number]) for number in cameras}
+    times = {n: float(t[0]) for n in cameras if (t := finite_numbers(entries[n].get("timestamp"), (1,))) is not None}
     found = Found(colour=colour, depth=depth, poses=poses, times_s=times)
     frames, notices = joined_frames(files, found, cameras.__getitem__, lambda n: cameras[n].resized(*depth_size))
     return Recording(
@@ -62,27 +62,15 @@ def _entries(files: Files) -> dict[int, Mapping[str, Any]]:
 
 
 def _camera(entry: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics | None:
-    matrix = _matrix(entry.get("intrinsic"), (3, 3))
-    if matrix is None or not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1]) <= 0:
+    matrix = finite_numbers(entry.get("intrinsic"), (3, 3))
+    if matrix is None or min(matrix[0, 0], matrix[1, 1]) <= 0:
         return None
     return integer_centred(matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], _FILM_SIZE).resized(*size)
 
 
-def _pose(value: Any) -> Rigid3 | None:
-    matrix = _matrix(value, (4, 4))
+def _pose(entry: Mapping[str, Any]) -> Rigid3 | None:
+    matrix = finite_numbers(entry.get("aligned_pose"), (4, 4))
     return None if matrix is None else pose_of_matrix(matrix)
-
-
-def _matrix(value: Any, shape: tuple[int, int]) -> np.ndarray | None:
-    try:
-        matrix = np.asarray(value, np.float64)
-    except (TypeError, ValueError):  # rows of different lengths, words
-        return None
-    return matrix if matrix.shape == shape else None
-
-
-def _number(value: Any) -> float | None:
-    return float(value) if isinstance(value, int | float) and np.isfinite(value) else None
 
 
 READER = Reader(

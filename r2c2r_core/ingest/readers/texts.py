@@ -20,6 +20,15 @@ def read_numbers(content: bytes) -> np.ndarray | None:
         return None
 
 
+def finite_numbers(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
+    """The numbers of a JSON value, as an array of that shape; None when they are not that, or not all finite."""
+    try:
+        numbers = np.atleast_1d(np.array(value, dtype=np.float64))
+    except (TypeError, ValueError, OverflowError):  # words, objects, rows of different lengths
+        return None
+    return numbers if numbers.shape == shape and np.isfinite(numbers).all() else None
+
+
 def read_pose(content: bytes) -> Rigid3 | None:
     """A 4x4 camera-to-world matrix; None where tracking was lost (written as -inf or NaN) or the matrix is no pose."""
     numbers = read_numbers(content)
