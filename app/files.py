@@ -53,6 +53,11 @@ class ProjectFiles:
         return self.root / "previews"
 
     @property
+    def arriving(self) -> Path:
+        """The newest frame of a sample that is being rendered; gone with the other previews once it was read."""
+        return self.previews / "arriving.jpg"
+
+    @property
     def kept_facts(self) -> Path:
         """What was read from nouns for the browser; may be deleted at any time."""
         return self.previews / "facts.json"

@@ -18,6 +18,7 @@ from starlette.exceptions import HTTPException
 from app import errors, schemas
 from app.db.channel import Channel, join_hubs
 from app.db.engine import open_engine
+from app.db.queries import READS_RECORDING
 from app.gates import Gates
 from app.hub import Hub
 from app.jobs.far import FarWorkers
@@ -221,6 +222,7 @@ def _open(
     context.posting.start()
     context.live.on_object = lambda project, number: _tell(context, project, number)
     context.live.on_again = lambda project, number, key, others: _again(context, project, number, key, others)
+    runner.on_done = lambda project, kind: _prepare(context, project, kind)
     if context.channel is not None:
         join_hubs(context.channel, hub)
         hear_others(context, context.channel)
@@ -286,6 +288,16 @@ def _tell(context: Context, project: str, number: int) -> None:
         tell_object(context, project, number)
     except R2C2RError:  # deleted meanwhile
         return
+
+
+def _prepare(context: Context, project: str, kind: str) -> None:
+    """Prepare what was just read; whatever is wrong with that is said to who opens Annotate."""
+    if kind not in READS_RECORDING or not context.settings.prepare_imports:
+        return
+    try:
+        masks.prepare(context, project)
+    except Exception:
+        _log.exception("preparing %s", project)
 
 
 def _again(context: Context, project: str, number: int, key: str, others: list[int]) -> None:

@@ -93,6 +93,7 @@ class Settings:
     viewer_page_s: float = 10.0  # the same for a file of its page, and for its connection
     busy_s: float = BUSY_S  # until a request is refused that waits for another's writing
     run_jobs: bool = True  # tests of other things leave the queue alone
+    prepare_imports: bool = True  # for the live segmenter, once they were read; likewise
     preview_width: int = 960
     user: str = field(default_factory=lambda: _user_name())
 

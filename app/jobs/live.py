@@ -83,6 +83,12 @@ class LiveSegmenters:
         with self._lock:
             return frozenset(self._sessions)
 
+    @property
+    def preparing(self) -> bool:
+        """Whether a project is being prepared now."""
+        with self._lock:
+            return any(session.state in ("starting", "preparing") for session in self._sessions.values())
+
     def runs(self, project: str) -> bool:
         """Whether there is a process for the project."""
         with self._lock:

@@ -137,7 +137,8 @@ def _import(job: Job, project: Project, files: ProjectFiles, commands: Commands)
 def _sample(job: Job, project: Project, files: ProjectFiles, commands: Commands) -> list[Step]:
     wish = job.payload
     options = ("--seed", str(wish["seed"]), "--frames", str(wish["frames"]), "--size", f"{wish['width']}x{wish['height']}")
-    return [Step("sample", (*commands.sample, str(files.source), *options), 60.0), _ingest(job, files, commands)]
+    command = (*commands.sample, str(files.source), *options, "--picture", str(files.arriving))
+    return [Step("sample", command, 60.0), _ingest(job, files, commands)]
 
 
 def _run(job: Job, project: Project, files: ProjectFiles, commands: Commands) -> list[Step]:

@@ -191,8 +191,8 @@ class JobRows:
                 session.add(row)
         return further
 
-    def finish(self, job_id: int) -> None:
-        """All of it is done: what it made is taken over. Raises what the finisher raises; nothing is stored then."""
+    def finish(self, job_id: int) -> str:
+        """All of it is done: what it made is taken over; its kind. Raises what the finisher raises; nothing is stored then."""
         with reading(self.engine) as session:
             row = self._own(session, job_id)
             finisher, files = self._finishers[row.kind], self._files(session, row)
@@ -207,7 +207,9 @@ class JobRows:
             row.stage, row.eta_s, row.worker_pid, row.error = STAGES[row.kind][-1], None, None, None
             _note(session, row, "state", "done")
             session.add(row)
+            kind = row.kind
         self._tell_end(job_id)
+        return kind
 
     def end(self, job_id: int, state: str, error: dict[str, Any]) -> None:
         """It failed or was cancelled."""

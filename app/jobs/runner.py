@@ -11,6 +11,7 @@ import secrets
 import threading
 import time
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -44,7 +45,10 @@ class ServerStops(Exception):
 
 
 class Runner:
-    """Takes jobs from the table and runs them in threads that only wait for processes."""
+    """Takes jobs from the table and runs them in threads that only wait for processes.
+
+    `on_done` is told of every job that did its work, by its project and kind; it raises nothing.
+    """
 
     def __init__(
         self, rows: JobRows, settings: Settings, commands: Commands, stages: Histogram, traces: TracerProvider
@@ -55,6 +59,7 @@ class Runner:
         self._compute = seat_of(settings, rows.store)
         self._wake, self._stopping = threading.Event(), threading.Event()
         self._sharing = Sharing(rows, settings, commands, self._compute, self._stopping)
+        self.on_done: Callable[[str, str], None] = lambda project, kind: None
         self.draining, self.began = False, time.time()  # draining: it takes no further job
         self._at: dict[int, tuple[str, Path | None]] = {}  # project and log of each job that runs here
         self._threads: list[threading.Thread] = []
@@ -211,8 +216,9 @@ class Runner:
                     return
                 if self.rows.got_further(job_id, number + 1):
                     del self._deaths[job_id]
-            self.rows.finish(job_id)
+            kind = self.rows.finish(job_id)
             self._forget(job_id)
+            self.on_done(project_id, kind)
         except ServerStops:
             self.rows.give_back(job_id, "waits for the server")
         except Unavailable:

@@ -1,12 +1,19 @@
-"""A synthetic kitchen as a job: `python -m app.jobs.sample FOLDER --seed 0 --frames 90 --size 960x720`."""
+"""A synthetic kitchen as a job: `python -m app.jobs.sample FOLDER --seed 0 --frames 90 --size 960x720 --picture FILE`."""
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 
+import cv2
+
 from app.jobs.messages import run_stage
+from r2c2r_core.arrays import Image
 from r2c2r_core.limits import limit_this_process
 from r2c2r_core.progress import Progress
+from r2c2r_core.workspace import write_atomically
+
+PICTURE_WIDTH = 480  # pixels, of the picture that is shown meanwhile
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -16,6 +23,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--frames", type=int, default=90)
     parser.add_argument("--size", default="960x720")
+    parser.add_argument("--picture", type=Path, required=True, help="the newest frame, shown while the others are rendered")
     options = parser.parse_args(arguments)
     width, height = (int(side) for side in options.size.split("x"))
 
@@ -24,10 +32,25 @@ def main(arguments: list[str] | None = None) -> int:
 
         finished = options.folder / ".complete"
         if not finished.exists():
-            write_sample(options.folder, seed=options.seed, frames=options.frames, size=(width, height), progress=progress)
+            options.picture.parent.mkdir(parents=True, exist_ok=True)
+            write_sample(
+                options.folder,
+                seed=options.seed,
+                frames=options.frames,
+                size=(width, height),
+                progress=progress,
+                show=partial(write_picture, options.picture),
+            )
             finished.touch()
 
     return run_stage("sample", work)
+
+
+def write_picture(path: Path, rgb: Image) -> None:
+    """Write a frame as a small JPEG, at once or not at all."""
+    height = round(rgb.shape[0] * PICTURE_WIDTH / rgb.shape[1])
+    small = cv2.resize(rgb, (PICTURE_WIDTH, height), interpolation=cv2.INTER_AREA)
+    write_atomically(path, cv2.imencode(".jpg", cv2.cvtColor(small, cv2.COLOR_RGB2BGR))[1].tobytes())
 
 
 if __name__ == "__main__":

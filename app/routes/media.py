@@ -37,6 +37,12 @@ def thumbnail(context: Ctx, request: Request, project: str, v: str = "") -> Resp
     return send(request, media.thumbnail(context, project), "image/jpeg", immutable=bool(v))
 
 
+@router.get("/arriving.jpg", operation_id="arrivingPicture")
+def arriving_picture(context: Ctx, request: Request, project: str, v: str = "") -> Response:
+    """The newest frame of a sample kitchen while it is rendered."""
+    return send(request, media.arriving(context, project), "image/jpeg", immutable=bool(v))
+
+
 @router.get("/scan/{side}.png", operation_id="scanPicture")
 def scan_picture(context: Ctx, request: Request, project: str, side: Literal["plan", "view"], v: str = "") -> Response:
     """The fused scan with the camera's path, from above or from where it was filmed; transparent around it."""

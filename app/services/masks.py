@@ -68,18 +68,26 @@ def status(context: Context, project_id: str) -> schemas.LiveStatus:
 
 
 def open_live(context: Context, project_id: str) -> schemas.LiveStatus:
-    """Start preparing the live segmenter."""
+    """Start preparing the live segmenter, and compute the masks of what is clicked and has none: imported clicks, say."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = queries.live_objects(session, project_id)
+        clicks = queries.clicks_by_object(session, project_id)
     if project.status != "ready":
         raise NotReady("the recording has not been read yet", hint="wait for the import")
     places = Places.of(context.files(project))
     tell_objects(context, project, starts=True)
-    for item in items:
-        if _outdated(found_of(context, project, item, places)):
-            segment(context, project_id, item.id or 0)
+    missing = [item for item in items if item.masks_key and _is_missing(found_of(context, project, item, places))]
+    for item in reversed(missing):  # what is asked for last is computed first
+        _start(context, project, item, clicks.get(item.id or 0, []), tells=item is missing[0])
+        context.live.on_object(project_id, item.id or 0)
     return context.live.status(project_id)
+
+
+def prepare(context: Context, project_id: str) -> None:
+    """Prepare a recording that was just read, so that nobody waits for it in Annotate; one project at a time."""
+    if not context.live.preparing:
+        open_live(context, project_id)
 
 
 def segment(context: Context, project_id: str, object_id: int) -> None:
@@ -245,8 +253,11 @@ def front_of(context: Context, project: Project, item: SceneObject, places: Plac
     return run.front if run is not None else None
 
 
-def _outdated(found: Found | None) -> bool:
-    return found is not None and found.masks.end == mask_store.OUTDATED
+def _is_missing(found: Found | None) -> bool:
+    """Whether masks were never asked for, are of an older version, or were left when their process vanished."""
+    if found is None or found.masks.end == mask_store.OUTDATED:
+        return True
+    return found.state == "partial" and found.masks.end is None
 
 
 def _frame_mask(number: int, found: Found, entry: Entry) -> FrameMask:

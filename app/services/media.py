@@ -55,6 +55,14 @@ def thumbnail(context: Context, project_id: str) -> Path:
     return frame(context, project_id, int(best["index"]), 480)
 
 
+def arriving(context: Context, project_id: str) -> Path:
+    """The newest frame of a sample that is being rendered."""
+    path = _files(context, project_id).arriving
+    if not path.is_file():
+        raise NotFound("nothing is rendered for this project now", hint="look at its frames")
+    return path
+
+
 def scan(context: Context, project_id: str, side: str) -> Path:
     """The fused scan from above ("plan") or from where it was filmed ("view"), drawn when the recording was read."""
     path = _files(context, project_id).root / f"scan-{side}.png"

@@ -4,7 +4,7 @@ import json
 import secrets
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy.orm import defer
 from sqlmodel import Session, col, select
@@ -16,7 +16,7 @@ from app.db.engine import reading, writing
 from app.db.tables import Event, Project
 from app.errors import NotReady
 from app.file_cache import FileCache
-from app.files import ProjectFiles
+from app.files import ProjectFiles, project_files
 from app.services import crossing, masks, project_shapes
 from app.services.context import Context
 from r2c2r_core.align.protocol import MATCHERS
@@ -34,6 +34,8 @@ SEAMS: dict[str, Registry[Any]] = {  # what a person may choose for a project
 }
 
 
+Shape = TypeVar("Shape", bound=schemas.ProjectSummary)
+
 _FRAMES: FileCache[list[dict[str, Any]]] = FileCache(64 << 20)
 _FRAMES_GROW = 4  # what a frame table takes in memory, over its file
 
@@ -41,13 +43,26 @@ _FRAMES_GROW = 4  # what a frame table takes in memory, over its file
 def list_projects(context: Context) -> list[schemas.ProjectSummary]:
     """All projects that the person may see, last touched first."""
     with reading(context.engine) as session:
-        return project_shapes.listed(session, context.access.hidden(context.person))
+        shapes = project_shapes.listed(session, context.access.hidden(context.person))
+    return [_pictured(context, shape) for shape in shapes]
 
 
 def get_project(context: Context, project_id: str) -> schemas.Project:
     """One project."""
     with reading(context.engine) as session:
-        return project_shapes.whole(session, queries.project_row(session, project_id))
+        shape = project_shapes.whole(session, queries.project_row(session, project_id))
+    return _pictured(context, shape)
+
+
+def _pictured(context: Context, shape: Shape) -> Shape:
+    """The project with the newest frame of its sample for a thumbnail, while that is being rendered."""
+    if shape.status != "importing":
+        return shape
+    try:
+        drawn = project_files(context.settings.data_dir, shape.id).arriving.stat().st_mtime_ns
+    except FileNotFoundError:
+        return shape
+    return shape.model_copy(update={"thumbnail": f"/media/{shape.id}/arriving.jpg?v={drawn:x}"})
 
 
 def new_project(

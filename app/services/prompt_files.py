@@ -25,5 +25,5 @@ def adopt(context: Context, project_id: str, body: schemas.PromptsFile) -> list[
         project = queries.project_row(session, project_id)
         check_file(table_of(context, project), body)
         items = adopt_prompts(session, project, body, context.who)
-        changes = [change_of(context, session, project, item, infer=False) for item in items]
+        changes = [change_of(context, session, project, item, infer=True) for item in items]
     return after_changes(context, changes)

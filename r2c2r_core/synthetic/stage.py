@@ -5,10 +5,12 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
+from r2c2r_core.arrays import Image
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.progress import SILENT, Progress
@@ -26,9 +28,10 @@ from r2c2r_core.synthetic.path import SECONDS, Shot, walk
 from r2c2r_core.synthetic.posed import Stage, moved_patches
 from r2c2r_core.synthetic.record3d import Record3DWriter
 from r2c2r_core.synthetic.render import View, photograph, render_view
-from r2c2r_core.synthetic.sensor import scan_depth
+from r2c2r_core.synthetic.sensor import LidarFrame, scan_depth
 from r2c2r_core.synthetic.styled import plan_styled_kitchen
 from r2c2r_core.synthetic.truth import Sightings, capture_from_kitchen, prompts_document, true_objects, truth_document
+from r2c2r_core.threads import in_threads
 
 _AJAR = 0.6  # of the way to its widest: where the light on a front that opens is worked out
 _FOCAL_PER_LONG_SIDE = 0.757  # 726.6 px at 960 px: a real iPhone recording
@@ -62,10 +65,11 @@ def write_sample(
     opened: bool = False,
     choice: Choice = SEEDS_OWN,
     progress: Progress = SILENT,
+    show: Callable[[Image], None] = lambda rgb: None,
 ) -> SamplePaths:
     """Write scan.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames.
 
-    With `opened`, fronts are opened and closed while it is filmed (opening.py).
+    With `opened`, fronts are opened and closed while it is filmed (opening.py). `show` is given each colour frame.
     """
     paths = SamplePaths(
         scan=out / "scan.r3d", truth=out / "truth.json", prompts=out / "prompts.json", masks=out / "truth_masks"
@@ -91,14 +95,24 @@ def write_sample(
     cameras = _cameras(size, frames, np.random.default_rng([seed, 5]))
     white = _white_balance(np.random.default_rng([seed, 6]))
     seen: list[dict[str, Sight]] = []
+
+    def take(number: int) -> _Taken:
+        rng = np.random.default_rng([seed, 7, number])
+        scene = scenes(number, shots[number], frames)
+        return _take_frame(scene, shots[number], cameras[number], white, rng, number, folders)
+
     with Record3DWriter(path=paths.scan, fps=round(frames / SECONDS)) as writer:
-        for number in progress.part(0.1, 1.0).each(range(frames), "frame"):
-            rng = np.random.default_rng([seed, 7, number])
-            scene, shot, camera = scenes(number, shots[number], frames), shots[number], cameras[number]
-            view = _add_frame(writer, scene, shot, camera, poses[number], white, rng, number, sightings, folders)
+        taken = in_threads(take, range(frames))
+        for number, frame in enumerate(progress.part(0.1, 1.0).each(taken, "frame", frames)):
+            shot, camera = shots[number], cameras[number]
+            writer.add(frame.rgb, frame.lidar.depth_m, frame.lidar.confidence, camera, poses[number], shot.timestamp_s)
+            show(frame.rgb)
+            sightings.add(
+                number, frame.view, frame.ids, frame.is_handle, frame.is_front, camera, shot.kitchen_from_camera, frame.rng
+            )
             if film is not None:
                 states = film.states(share_of(number, frames))
-                seen.append(sights(film, states, scene, view, camera, shot.kitchen_from_camera.inverse))
+                seen.append(sights(film, states, frame.scene, frame.view, camera, shot.kitchen_from_camera.inverse))
     motions = {} if film is None else motion_entries(film, seen)
     _write_json(paths.truth, truth_document(objects, to_capture, sightings, motions))
     _write_json(paths.prompts, prompts_document(objects, sightings, np.random.default_rng([seed, 8])))
@@ -140,32 +154,41 @@ def _moving(film: Film, seed: int) -> Scenes:
     return scene_at
 
 
-def _add_frame(
-    writer: Record3DWriter,
+class _Taken(NamedTuple):
+    """One frame as it was taken, with what it shows of whom."""
+
+    scene: LitScene
+    view: View
+    rgb: Image
+    lidar: LidarFrame
+    ids: np.ndarray  # (h, w) instance ids, 0: of nothing that is prompted
+    is_handle: np.ndarray  # (h, w)
+    is_front: np.ndarray  # (h, w)
+    rng: np.random.Generator  # what is left to draw of this frame
+
+
+def _take_frame(
     scene: LitScene,
     shot: Shot,
     camera: Intrinsics,
-    pose: Rigid3,
     white: tuple[float, float, float],
     rng: np.random.Generator,
     number: int,
-    sightings: Sightings,
     folders: list[Path],
-) -> View:
+) -> _Taken:
+    """Photograph and scan the scene, and write the mask of every object in it."""
     camera_from_kitchen = shot.kitchen_from_camera.inverse
     view = render_view(scene, camera, camera_from_kitchen)
     blur_px = shot.blur_px * camera.width / 960
     rgb = photograph(view.colour, gain=shot.gain, blur_px=blur_px, white=white, rng=rng)
     lidar = scan_depth(scene, _depth_camera(camera), camera_from_kitchen, rng)
-    writer.add(rgb, lidar.depth_m, lidar.confidence, camera, pose, shot.timestamp_s)
     ids = np.where(view.patch >= 0, scene.object_of_patch[view.patch], 0)
     is_handle = (view.patch >= 0) & scene.handle_patch[view.patch]
     is_front = (view.patch >= 0) & front_patches(scene)[view.patch]
-    sightings.add(number, view, ids, is_handle, is_front, camera, shot.kitchen_from_camera, rng)
     for index in np.unique(ids[ids > 0]):
         mask = (ids == index).astype(np.uint8) * np.uint8(255)
         cv2.imwrite(str(folders[index - 1] / f"{number:06d}.png"), mask, _QUICK_PNG)
-    return view
+    return _Taken(scene, view, rgb, lidar, ids, is_handle, is_front, rng)
 
 
 def _cameras(size: tuple[int, int], frames: int, rng: np.random.Generator) -> list[Intrinsics]:

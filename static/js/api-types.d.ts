@@ -1950,6 +1950,8 @@ export interface Operations {
   testWebhook: { parameters: { webhook: number }; body: undefined; answer: Delivery };
   /** GET /media/{project}/README.txt */
   sceneReadme: { parameters: { project: string }; body: undefined; answer: unknown };
+  /** GET /media/{project}/arriving.jpg */
+  arrivingPicture: { parameters: { project: string; v?: string }; body: undefined; answer: unknown };
   /** GET /media/{project}/bundles/{version}.zip */
   downloadBundle: { parameters: { project: string; version: number; formats?: string[] }; body: undefined; answer: unknown };
   /** GET /media/{project}/bundles/{version}/objects/{object_name}.zip */

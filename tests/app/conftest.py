@@ -126,6 +126,7 @@ def running(
         "job_memory_bytes": 0,
         "kill_grace_s": 0.5,
         "beat_s": 3600.0,  # no signs of life among the statements that a test counts
+        "prepare_imports": False,
         "user": "tester",
         "import_roots": (data_dir.parent,),
         **PATIENT,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from starlette.websockets import WebSocketDisconnect
 
-from app.services import prompts
+from app.services import masks, prompts
 from tests.app.conftest import ORIGIN, SOCKETS, Running
 
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
@@ -179,6 +179,7 @@ def test_a_preparation_nobody_looks_at_any_more_is_stopped(start: Callable[..., 
     monkeypatch.setattr("app.jobs.live.LEFT_S", 0.3)
     with start() as web:
         project = web.sample()
+        unclick(web, project)
         slow = next(web.settings.data_dir.rglob("work")) / "prepare_slowly"
         slow.touch()
         with listening(web, project) as socket:
@@ -190,6 +191,53 @@ def test_a_preparation_nobody_looks_at_any_more_is_stopped(start: Callable[..., 
         slow.unlink()
         web.post(f"/api/projects/{project}/live/open")
         web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
+
+
+def test_clicks_that_came_with_a_recording_get_their_masks_when_it_is_opened(web: Running) -> None:
+    project = web.sample()
+    items = web.get(f"/api/projects/{project}/objects")
+    assert [item["segment"] for item in items] == ["none", "none"]
+    with listening(web, project) as socket:
+        socket.receive_json()
+        web.post(f"/api/projects/{project}/live/open")
+        told, _ = until(socket, type="segment", object=items[1]["id"], state="done")
+    assert {item["segment"] for item in web.get(f"/api/projects/{project}/objects")} == {"done"}
+    waiting = [said["object"]["id"] for said in told if said["type"] == "object" and said["object"]["segment"] == "waiting"]
+    assert set(waiting) == {item["id"] for item in items}  # every tab shows that they come
+
+
+def test_masks_that_a_person_stopped_are_not_begun_again_by_opening(web: Running) -> None:
+    project = web.sample()
+    at = f"/api/projects/{project}/objects"
+    stopped = web.post(at, {"category": "drawer", "points": [HELD]}, 201)["id"]
+    web.post(f"{at}/{stopped}/segment/cancel")
+    web.post(f"/api/projects/{project}/live/open")
+    web.until(lambda: [item["segment"] for item in web.get(at)].count("done") == 2)
+    assert web.get(at)[-1]["segment"] == "partial"
+
+
+def test_a_recording_is_prepared_once_it_was_read(start: Callable[..., Any]) -> None:
+    with start(prepare_imports=True) as web:
+        project = web.sample()
+        web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
+        web.until(lambda: {item["segment"] for item in web.get(f"/api/projects/{project}/objects")} == {"done"})
+
+
+def test_one_recording_is_prepared_at_a_time(start: Callable[..., Any]) -> None:
+    with start() as web:
+        first, second = web.sample(), web.sample()
+        unclick(web, first)
+        slow = next(web.settings.data_dir.glob(f"projects/{first}/work")) / "prepare_slowly"
+        slow.touch()
+        masks.prepare(web.context, first)
+        masks.prepare(web.context, second)
+        assert web.context.live.projects == {first}
+
+
+def unclick(web: Running, project: str) -> None:
+    """Delete the objects that came with a sample: nobody waits for their masks."""
+    for item in web.get(f"/api/projects/{project}/objects"):
+        web.delete(f"/api/projects/{project}/objects/{item['id']}")
 
 
 def test_a_tab_that_was_away_gets_what_it_missed_or_is_told_to_fetch_anew(web: Running) -> None:

@@ -7,9 +7,8 @@ from playwright.sync_api import expect
 
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext
-from tests.browser.test_many import post
 from tests.browser.test_together import rows, sample
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, post, signed_in
 
 # half a metre wide and 20 cm high, as what is proposed
 CORNERS = [[0.6, 2.0, 0.8], [1.1, 2.0, 0.8], [1.1, 2.0, 0.6], [0.6, 2.0, 0.6]]

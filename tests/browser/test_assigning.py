@@ -6,9 +6,8 @@ from playwright.sync_api import expect
 
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.test_many import post
 from tests.browser.test_together import pick, rows, sample
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, post, signed_in
 
 
 def test_objects_are_assigned_and_wait_for_their_person(new_context: NewContext, server: Server) -> None:

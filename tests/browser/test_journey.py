@@ -54,7 +54,6 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
 
     # Annotate: click, mask, name; a wrong click is undone
     page.get_by_role("link", name="Annotate").click()
-    expect(page.get_by_label("Proposals", exact=True)).to_contain_text("They appear once the scan is prepared")
     page.locator(".chip", has_text=re.compile("^ready$")).wait_for(timeout=LONG_MS)
     frame, x, y = click_of(sample, "drawer")
     seek(page, frame)
@@ -113,6 +112,22 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
         assert bundle.testzip() is None
         names = {name.removeprefix(f"{Path(bundle.namelist()[0]).parts[0]}/") for name in bundle.namelist()}
         assert {"scene.urdf", "scene.xml", "scene.glb", "manifest.json", "report.html"} <= names | set(bundle.namelist())
+
+
+def test_the_sample_is_seen_while_it_is_made_and_opens_with_its_masks(page: Page) -> None:
+    small = json.dumps({"seed": 1, "frames": 10, "width": 320, "height": 240})
+    page.route("**/api/projects/sample", lambda route: route.continue_(post_data=small))
+    page.get_by_role("button", name="Open the sample kitchen").click()
+    rendered = page.get_by_alt_text("The frame that was rendered last")
+    expect(rendered).to_be_visible()
+    assert rendered.evaluate("image => image.naturalWidth") == 480
+    page.get_by_role("link", name="Annotate").click(timeout=PATIENCE_MS)
+    expect(page.locator(".stage-tools .chip").first).to_have_text("ready")
+    rows = page.locator(".object-list > li")
+    expect(rows.first).to_contain_text("frames")
+    seen = rows.all_inner_texts()
+    assert len(seen) > 5
+    assert all("frame" in row for row in seen), seen  # nobody clicked and nobody asked for them
 
 
 def test_a_foreign_file_is_refused_in_one_line(page: Page, address: str, tmp_path: Path) -> None:

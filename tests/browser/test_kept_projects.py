@@ -4,9 +4,8 @@ from playwright.sync_api import expect
 
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext
-from tests.browser.test_many import post
 from tests.browser.test_together import say
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, post, signed_in
 
 
 def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Server) -> None:

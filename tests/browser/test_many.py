@@ -2,20 +2,12 @@
 
 import re
 
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 
 from tests.browser.looks import picture
 from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_together import rows, sample
-from tests.browser.together import Server, signed_in
-
-
-def post(page: Page, path: str, body: dict[str, str]) -> None:
-    script = """async ([path, body]) => {
-      const headers = { "content-type": "application/json", "x-requested-with": "r2c2r" };
-      return (await fetch(path, { method: "POST", headers, body: JSON.stringify(body) })).status;
-    }"""
-    assert page.evaluate(script, [path, body]) in (201, 202)
+from tests.browser.together import Server, post, signed_in
 
 
 def test_many_objects_are_searched_and_new_object_stays_in_sight(new_context: NewContext, server: Server) -> None:

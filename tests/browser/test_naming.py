@@ -4,9 +4,8 @@ from playwright.sync_api import expect
 
 from tests.browser.looks import picture
 from tests.browser.serving import NewContext
-from tests.browser.test_many import post
 from tests.browser.test_together import rows, sample
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, post, signed_in
 
 
 def test_names_are_joined_and_an_unknown_category_is_said_once(new_context: NewContext, server: Server) -> None:

@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_together import click_frame, ready, rows, sample
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, post, signed_in
 
 
 def test_a_second_opinion_is_asked_given_and_compared(new_context: NewContext, server: Server) -> None:
@@ -23,6 +23,7 @@ def test_a_second_opinion_is_asked_given_and_compared(new_context: NewContext, s
         click_frame(ann, x, y)
     expect(rows(ann)).to_have_count(4)
     expect(rows(ann).last).to_contain_text("3 frames")
+    post(ann, f"/api/projects/{project.rsplit('/', 1)[-1]}/objects", {"category": "bottle"})  # which has no mask
 
     ann.goto(project)
     section = ann.get_by_role("region", name="Second opinions")

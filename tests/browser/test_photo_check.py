@@ -142,7 +142,6 @@ def segmented(page: Page, project: str) -> str:
     page.goto(f"{project}/annotate?frame=3")
     ready(page)
     pick(page, "drawer_1")
-    page.keyboard.press("g")
     expect(page.locator(".object-list .current")).to_contain_text("3 frames")
     return str(page.evaluate("new URLSearchParams(location.search).get('object')"))
 

@@ -7,8 +7,7 @@ from playwright.sync_api import Page, expect
 from tests.app.test_imports import R3D
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext
-from tests.browser.test_many import post
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, post, signed_in
 
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
 

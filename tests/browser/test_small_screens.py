@@ -4,9 +4,8 @@ from playwright.sync_api import expect
 
 from tests.browser.looks import picture
 from tests.browser.serving import NewContext, box_of
-from tests.browser.test_many import post
 from tests.browser.test_together import rows, sample
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, post, signed_in
 
 ZOOMED = {"width": 640, "height": 360}  # 1280 × 720 at 200 %
 PHONE = {"width": 390, "height": 844}

@@ -10,7 +10,7 @@ from playwright.sync_api import Locator, Page, expect
 from tests.app.nouns import finish
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, post, signed_in
 
 FRAME = (160, 120)
 STUCK_X = 158  # the stand-in segmenter draws one frame there and waits
@@ -167,7 +167,8 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     # to review, back, and to review again: reasons are asked for where something is unmet or refused
     ann.goto(f"{project}/review")
     viewed(ann)
-    move(ann, "Send to review", "the stand-in sees little")
+    post(ann, f"/api/projects/{folder.name}/objects", {"category": "bottle"})  # which nobody has clicked
+    move(ann, "Send to review", "the bottle is not there")
     expect(bea.get_by_text("ready", exact=True)).to_be_visible()  # on the list of projects, by itself
     bea.goto(f"{project}/review")
     viewed(bea)

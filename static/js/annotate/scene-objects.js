@@ -49,6 +49,11 @@ export class SceneObjects extends EventTarget {
     return this.#all.size;
   }
 
+  /** Of how many masks are still to come. */
+  get following() {
+    return this.sorted.filter(({ segment }) => segment === "waiting" || segment === "running").length;
+  }
+
   /** In the order they were made. */
   get sorted() {
     return [...this.#all.values()].toSorted((a, b) => a.id - b.id);

@@ -1,6 +1,7 @@
 /** How the live segmenter stands, in a chip. */
 
 import { h } from "../dom.js";
+import { counted } from "../lib/format.js";
 
 /** @typedef {import("../api-types").LiveStatus} LiveStatus */
 
@@ -16,6 +17,15 @@ export class SegmenterChip {
   element = h("span", { class: "chip", role: "status" });
 
   #told = false;
+  /** @type {LiveStatus | null} */
+  #status = null;
+  #following = 0;
+
+  /** Of how many objects masks are still to come: it is ready once none is. @param {number} count */
+  set following(count) {
+    this.#following = count;
+    this.#draw();
+  }
 
   /**
    * Show what opening it answers, unless the live connection, which may be quicker, has said something newer by then.
@@ -30,9 +40,20 @@ export class SegmenterChip {
   /** @param {LiveStatus} status */
   show(status) {
     this.#told = true;
+    this.#status = status;
+    this.#draw();
+  }
+
+  #draw() {
+    const status = this.#status;
+    if (!status) return;
+    const busy = status.state === "ready" && this.#following > 0;
     const percent = status.state === "preparing" ? ` ${Math.round(100 * status.fraction)} %` : "";
-    this.element.textContent = `${TEXT[status.state]}${percent}`;
-    this.element.className = `chip ${status.state === "ready" ? "good" : status.state === "failed" ? "bad" : ""}`;
+    this.element.textContent = busy
+      ? `finding ${counted(this.#following, "object")}`
+      : `${TEXT[status.state]}${percent}`;
+    const tone = { ready: busy ? "" : "good", failed: "bad" }[String(status.state)] ?? "";
+    this.element.className = `chip ${tone}`;
     this.element.title = status.error ? `${status.error.message} ${status.error.hint}` : status.text;
   }
 }

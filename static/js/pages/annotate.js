@@ -372,6 +372,7 @@ export class AnnotatePage extends LiveElement {
   #drawObjects() {
     this.#drawCrop(); // and the tip
     this.#drawList();
+    this.#tools.segmenter.following = this.#objects.following;
     this.#picture.drawObjects();
     if (this.#player.frame) this.#contradictions.lookSoon(this.#player.frame);
   }

@@ -32,6 +32,7 @@ export class OverviewPage extends LiveElement {
   #next = h("span");
   #head = h("header", {}, this.#title, this.#assignee, this.#next);
   #importing = h("section", { class: "card stack", hidden: true });
+  #arriving = h("div", { class: "arriving" }); // keeps the room of the picture that comes
   #scan = h("div", { class: "split", hidden: true });
   #work = h("div", { class: "split", hidden: true });
   #history = h("section", { class: "stack" });
@@ -145,8 +146,10 @@ export class OverviewPage extends LiveElement {
       h("h2", {}, missing ? "The recording is missing" : "Importing"),
       failure(project) ?? "",
       ...(missing ? [this.#missing(project)] : []),
-      ...(project.job ? [this.#job] : []),
+      ...(project.job ? [h("div", { class: "split" }, this.#job, this.#arriving)] : []),
     );
+    this.#arriving.hidden = ready || project.job?.kind !== "sample";
+    if (!ready && project.thumbnail) this.#drawArriving(project.thumbnail);
     this.#scan.hidden = this.#work.hidden = this.#lengths.hidden = this.#opinions.hidden = !capture;
     if (capture) this.#drawScan(project, capture);
     this.#drawHistory();
@@ -155,6 +158,17 @@ export class OverviewPage extends LiveElement {
       this.#shown = true;
       this.#viewer.open(this.project, { mode: "cloud" });
     }
+  }
+
+  /** Show the frame of a sample that was rendered last, once it is loaded. @param {string} address */
+  async #drawArriving(address) {
+    const picture = h("img", { src: address, alt: "The frame that was rendered last" });
+    try {
+      await picture.decode();
+    } catch {
+      return; // it was read meanwhile: its frames are there instead
+    }
+    this.#arriving.replaceChildren(picture);
   }
 
   /**

@@ -6,8 +6,11 @@ from pathlib import Path
 
 folder = Path(sys.argv[1])
 folder.mkdir(parents=True, exist_ok=True)
-points = [{"frame": 3, "x": 80.5, "y": 60.5, "label": 1}]
-objects = [{"name": "drawer_1", "category": "drawer", "points": points}, {"name": "mug_1", "category": "mug", "points": points}]
+click, other = ({"frame": 3, "x": x, "y": y, "label": 1} for x, y in ((80.5, 60.5), (8.5, 112.5)))
+objects = [
+    {"name": "drawer_1", "category": "drawer", "points": [click]},
+    {"name": "mug_1", "category": "mug", "points": [other]},
+]
 (folder / "prompts.json").write_text(json.dumps({"version": 1, "objects": objects}))
 (folder / "scan.r3d").write_bytes(b"PK")
 sys.stdout.write(json.dumps({"stage": "sample", "fraction": 0.5, "text": "rendering"}) + "\n")

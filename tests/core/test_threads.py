@@ -1,0 +1,25 @@
+import threading
+from itertools import count
+
+from r2c2r_core.threads import in_threads
+
+
+def test_results_come_in_order_whatever_ends_first() -> None:
+    second_ended = threading.Event()
+
+    def work(number: int) -> int:
+        if number == 0:
+            assert second_ended.wait(60)
+        elif number == 1:
+            second_ended.set()
+        return number
+
+    assert list(in_threads(work, range(9))) == list(range(9))
+
+
+def test_work_is_begun_only_so_far_ahead_of_who_takes_its_results() -> None:
+    begun: list[int] = []
+    results = in_threads(lambda number: begun.append(number) or number, count())  # as many as anybody asks for
+    assert [next(results), next(results)] == [0, 1]
+    results.close()
+    assert len(begun) <= 12
