@@ -66,6 +66,15 @@ export function segments(label, ...buttons) {
   return h("div", { class: "segments", role: "group", "aria-label": label }, ...buttons);
 }
 
+/** Bring a line into sight in the list that scrolls around it; where the whole page scrolls, what somebody looks at stays. @param {Element | null} line */
+export function reveal(line) {
+  const around = line?.closest(".scrolled");
+  if (!line || !around || around.scrollHeight <= around.clientHeight) return;
+  const [box, room] = [line.getBoundingClientRect(), around.getBoundingClientRect()];
+  if (box.top < room.top) around.scrollTop -= room.top - box.top;
+  else if (box.bottom > room.bottom) around.scrollTop += Math.min(box.bottom - room.bottom, box.top - room.top);
+}
+
 /**
  * A slider with its name before it, which goes where there is no room.
  * @param {string} text

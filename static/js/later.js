@@ -67,6 +67,9 @@ const PARTS = {
   run: ["job"],
 };
 
+/** The style sheet of one page alone. @type {Record<string, string>} */
+const STYLES = { elevation: "elevation", review: "compare" };
+
 /**
  * Fetch a page that is not here yet; null when there is nothing to wait for.
  * @param {string} page
@@ -74,7 +77,19 @@ const PARTS = {
  */
 export function fetched(page) {
   if (customElements.get(`r2c2r-${page}`)) return null;
-  return fetchAll([...(PARTS[page] ?? []), page].map((part) => `r2c2r-${part}`));
+  const tags = [...(PARTS[page] ?? []), page].map((part) => `r2c2r-${part}`);
+  return Promise.all([fetchAll(tags), styled(STYLES[page])]).then(() => {});
+}
+
+/** Add a style sheet, and wait for it: without it a page would be drawn twice. @param {string | undefined} name @returns {Promise<void>} */
+function styled(name) {
+  const href = `/static/css/${name}.css`;
+  if (!name || document.querySelector(`link[href="${href}"]`)) return Promise.resolve();
+  const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href });
+  return new Promise((done) => {
+    link.onload = link.onerror = () => done();
+    document.head.append(link);
+  });
 }
 
 /** Define them in this order: a page makes its parts. @param {string[]} tags */

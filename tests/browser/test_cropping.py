@@ -14,7 +14,7 @@ from tests.browser.together import Server, signed_in
 
 def crop(page: Page) -> dict[str, Any] | None:
     """What prompts.json says of the mug's box, once all is saved."""
-    expect(page.locator(".stage-tools .chip").nth(1)).to_contain_text("saved")
+    expect(page.locator(".transport .chip").nth(1)).to_contain_text("saved")
     project = page.url.split("/p/")[1].split("/")[0]
     file = page.evaluate(f"async () => (await fetch('/api/projects/{project}/prompts.json')).json()")
     box: dict[str, Any] | None = next(entry for entry in file["objects"] if entry["name"] == "mug_1").get("crop")

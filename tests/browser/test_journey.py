@@ -122,7 +122,7 @@ def test_the_sample_is_seen_while_it_is_made_and_opens_with_its_masks(page: Page
     expect(rendered).to_be_visible()
     assert rendered.evaluate("image => image.naturalWidth") == 480
     page.get_by_role("link", name="Annotate").click(timeout=PATIENCE_MS)
-    expect(page.locator(".stage-tools .chip").first).to_have_text("ready")
+    expect(page.locator(".transport .chip").first).to_have_text("ready")
     rows = page.locator(".object-list > li")
     expect(rows.first).to_contain_text("frames")
     seen = rows.all_inner_texts()

@@ -35,7 +35,7 @@ def test_a_mask_is_painted_kept_and_said_not_to_be_there(new_context: NewContext
     page.mouse.down()
     page.mouse.move(x + 60, y, steps=5)
     page.mouse.up()
-    saved = page.locator(".stage-tools .chip").nth(1)
+    saved = page.locator(".transport .chip").nth(1)
     expect(saved).to_contain_text("saved")
     (painted,) = said(page)
     assert sum(painted["mask"]["runs"]) == painted["mask"]["width"] * painted["mask"]["height"]
@@ -58,7 +58,7 @@ def test_eraser_lasso_polygon_and_keep_each_set_the_frame_right(new_context: New
     page.keyboard.press("1")
     box = box_of(page.locator("r2c2r-frame-canvas canvas"))
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    saved = page.locator(".stage-tools .chip").nth(1)
+    saved = page.locator(".transport .chip").nth(1)
 
     def drag(*path: tuple[float, float]) -> None:
         page.mouse.move(x + path[0][0], y + path[0][1])

@@ -16,6 +16,7 @@ import { say } from "../elements/toasts.js";
  * @property {import("./stage-tools.js").StageTools} tools
  * @property {import("../elements/frame-canvas.js").FrameCanvas} canvas
  * @property {import("../elements/frame-mosaic.js").FrameMosaic} mosaic
+ * @property {import("./layout.js").Layout} layout
  */
 
 /** What a key held down must not do again and again. */
@@ -31,6 +32,7 @@ export const ONE_A_PRESS = [
   "keep",
   "absent",
   "crop",
+  "panels",
 ];
 
 /**
@@ -118,7 +120,7 @@ function changes({ objects, edits, player, pane: { proposals, checklist }, press
  * @param {Doers} doers
  * @returns {import("../keyboard.js").Actions}
  */
-function looks({ objects, masks, player, canvas, tools, evidence, mosaic }) {
+function looks({ objects, masks, player, canvas, tools, evidence, mosaic, layout }) {
   const openMosaic = () => {
     const object = objects.chosen;
     if (!object) return say("Choose an object first.");
@@ -138,6 +140,7 @@ function looks({ objects, masks, player, canvas, tools, evidence, mosaic }) {
     mosaic: openMosaic,
     fit: () => canvas.fit(),
     sign: () => tools.switchSign(),
+    panels: () => layout.fold(),
     evidence: () => (evidence.open = !evidence.open),
     crosshair: () => canvas.showCrosshair(!canvas.crosshair),
   };

@@ -1,9 +1,9 @@
 /**
- * What lies over the frame's upper edge: how things stand, what a click does, how strong the masks are; on a narrow screen the
- * way to depth, shape and comments. Says "opacity", "sign" and "evidence" when they are changed, "paint" what is to be painted.
+ * The rail of tools beside the frame: what a click does, what is painted, how strong the masks are; on a narrow screen the way to
+ * depth, shape and comments. Its status (the segmenter, the last change) stands among the frames, where nothing moves for it. Says "opacity", "sign" and "evidence" when they are changed, "paint" what is to be painted.
  */
 
-import { h, segments, slider } from "../dom.js";
+import { h, icon, segments, slider } from "../dom.js";
 import { SegmenterChip } from "./segmenter-chip.js";
 
 /** @type {[string, string, string][]} */
@@ -13,18 +13,20 @@ const PAINTS = [
   ["lasso", "Lasso", "Draw around what belongs to it (L)"],
   ["polygon", "Polygon", "Click its corners, Enter closes it (O)"],
 ];
-/** @type {[string, string, string][]} */
+/** @type {[string, string, string, string][]} what it says, its icon, its name, what it does */
 const HERE = [
-  ["keep", "Keep", "Its mask in this frame is right: it stands (W)"],
-  ["absent", "Not here", "It is not visible in this frame; again: as found (A)"],
+  ["keep", "check", "Keep", "Its mask in this frame is right: it stands (W)"],
+  ["absent", "eye-off", "Not here", "It is not visible in this frame; again: as found (A)"],
 ];
 
 export class StageTools extends EventTarget {
   segmenter = new SegmenterChip();
   #saved = h("span", { class: "chip", role: "status" });
   #opacity = h("input", { type: "range", min: "0", max: "100", value: "42", "aria-label": "Mask opacity" });
-  #adds = h("button", { type: "button" }, "+ Add");
-  #takes = h("button", { type: "button" }, "− Take away");
+  /** How the segmenter stands, and when the last change was stored. */
+  status = h("div", { class: "status" }, this.segmenter.element, this.#saved);
+  #adds = h("button", { type: "button" }, icon("plus"), "Add");
+  #takes = h("button", { type: "button" }, icon("minus"), "Take away");
   #evidence = h("button", { type: "button", class: "narrow-only", "aria-expanded": "false" }, "Depth, shape, comments");
   #paints = segments(
     "What a drag paints",
@@ -32,27 +34,25 @@ export class StageTools extends EventTarget {
       h(
         "button",
         { type: "button", title, "aria-pressed": "false", "data-tool": tool, onClick: () => this.#paint(tool) },
+        icon(tool),
         text,
       ),
     ),
   );
   #here = segments(
     "This frame",
-    ...HERE.map(([what, text, title]) =>
-      h("button", { type: "button", title, onClick: () => this.#paint(what) }, text),
+    ...HERE.map(([what, shown, text, title]) =>
+      h("button", { type: "button", title, onClick: () => this.#paint(what) }, icon(shown), text),
     ),
   );
   /** @type {0 | 1} what a click says */
   sign = 1;
   element = h(
     "div",
-    { class: "stage-tools" },
-    this.segmenter.element,
-    this.#saved,
-    h("span", { class: "spring" }),
+    { class: "rail", role: "toolbar", "aria-label": "Tools" },
+    segments("What a click does", this.#adds, this.#takes),
     this.#paints,
     this.#here,
-    segments("What a click does", this.#adds, this.#takes),
     slider("Masks", this.#opacity),
     this.#evidence,
   );

@@ -28,6 +28,8 @@ export class FilmStrip extends LiveElement {
   #lanes = h("div", { class: "lanes" });
   #slider = h("input", { type: "range", min: "0", max: "0", value: "0", "aria-label": "Frame" });
   #text = h("output", { class: "mono" });
+  /** What stands beside the number of the frame: how things are, at a width of its own. */
+  status = h("div", { class: "beside" });
   #play = h("button", { type: "button", class: "quiet", "aria-label": "Play or pause" }, icon("play"));
 
   connected() {
@@ -46,7 +48,7 @@ export class FilmStrip extends LiveElement {
     observer.observe(this);
     signal.addEventListener("abort", () => (observer.disconnect(), page.removeProperty("--strip-height")));
     this.replaceChildren(
-      h("div", { class: "transport" }, this.#play, this.#slider, this.#text),
+      h("div", { class: "transport" }, this.#play, this.#slider, this.status, this.#text),
       this.#thumbs,
       this.#lanes,
     );
@@ -185,7 +187,9 @@ export class FilmStrip extends LiveElement {
     this.#opened = opened;
     this.#measure();
     const current = /** @type {HTMLElement | null} */ (this.#lanes.querySelector(".current"));
-    if (current) this.#lanes.scrollTop = current.offsetTop - this.#lanes.offsetTop - this.#lanes.clientHeight / 2;
+    if (!current) return;
+    const above = (this.#lanes.clientHeight - current.offsetHeight) / 2;
+    this.#lanes.scrollTop = current.offsetTop - this.#lanes.offsetTop - above;
   }
 }
 

@@ -4,7 +4,7 @@
  * "lock" ids, "delete" ids, "stop" id, "merge" {id, other}. A line is made anew when what it shows has changed, and painted once it is in sight.
  */
 
-import { h, icon, LiveElement, renew } from "../dom.js";
+import { h, icon, LiveElement, renew, reveal } from "../dom.js";
 import { inkOn } from "../lib/colour.js";
 import { counted, usableName } from "../lib/format.js";
 import { listed, OF_PEOPLE, ORDERS, span, STATES } from "../lib/listing.js";
@@ -102,7 +102,7 @@ export class ObjectList extends LiveElement {
     this.#found.textContent = `${this.#ids.length} of ${entries.length}`;
     this.#bar.show(entries.filter(({ selected }) => selected));
     this.#rove();
-    if (this.#shown !== current) this.#list.querySelector(".current")?.scrollIntoView({ block: "nearest" });
+    if (this.#shown !== current) reveal(this.#list.querySelector(".current"));
     this.#shown = current;
   }
 
@@ -319,16 +319,20 @@ function assigned({ assignee }) {
   return assignee ? h("span", { class: "chip", title: "assigned to" }, `@${assignee}`) : null;
 }
 
-/** @param {Entry} entry */
+/** How far its masks are; what is in `.detail` stands in the line of the current object only. @param {Entry} entry */
 function state({ object, current, sure }) {
   if (!object.points.length && !object.front) return "no click yet";
   const clicks = object.front ? "drawn" : counted(object.points.length, "click");
-  if (object.segment === "running" || object.segment === "waiting") return `${clicks} · finding it in all frames…`;
+  const frames = counted(object.mask_frames, "frame");
+  /** @type {(detail: string, ...told: (Node | string | null)[]) => HTMLElement} */
+  const line = (detail, ...told) =>
+    h("span", { title: `${detail}${told[0]}` }, h("span", { class: "detail" }, detail), ...told);
+  if (object.segment === "running" || object.segment === "waiting")
+    return line(`${clicks} · `, "finding it in all frames…");
   if (object.segment === "failed") return h("span", { class: "chip bad" }, "no mask");
-  if (!object.mask_frames) return clicks;
-  if (object.segment === "partial") return `${clicks} · stopped after ${counted(object.mask_frames, "frame")}`;
-  const text = `${clicks} · ${counted(object.mask_frames, "frame")}${sure === null ? "" : ` · ${Math.round(100 * sure)} % sure`} `;
-  if (!current) return text;
+  if (!object.mask_frames) return line("", clicks);
+  if (object.segment === "partial") return line(`${clicks} · `, `stopped after ${frames}`);
   const drawn = h("span", { class: "chip", title: "the segmenter that drew its masks" }, object.mask_backend);
-  return h("span", {}, text, drawn);
+  if (sure === null) return line(`${clicks} · `, frames, " ", current ? drawn : null);
+  return line(`${clicks} · ${frames} · `, `${Math.round(100 * sure)} % sure`, " ", current ? drawn : null);
 }

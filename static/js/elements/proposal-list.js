@@ -5,7 +5,7 @@
 
 import { getFoundFronts, getProposals, restoreProposals } from "../api.js";
 import { confirmProposals, dismissProposals } from "../changes.js";
-import { detailOf, h, icon, LiveElement, renew } from "../dom.js";
+import { detailOf, h, icon, LiveElement, renew, reveal } from "../dom.js";
 import { Answers } from "../lib/answers.js";
 import { counted } from "../lib/format.js";
 import { alike, kindOf } from "../lib/likeness.js";
@@ -216,7 +216,7 @@ export class ProposalList extends LiveElement {
   #show(item) {
     this.#current = item?.id ?? null;
     this.#draw();
-    this.#list.querySelector(".current")?.scrollIntoView({ block: "nearest" });
+    reveal(this.#list.querySelector(".current"));
     if (item) this.emit("show-frame", item.frame);
     this.emit("proposals-changed");
   }

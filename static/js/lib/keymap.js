@@ -40,6 +40,7 @@ export const KEYMAP = [
   { keys: ["t"], action: "raw", text: "Hold: the frame without masks", page: "annotate" },
   { keys: ["r"], action: "sign", text: "A click adds, or takes away", page: "annotate" },
   { keys: ["e"], action: "evidence", text: "Depth, shape and comments, on a narrow screen", page: "annotate" },
+  { keys: ["\\"], action: "panels", text: "The picture alone with its tools, or everything again", page: "annotate" },
   { keys: ["0"], action: "fit", text: "Fit the frame to the window", page: "annotate" },
   {
     keys: ["1", "2", "3", "4", "5", "6", "7", "8", "9"],

@@ -7,6 +7,7 @@ import { Cropper } from "../annotate/cropper.js";
 import { Contradictions } from "../annotate/contradictions.js";
 import { Edits } from "../annotate/edits.js";
 import { EvidencePane } from "../annotate/evidence-pane.js";
+import { Layout } from "../annotate/layout.js";
 import { LiveMasks } from "../annotate/live-masks.js";
 import { Painter } from "../annotate/painter.js";
 import { ObjectsPane } from "../annotate/objects-pane.js";
@@ -54,6 +55,7 @@ export class AnnotatePage extends LiveElement {
   #pane = new ObjectsPane();
   #evidence = new EvidencePane();
   #mosaic = new FrameMosaic();
+  #layout = new Layout();
   // What ties them together
   #player = new Player(this.#canvas, this.#strip);
   #presses = new Presses(
@@ -74,6 +76,7 @@ export class AnnotatePage extends LiveElement {
     tools: this.#tools,
     canvas: this.#canvas,
     mosaic: this.#mosaic,
+    layout: this.#layout,
   };
   #painter = new Painter({ ...this.#parts });
   #cropper = new Cropper(this.#parts);
@@ -105,18 +108,10 @@ export class AnnotatePage extends LiveElement {
       this.#mosaic,
     ])
       part.project = this.project;
-    const stage = h(
-      "div",
-      { class: "stage" },
-      this.#canvas,
-      this.#cropper.element,
-      this.#tools.element,
-      this.#tip.element,
-    );
-    this.replaceChildren(
-      h("div", { class: "annotate" }, this.#pane.element, stage, this.#evidence.element, this.#strip),
-      this.#mosaic,
-    );
+    const stage = h("div", { class: "stage" }, this.#canvas, this.#cropper.element, this.#tip.element);
+    this.#strip.status.replaceChildren(this.#tools.status);
+    this.#layout.fill(this.#pane.element, this.#tools.element, stage, this.#evidence.element, this.#strip);
+    this.replaceChildren(this.#layout.element, this.#mosaic);
     offerToSkip("Skip to the picture", this.#canvas, this.signal);
     this.#listen();
     this.#player.showFirst(this.project);

@@ -1,0 +1,74 @@
+"""The picture on Annotate is large, and nothing that appears moves it; bars between the panels are a person's own."""
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.looks import picture, serious
+from tests.browser.serving import NewContext, box_of
+from tests.browser.test_together import FRAME, click_frame, ready, rows, sample
+from tests.browser.together import Server, signed_in
+
+
+def share_of_window(page: Page) -> float:
+    """Of the window's pixels that show the frame."""
+    box = box_of(page.locator("r2c2r-frame-canvas canvas"))
+    scale = min(box["width"] / FRAME[0], box["height"] / FRAME[1])
+    return scale**2 * FRAME[0] * FRAME[1] / page.evaluate("innerWidth * innerHeight")
+
+
+def test_nothing_that_appears_moves_the_picture(new_context: NewContext, server: Server) -> None:
+    page = signed_in(new_context(viewport={"width": 1280, "height": 720}), server, "ann")
+    page.goto(f"{sample(page)}/annotate?frame=3")
+    canvas = page.locator("r2c2r-frame-canvas canvas")
+    expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
+    first = box_of(canvas)
+    assert share_of_window(page) >= 0.45
+    ready(page)
+    assert box_of(canvas) == first
+    for k in range(6):
+        page.get_by_role("button", name="New object").click()
+        click_frame(page, 20 + 8 * k, 100)
+        expect(rows(page)).to_have_count(3 + k)
+    expect(page.locator(".transport .chip").nth(1)).to_contain_text("saved")
+    page.keyboard.press("b")  # a tool, of the object that is chosen
+    assert box_of(canvas) == first
+    picture(page, "canvas-1280")
+    server.kill()
+    expect(page.get_by_text("The server does not answer")).to_be_visible()
+    assert box_of(canvas) == first
+
+
+def test_a_bar_between_two_panels_is_where_its_person_left_it(new_context: NewContext, server: Server) -> None:
+    context = new_context(viewport={"width": 1280, "height": 720}, bypass_csp=True)
+    page = signed_in(context, server, "ann")
+    page.goto(f"{sample(page)}/annotate?frame=3")
+    ready(page)
+    pane, canvas = page.locator(".objects-pane"), page.locator("r2c2r-frame-canvas canvas")
+    bar = page.get_by_role("separator", name="Width of the list of objects")
+    before, at = box_of(pane)["width"], box_of(bar)
+    page.mouse.move(at["x"] + 2, at["y"] + 200)
+    page.mouse.down()
+    page.mouse.move(at["x"] + 82, at["y"] + 200, steps=4)
+    page.mouse.up()
+    assert box_of(pane)["width"] == before + 80
+    bar.focus()
+    page.keyboard.press("ArrowLeft")
+    assert box_of(pane)["width"] == before + 64
+    page.reload()
+    ready(page)
+    assert box_of(pane)["width"] == before + 64
+    bar.focus()
+    page.keyboard.press("Enter")
+    expect(pane).to_be_hidden()
+    page.keyboard.press("Enter")
+    assert box_of(pane)["width"] == before + 64
+    share = share_of_window(page)
+    canvas.focus()
+    page.keyboard.press("\\")
+    expect(pane).to_be_hidden()
+    expect(page.get_by_role("complementary", name="Depth, shape and comments")).to_be_hidden()
+    assert share_of_window(page) > share + 0.03
+    picture(page, "canvas-alone")
+    assert serious(page, "annotate, panels folded") == []
+    page.keyboard.press("\\")
+    assert box_of(pane)["width"] == before + 64
+    assert serious(page, "annotate") == []
