@@ -6,7 +6,7 @@
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {{ x: number, y: number, label: number }} Click in pixels of the mask */
 /** @typedef {{ object: number, name: string, mask: MaskBits, pixels: Uint8Array, clicks: Click[] }} Shown pixels: of the mask's box */
-/** @typedef {{ object: number, text: string, mergesWith?: { object: number, name: string } }} Said */
+/** @typedef {{ object: number, text: string, other?: number, mergesWith?: { object: number, name: string } }} Said other: whose mask it shares pixels with */
 
 const OVERLAP = 0.1; // of the smaller mask
 const SAME = 0.5;
@@ -36,11 +36,13 @@ function between(first, second) {
     share >= SAME
       ? {
           object: one.object,
+          other: other.object,
           text: `On the same thing as ${other.name} (${percent} % shared): merge or delete one, or right-click on the other`,
           mergesWith: { object: other.object, name: other.name },
         }
       : {
           object: one.object,
+          other: other.object,
           text: `Shares ${percent} % with ${other.name} here: right-click where ${other.name} is`,
         };
   return [said(first, second), said(second, first)];

@@ -2,6 +2,7 @@
 
 import { getCertificate, getProject, getScene, listJobs, startRun } from "../api.js";
 import { detailOf, h, LiveElement } from "../dom.js";
+import { BeforeRun } from "../elements/before-run.js";
 import { JobPanel } from "../elements/job-panel.js";
 import { certificateCard, sceneTable } from "../elements/results.js";
 import { sayError } from "../elements/toasts.js";
@@ -10,11 +11,15 @@ import { live } from "../live.js";
 
 /** @typedef {import("../api-types").Job} Job */
 
+const SOON_MS = 500;
+
 export class RunPage extends LiveElement {
   project = "";
   #job = new JobPanel();
   #start = h("button", { type: "button", class: "primary" }, "Run");
   #lead = h("p", { class: "muted" });
+  #before = new BeforeRun();
+  #soon = 0;
   #result = h("div", { class: "stack" });
 
   connected() {
@@ -24,6 +29,7 @@ export class RunPage extends LiveElement {
         { class: "page stack" },
         h("header", {}, h("h1", {}, "Run"), this.#start),
         this.#lead,
+        this.#before.element,
         h("section", { class: "card" }, this.#job),
         this.#result,
       ),
@@ -32,6 +38,7 @@ export class RunPage extends LiveElement {
     this.#start.addEventListener("click", () => this.#run(), { signal });
     live.addEventListener("job", (event) => this.#hear(/** @type {{ job: Job }} */ (detailOf(event)).job), { signal });
     live.addEventListener("online", () => this.#load(), { signal });
+    live.addEventListener("segment", (event) => this.#found(detailOf(event)), { signal });
     this.#load();
   }
 
@@ -46,10 +53,18 @@ export class RunPage extends LiveElement {
       this.#lead.textContent = project.counts.objects
         ? `${objects}. ${project.result === "current" ? "The result is up to date: running again does no work." : "Only what changed is computed."}`
         : "Click at least one object on the Annotate page first.";
-      if (project.result !== "none") await this.#drawResult();
+      if (project.result !== "none") await this.#drawResult(project.result);
+      if (project.status === "ready") await this.#before.look(this.project, this.signal);
     } catch (error) {
       sayError(error);
     }
+  }
+
+  /** Masks came to an end: what they contradict may be another in a moment, once others came too. @param {{ state: string }} told */
+  #found({ state }) {
+    if (state !== "done" && state !== "failed") return;
+    clearTimeout(this.#soon);
+    this.#soon = window.setTimeout(() => this.#before.look(this.project, this.signal).catch(sayError), SOON_MS);
   }
 
   async #run() {
@@ -78,7 +93,8 @@ export class RunPage extends LiveElement {
     else if (job) this.#start.disabled = false;
   }
 
-  async #drawResult() {
+  /** @param {"current" | "stale"} result */
+  async #drawResult(result) {
     const [scene, certificate] = await Promise.all([
       getScene(this.project),
       getCertificate(this.project).catch(() => null),
@@ -91,6 +107,7 @@ export class RunPage extends LiveElement {
           "div",
           { class: "row" },
           h("h2", { class: "grow" }, "Result"),
+          result === "stale" ? h("span", { class: "chip warn" }, "older than the last change: run again") : null,
           h("a", { class: "button", href: `/p/${this.project}/review` }, "Review"),
           h("a", { class: "button", href: `/p/${this.project}/download` }, "Download"),
         ),

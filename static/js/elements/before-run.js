@@ -1,0 +1,92 @@
+/** Beside the button that starts a run: objects that contradict each other or were not found, and what is unsure, each with the way there. */
+
+import { getLanes, getMasks, listFrames, listObjects } from "../api.js";
+import { h } from "../dom.js";
+import { framesToLook, spoiling } from "../lib/before-run.js";
+import { contradictionsOn } from "../lib/contradictions.js";
+import { counted } from "../lib/format.js";
+import { decodeBox } from "../lib/masks.js";
+
+/** @typedef {import("../api-types").SceneObject} SceneObject */
+/** @typedef {import("../lib/before-run.js").Told} Told */
+
+export class BeforeRun {
+  element = h("section", { class: "card stack", hidden: true, "aria-label": "Before the run" });
+
+  /** Look at the project's masks as they are now. @param {string} project @param {AbortSignal} signal */
+  async look(project, signal) {
+    const [objects, lanes, frames] = await Promise.all([listObjects(project), getLanes(project), listFrames(project)]);
+    const widths = new Map(frames.map(({ index, width }) => [index, width]));
+    const looked = await Promise.all(
+      framesToLook(lanes).map(async (frame) => {
+        const masks = await getMasks(project, frame, signal);
+        return { frame, said: contradictionsOn(await shown(objects, masks, frame, widths.get(frame) ?? 1)) };
+      }),
+    );
+    if (!signal.aborted) this.#draw(project, objects, spoiling(objects, looked));
+  }
+
+  /**
+   * @param {string} project
+   * @param {SceneObject[]} objects
+   * @param {Told[]} told
+   */
+  #draw(project, objects, told) {
+    const names = new Map(objects.map(({ id, name }) => [id, name]));
+    const lines = (/** @type {Told[]} */ all) =>
+      h(
+        "ul",
+        {},
+        ...all.map(({ object, frame, text }) => {
+          const href = `/p/${project}/annotate?object=${object}${frame === null ? "" : `&frame=${frame}`}`;
+          return h("li", {}, h("a", { href }, names.get(object) ?? ""), `: ${text}`);
+        }),
+      );
+    const unsure = objects.flatMap(({ id, points, doubts }) =>
+      doubts.map((text) => ({ object: id, frame: points[0]?.frame ?? null, text })),
+    );
+    const coming = objects.filter(({ segment }) => segment === "waiting" || segment === "running").length;
+    this.element.hidden = !told.length && !unsure.length && !coming;
+    this.element.replaceChildren(
+      h("h2", {}, told.length ? "Mend this before the run" : "Before the run"),
+      ...(told.length ? [lines(told)] : []),
+      ...(coming
+        ? [h("p", { class: "muted" }, `${counted(coming, "object")} still being found: the run finds what is left.`)]
+        : []),
+      ...(unsure.length
+        ? [
+            h(
+              "details",
+              {},
+              h("summary", {}, `${counted(unsure.length, "doubt")} about sizes and edges`),
+              lines(unsure),
+            ),
+          ]
+        : []),
+    );
+  }
+}
+
+/**
+ * The masks of a frame as contradictions are found in them.
+ * @param {SceneObject[]} objects
+ * @param {import("../api-types").FrameMask[]} masks
+ * @param {number} frame
+ * @param {number} width of the frame
+ */
+function shown(objects, masks, frame, width) {
+  const known = new Map(objects.map((object) => [object.id, object]));
+  return Promise.all(
+    masks.flatMap(({ object, mask }) => {
+      const of = known.get(object);
+      if (!of || !mask.box_width) return [];
+      const here = of.points.filter((point) => point.frame === frame);
+      const clicks = here.map(({ x, y, label }) => ({
+        x: (x * mask.width) / width,
+        y: (y * mask.width) / width,
+        label,
+      }));
+      return [decodeBox(mask).then((pixels) => ({ object, name: of.name, mask, clicks, pixels }))];
+    }),
+  );
+}
