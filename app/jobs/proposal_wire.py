@@ -30,6 +30,7 @@ def proposal_line(proposal: Proposal, preview_width: int) -> dict[str, Any]:
         "y": click.y,
         "size_m": [round(float(side), 3) for side in proposal.size_m],
         "outline": _outline(unpack_mask(proposal.outline)),
+        "doubts": list(proposal.doubts),
         "handle": [list(corner) for corner in proposal.handle_px],
         "mask": mask_bits(proposal.outline, preview_width),
     }

@@ -21,6 +21,7 @@ class Proposal(Shape):
     size_m: list[float]  # width, depth, height
     outline: list[tuple[float, float]]  # in pixels of the stored frame
     handle: list[tuple[float, float]]  # its corners there; empty where none was found
+    doubts: list[str]  # why it is not confirmed together with others
 
 
 class Proposals(Shape):

@@ -15,7 +15,9 @@ from app.jobs.mask_wire import bits_mask
 from app.jobs.proposal_wire import read_proposals
 from app.services import masks, prompts
 from app.services.context import Context
-from r2c2r_core.segment.proposals.propose import is_taken
+from r2c2r_core.segment.contradictions import Params
+from r2c2r_core.segment.proposals.propose import covered_share, is_taken
+from r2c2r_core.tuning import tuned
 
 _SCOPE = "proposals"
 
@@ -23,7 +25,7 @@ _SCOPE = "proposals"
 def current(context: Context, project_id: str) -> schemas.Proposals:
     """What is proposed now."""
     found = _look(context, project_id)
-    left = _without_covered(context, project_id, found.lines)
+    left = _without_covered(context, project_id, found)
     return schemas.Proposals(
         state=found.state,
         fraction=found.fraction,
@@ -75,6 +77,7 @@ class _Found:
     fraction: float
     lines: list[dict[str, Any]]
     dismissed: set[str]
+    names: dict[int | None, str]  # of the project's objects
 
 
 def _look(context: Context, project_id: str) -> _Found:
@@ -87,9 +90,10 @@ def _look(context: Context, project_id: str) -> _Found:
     stored = read_proposals(context.files(project).proposals) if at_work is None else None
     lines = at_work[1] if at_work is not None else stored or []
     left = [line for line in lines if (line["frame"], line["x"], line["y"]) not in clicks]
+    names = {item.id: item.name for item in there}
     if at_work is not None:
-        return _Found("running", at_work[0], left, dismissed)
-    return _Found("none" if stored is None else "done", float(stored is not None), left, dismissed)
+        return _Found("running", at_work[0], left, dismissed, names)
+    return _Found("none" if stored is None else "done", float(stored is not None), left, dismissed, names)
 
 
 def _wanted(context: Context, project_id: str, ids: list[str]) -> list[schemas.Proposal]:
@@ -116,14 +120,20 @@ def _dismissed(session: Session, project_id: str) -> set[str]:
     return set(session.exec(select(proposal).where(*mine, Event.action != "restore", col(Event.id) > restored)))
 
 
-def _without_covered(context: Context, project_id: str, lines: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The proposals that no object's mask covers: what was clicked by hand is proposed no more."""
-    shown = masks.on_frames(context, project_id, {line["frame"] for line in lines})
+def _without_covered(context: Context, project_id: str, found: _Found) -> list[dict[str, Any]]:
+    """The proposals that no object's mask covers, with a doubt where one covers a part."""
+    shown = masks.on_frames(context, project_id, {line["frame"] for line in found.lines})
     left = []
-    for line in lines:
-        near = [found["mask"] for found in shown[line["frame"]] if _may_cover(found["mask"], line["mask"])]
-        if not is_taken(bits_mask(line["mask"]), (bits_mask(mask) for mask in near)):
-            left.append(line)
+    for line in found.lines:
+        outline = bits_mask(line["mask"])
+        near = [one for one in shown[line["frame"]] if _may_cover(one["mask"], line["mask"])]
+        shares = {one["object"]: covered_share(outline, bits_mask(one["mask"])) for one in near}
+        if not any(is_taken(share) for share in shares.values()):
+            most = tuned(Params).overlap
+            partly = [
+                f"shares {100 * share:.0f} % with {found.names.get(number)}" for number, share in shares.items() if share > most
+            ]
+            left.append({**line, "doubts": [*line.get("doubts", ()), *partly]})  # none in files of older versions
     return left
 
 
@@ -139,7 +149,7 @@ def _may_cover(mask: dict[str, Any], outline: dict[str, Any]) -> bool:
 
 
 def _shape(line: dict[str, Any]) -> schemas.Proposal:
-    return schemas.Proposal(**{key: value for key, value in line.items() if key != "mask"})
+    return schemas.Proposal(**{"doubts": [], **{key: value for key, value in line.items() if key != "mask"}})
 
 
 def _tell(context: Context, project_id: str) -> None:

@@ -20,3 +20,4 @@ class Proposal:
     size_m: tuple[float, float, float]  # width, depth, height; the depth of a front is a usual one
     centre_world: Vector3  # of its front, where it has one
     handle_px: tuple[tuple[float, float], ...]  # corners of its handle in that frame; empty where none was found
+    doubts: tuple[str, ...] = ()  # why it should be looked at before it is confirmed; empty for most

@@ -1110,6 +1110,7 @@ export interface Proposal {
   size_m: number[];
   outline: [number, number][];
   handle: [number, number][];
+  doubts: string[];
 }
 
 /** Which proposals are meant. */

@@ -62,6 +62,17 @@ def test_an_object_clicked_by_hand_takes_its_proposal(web: Running) -> None:
     assert [item["category"] for item in left] == ["drawer", "drawer"]
 
 
+def test_a_proposal_that_an_object_covers_in_part_is_doubted(web: Running) -> None:
+    project = web.sample()
+    assert {tuple(item["doubts"]) for item in proposed(web, project)} == {()}
+    click = {**CLICK, "x": 107.5}  # 3 of 10 columns of the bottle's outline, of which 4 would be the same object
+    made = web.post(f"/api/projects/{project}/objects", {"category": "bottle", "points": [click]}, 201)
+    web.until(lambda: web.get(f"/api/projects/{project}/objects")[-1]["segment"] == "done")
+    *drawers, bottle = proposed(web, project)
+    assert bottle["doubts"] == [f"shares 30 % with {made['name']}"]
+    assert [item["doubts"] for item in drawers] == [[], []]
+
+
 def test_those_like_an_object_are_confirmed_under_its_category(web: Running) -> None:
     project = web.sample()
     ids = [item["id"] for item in proposed(web, project)[:2]]

@@ -6,7 +6,7 @@ from playwright.sync_api import expect
 
 from tests.browser.looks import picture
 from tests.browser.serving import NewContext, wait_for_toast
-from tests.browser.test_together import sample
+from tests.browser.test_together import click_frame, rows, sample
 from tests.browser.together import Server, signed_in
 
 
@@ -56,3 +56,20 @@ def test_a_key_confirms_the_next_proposal_undo_takes_it_back_and_another_dismiss
     expect(rows).to_have_count(1)
     expect(objects).not_to_contain_text("finding it")
     picture(page, "15-all-confirmed")
+
+
+def test_what_is_doubted_is_not_confirmed_with_the_others(new_context: NewContext, server: Server) -> None:
+    page = signed_in(new_context(viewport={"width": 1280, "height": 1000}), server, "ann")
+    page.goto(f"{sample(page)}/annotate?frame=3")
+    proposals = page.get_by_label("Proposals", exact=True)
+    expect(proposals.get_by_role("button", name="Confirm 2")).to_be_visible()  # of at least 80 %
+    page.get_by_role("button", name="New object").click()
+    click_frame(page, 38, 60)  # its mask takes a part of the first drawer's
+    expect(rows(page)).to_have_count(3)
+    page.keyboard.press("Escape")
+    expect(proposals.get_by_role("button", name="Confirm 1")).to_be_visible()
+    expect(proposals).to_contain_text("1 proposal left out, to be looked at one by one: drawer shares")
+    picture(page, "proposal-left-out")
+    page.keyboard.press("Shift+Y")
+    expect(rows(page)).to_have_count(4)
+    expect(proposals.get_by_role("listitem")).to_have_count(2)

@@ -138,7 +138,11 @@ test("numbers read well", () => {
 
 test("proposals are walked round the end, past those about to go", () => {
   const items = /** @type {any[]} */ (
-    ["a", "b", "c"].map((id, k) => ({ id, confidence: 0.9 - 0.3 * k }))
+    ["a", "b", "c"].map((id, k) => ({
+      id,
+      confidence: 0.9 - 0.3 * k,
+      doubts: [],
+    }))
   );
   const step = (
     /** @type {string | null} */ current,
@@ -151,10 +155,14 @@ test("proposals are walked round the end, past those about to go", () => {
   assert.equal(step("a", -1), "c");
   assert.equal(step("a", 1, "a", "b"), "c");
   assert.equal(step("a", 1, "a", "b", "c"), undefined);
-  assert.deepEqual(
-    surest(items, 0.6).map((item) => item.id),
-    ["a", "b"],
-  );
+  const ids = (/** @type {any[]} */ all) => all.map((item) => item.id);
+  assert.deepEqual(ids(surest(items, 0.6).sure), ["a", "b"]);
+  const [first, second] = [
+    { ...items[0], doubts: ["overlaps a drawer"] },
+    items[1],
+  ];
+  assert.deepEqual(ids(surest([first, second], 0.6).sure), ["b"]); // a person looks at the other first
+  assert.deepEqual(ids(surest([first, second], 0.6).leftOut), ["a"]);
 });
 
 test("frames that stand out are marked in the strips", () => {

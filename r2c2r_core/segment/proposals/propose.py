@@ -50,6 +50,12 @@ class Params:
     larger_m: float = param(0.05, "m", "by which what a click gives may be larger besides")
     odd_size: float = param(8.0, "ratio", "of squared deviations from the usual size by which confidence falls to 1/e", gt=0)
     taken_share: float = param(0.4, "share", "of an outline that other proposals may cover")
+    clash_m: float = param(
+        0.01,
+        "m",
+        "by which two fronts overlap, both ways, from which one is doubted",
+        source="edges of right ones are 2 mm off",
+    )
     tall_m: float = param(1.25, "m", "height of a refrigerator's front, at least")
     least_seen_m: float = param(0.12, "m", "side of a microwave's front, of which glass may leave little")
 
@@ -71,6 +77,7 @@ def propose_steps(prepared: PreparedCapture) -> Steps:
     for position, panel in enumerate(wanted):
         proposal = _present_panel(prepared, panel)
         if proposal is not None:
+            proposal = replace(proposal, doubts=clashes(panel, shown))
             found.append(proposal)
             shown.append((proposal, panel))
         yield 0.5 + 0.3 * (position + 1) / len(wanted), _ranked(found)
@@ -83,10 +90,15 @@ def propose_steps(prepared: PreparedCapture) -> Steps:
     yield 1.0, _ranked(found)
 
 
-def is_taken(outline: Mask, masks: Iterable[Mask]) -> bool:
-    """Whether one of the masks (of clicked objects, in the proposal's frame, at the outline's size) already covers it."""
-    enough = tuned(Params).taken_share * np.count_nonzero(outline)
-    return any(np.count_nonzero(outline & mask) > enough for mask in masks)
+def is_taken(share: float) -> bool:
+    """Whether a mask that covers so much of a proposal's outline is of the same object."""
+    return share > tuned(Params).taken_share
+
+
+def covered_share(outline: Mask, mask: Mask) -> float:
+    """Share 0..1 of a proposal's outline that is in a mask of the same frame and size."""
+    size = int(np.count_nonzero(outline))
+    return int(np.count_nonzero(outline & mask)) / size if size else 0.0
 
 
 def _least(category: str) -> float:
@@ -127,6 +139,20 @@ def _covers(panel: Panel, point: Vector3) -> bool:
     local = panel.run.region.world_from_plane.rotation.T @ (point - panel.centre)
     width, height = panel.size_m
     return bool(abs(local[1]) < tuned(Params).same_plane_m and abs(local[0]) < width / 2 and abs(local[2]) < height / 2)
+
+
+def clashes(panel: Panel, others: Iterable[tuple[Proposal, Panel]]) -> tuple[str, ...]:
+    """In which fronts that were proposed before it a panel lies in part: no two fronts share a place."""
+    params = tuned(Params)
+    width, height = panel.size_m
+    doubts = []
+    for proposal, other in others:
+        x, off, z = panel.run.region.world_from_plane.rotation.T @ (other.corners - panel.centre).T
+        across = min(x.max(), width / 2) - max(x.min(), -width / 2)
+        down = min(z.max(), height / 2) - max(z.min(), -height / 2)
+        if np.abs(off).max() < params.same_plane_m and min(across, down) > params.clash_m:
+            doubts.append(f"overlaps the proposed {proposal.category} beside it by {100 * min(across, down):.0f} cm")
+    return tuple(doubts)
 
 
 def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:

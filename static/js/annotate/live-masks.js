@@ -7,6 +7,7 @@
 import { getLanes, getMasks, getOpenings } from "../api.js";
 import { detailOf } from "../dom.js";
 import { say, sayError } from "../elements/toasts.js";
+import { Meanwhile } from "../lib/meanwhile.js";
 import { live } from "../live.js";
 import { Masks } from "./masks.js";
 
@@ -18,6 +19,7 @@ export class LiveMasks extends EventTarget {
   stored = new Masks();
   /** @type {import("../api-types").Opening[]} how fronts were filmed to move */
   openings = [];
+  #meanwhile = new Meanwhile();
 
   /** @param {AbortSignal} signal */
   listen(signal) {
@@ -27,9 +29,11 @@ export class LiveMasks extends EventTarget {
 
   /** On which frames each object is seen; masks themselves are asked for frame by frame. */
   async load() {
-    const [lanes, openings] = await Promise.all([getLanes(this.project), getOpenings(this.project)]);
-    this.stored.fill(lanes);
-    this.#open(openings);
+    const both = Promise.all([getLanes(this.project), getOpenings(this.project)]);
+    await this.#meanwhile.during(both, ([lanes, openings]) => {
+      this.stored.fill(lanes);
+      this.#open(openings);
+    });
   }
 
   /**
@@ -53,7 +57,7 @@ export class LiveMasks extends EventTarget {
 
   /** @param {FrameMask} mask */
   #receive(mask) {
-    this.stored.receive(mask);
+    this.#meanwhile.take(() => this.stored.receive(mask));
     this.#say("masks", { frame: mask.frame });
     this.#say("grown", { object: mask.object });
   }
@@ -69,7 +73,7 @@ export class LiveMasks extends EventTarget {
   #told({ object, restart, state, error }) {
     if (state === "done") getOpenings(this.project).then((openings) => this.#open(openings), sayError);
     if (restart) {
-      this.stored.restart(object);
+      this.#meanwhile.take(() => this.stored.restart(object));
       this.#say("masks", { frame: null });
     }
     if (error) say(error.message, { kind: "bad", hint: error.hint });

@@ -40,6 +40,7 @@ export class ProposalList extends LiveElement {
   );
   #every = h("button", { type: "button" });
   #bulk = h("div", { class: "row" }, this.#every, h("span", { class: "muted" }, "at least"), this.#least);
+  #leftOut = h("p", { class: "doubt", hidden: true });
   #restore = h("button", { type: "button", class: "quiet" });
   #others = h("button", { type: "button", class: "quiet", onClick: () => this.findLike(null) }, "All proposals");
   #timer = 0;
@@ -58,6 +59,7 @@ export class ProposalList extends LiveElement {
         this.#note,
         this.#others,
         this.#bulk,
+        this.#leftOut,
         this.#list,
         this.#restore,
       ),
@@ -159,7 +161,7 @@ export class ProposalList extends LiveElement {
   }
 
   confirmAll() {
-    const ids = surest(this.#items, Number(this.#least.value)).map((item) => item.id);
+    const ids = surest(this.#items, Number(this.#least.value)).sure.map((item) => item.id);
     if (ids.length) this.#confirm(ids);
   }
 
@@ -245,13 +247,15 @@ export class ProposalList extends LiveElement {
   #draw() {
     this.#drawState();
     const items = this.#items;
-    const sure = surest(items, Number(this.#least.value)).length;
+    const { sure, leftOut } = surest(items, Number(this.#least.value));
     for (const option of this.#least.options)
       option.text = `${Math.round(100 * Number(option.value))} % ${this.#like ? "alike" : "sure"}`;
     this.#bulk.hidden = !items.length;
     this.#others.hidden = !this.#like;
-    this.#every.textContent = sure ? `Confirm ${sure}` : "None";
-    this.#every.disabled = sure === 0;
+    this.#every.textContent = sure.length ? `Confirm ${sure.length}` : "None";
+    this.#every.disabled = sure.length === 0;
+    this.#leftOut.hidden = !leftOut.length;
+    this.#leftOut.textContent = `${counted(leftOut.length, "proposal")} left out, to be looked at one by one: ${leftOut.map(({ category, doubts }) => `${category} ${doubts[0]}`).join("; ")}.`;
     renew(this.#list, ...items.map((item) => this.#row(item)));
     this.#restore.hidden = this.#all.dismissed === 0;
     this.#restore.textContent = `Bring back ${this.#all.dismissed} dismissed`;
@@ -291,6 +295,7 @@ export class ProposalList extends LiveElement {
       h("strong", {}, item.category),
       " ",
       h("span", { class: "muted" }, about),
+      ...item.doubts.map((text) => h("span", { class: "doubt" }, text)),
     );
     pick.addEventListener("click", () => this.#show(item));
     const yes = h("button", { type: "button", class: "quiet", "aria-label": `Confirm the ${name}` }, icon("check"));

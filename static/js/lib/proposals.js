@@ -21,10 +21,12 @@ export function neighbour(items, current, step, without = new Set()) {
 }
 
 /**
- * In whole percent, as they are shown.
+ * Those sure enough to be confirmed together, in whole percent as they are shown, and those left out though they are that sure:
+ * something speaks against each, which a person should look at.
  * @param {Proposal[]} items
  * @param {number} least confidence 0..1
  */
 export function surest(items, least) {
-  return items.filter((item) => Math.round(100 * item.confidence) >= Math.round(100 * least));
+  const sure = items.filter((item) => Math.round(100 * item.confidence) >= Math.round(100 * least));
+  return { sure: sure.filter(({ doubts }) => !doubts.length), leftOut: sure.filter(({ doubts }) => doubts.length) };
 }

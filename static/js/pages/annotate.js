@@ -23,6 +23,7 @@ import { FrameCanvas } from "../elements/frame-canvas.js";
 import { FrameMosaic } from "../elements/frame-mosaic.js";
 import { say, sayError } from "../elements/toasts.js";
 import { Commands, isForPage } from "../keyboard.js";
+import { Meanwhile } from "../lib/meanwhile.js";
 import { partedText } from "../lib/parted.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
@@ -41,6 +42,7 @@ export class AnnotatePage extends LiveElement {
   // What is known
   #objects = new SceneObjects();
   #masks = new LiveMasks();
+  #meanwhile = new Meanwhile();
   #contradictions = new Contradictions(this.#objects, this.#masks.stored);
   #edits = new Edits(this.#objects);
   /** @type {string[]} */
@@ -219,7 +221,9 @@ export class AnnotatePage extends LiveElement {
     this.#on(this.#edits, "making", ({ name, coming }) => this.#pane.checklist.making(name, coming));
     this.#on(this.#edits, "clicks", () => this.#picture.drawMarkers());
     this.#on(this.#edits, "saved", ({ text, tone }) => this.#tools.saved(text, tone));
-    this.#on(live, "object", ({ object }) => object.project === this.project && this.#objects.store(object));
+    this.#on(live, "object", ({ object }) => {
+      if (object.project === this.project) this.#meanwhile.take(() => this.#objects.store(object));
+    });
     this.#on(live, "project", () => this.#player.frame && this.#relist().catch(sayError));
     this.#on(live, "parted", ({ name, others }) => say(partedText(name, others)));
     this.#on(live, "live", ({ status }) => this.#tools.segmenter.show(status));
@@ -269,8 +273,8 @@ export class AnnotatePage extends LiveElement {
   }
 
   async #reload() {
-    const [objects] = await Promise.all([api.listObjects(this.project), this.#masks.load()]);
-    this.#objects.fill(objects);
+    const listed = Promise.all([api.listObjects(this.project), this.#masks.load()]).then(([objects]) => objects);
+    await this.#meanwhile.during(listed, (objects) => this.#objects.fill(objects));
     this.#fetchMasks();
   }
 

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -7,12 +8,13 @@ from r2c2r_core.geometry.masks import mask_iou, unpack_mask
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
+from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.mosaics.handles import GridHandle
 from r2c2r_core.segment.proposals import panels
 from r2c2r_core.segment.proposals.naming import FrontLook, name_front, name_thing
-from r2c2r_core.segment.proposals.propose import is_taken
+from r2c2r_core.segment.proposals.propose import clashes, covered_share, is_taken
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import DOORS, DRAWERS
 
@@ -79,7 +81,26 @@ def test_a_clicked_object_takes_its_proposal_and_no_other(proposals: tuple[Propo
         masks = {name: masks[proposal.click.frame] for name, masks in boxes[1].items()}
         own = name_of(proposal, boxes[1])
         for name, mask in masks.items():
-            assert is_taken(unpack_mask(proposal.outline), [mask]) == (name == own)
+            assert is_taken(covered_share(unpack_mask(proposal.outline), mask)) == (name == own)
+
+
+def test_fronts_that_overlap_are_doubted_and_neighbours_are_not(
+    proposals: tuple[Proposal, ...], session: GeometricSession
+) -> None:
+    assert {proposal.doubts for proposal in proposals} == {()}
+    drawer = next(proposal for proposal in proposals if proposal.category == "drawer")
+    found = session.find(ObjectPrompt(name="any", category="drawer", points=(drawer.click,)))
+    assert isinstance(found, FoundFront)
+    cell, cell_m = found.front.cell, found.front.run.grid.cell_m
+    panel = panels.Panel(found.front, "drawer", 0.9)
+
+    def beside(overlap_m: float) -> panels.Panel:
+        move = cell.width - overlap_m / cell_m
+        shifted = replace(cell, left=cell.left + move, right=cell.right + move)
+        return panels.Panel(replace(found.front, cell=shifted), "drawer", 0.8)
+
+    assert clashes(beside(0.003), [(drawer, panel)]) == ()
+    assert clashes(beside(0.03), [(drawer, panel)]) == ("overlaps the proposed drawer beside it by 3 cm",)
 
 
 def bar(width: float, height: float) -> GridHandle:
