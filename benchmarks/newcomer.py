@@ -8,6 +8,7 @@ picture within 5 s, or no mask within 60 s.
 """
 
 import argparse
+import re
 import sys
 import tempfile
 import time
@@ -47,7 +48,7 @@ def newcomer(data: Path, picture: Path | None) -> dict[str, Any]:
         seen("read_s")
         page.get_by_role("link", name="Annotate").click()
         rows = page.locator(".object-list > li")
-        expect(rows.filter(has_text="frame").first).to_be_visible()
+        expect(page.get_by_role("img", name=re.compile("seen in [1-9]")).first).to_be_visible()
         seen("first_mask_s")
         expect(page.locator(".transport .chip").first).to_have_text("ready")
         seen("all_masks_s")

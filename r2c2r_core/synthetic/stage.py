@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -101,12 +101,15 @@ def write_sample(
         scene = scenes(number, shots[number], frames)
         return _take_frame(scene, shots[number], cameras[number], white, rng, number, folders)
 
+    def taken() -> Iterator[_Taken]:
+        for frame in in_threads(take, range(frames)):
+            show(frame.rgb)  # before it is reported, so that whoever hears of it can look
+            yield frame
+
     with Record3DWriter(path=paths.scan, fps=round(frames / SECONDS)) as writer:
-        taken = in_threads(take, range(frames))
-        for number, frame in enumerate(progress.part(0.1, 1.0).each(taken, "frame", frames)):
+        for number, frame in enumerate(progress.part(0.1, 1.0).each(taken(), "frame", frames)):
             shot, camera = shots[number], cameras[number]
             writer.add(frame.rgb, frame.lidar.depth_m, frame.lidar.confidence, camera, poses[number], shot.timestamp_s)
-            show(frame.rgb)
             sightings.add(
                 number, frame.view, frame.ids, frame.is_handle, frame.is_front, camera, shot.kitchen_from_camera, frame.rng
             )
