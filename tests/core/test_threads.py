@@ -2,6 +2,7 @@ import threading
 from itertools import count
 
 from r2c2r_core.threads import in_threads
+from tests.waiting import PATIENCE_S
 
 
 def test_results_come_in_order_whatever_ends_first() -> None:
@@ -9,7 +10,7 @@ def test_results_come_in_order_whatever_ends_first() -> None:
 
     def work(number: int) -> int:
         if number == 0:
-            assert second_ended.wait(60)
+            assert second_ended.wait(PATIENCE_S)
         elif number == 1:
             second_ended.set()
         return number
