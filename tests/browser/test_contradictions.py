@@ -47,7 +47,7 @@ def test_a_thing_that_is_too_large_is_said_at_the_click_with_what_mends_it(new_c
         page.get_by_role("button", name="New object").click()
         click_frame(page, 20, 60)
         expect(rows(page)).to_have_count(3)
-        said = rows(page).last.locator(".contradicted")
+        said = rows(page).last.locator(".contradicted", has_text="m wide")
         expect(said.first).to_contain_text("0.80 m wide")
         expect(said.first).to_contain_text("click off it where its mask goes too far")
 
@@ -63,7 +63,7 @@ def test_a_size_that_its_category_does_not_have_is_said_at_the_click_with_what_m
         page.get_by_role("button", name="New object").click()
         click_frame(page, 20, 60)
         expect(rows(page)).to_have_count(3)
-        said = rows(page).last.locator(".contradicted")
+        said = rows(page).last.locator(".contradicted", has_text="m high")  # beside that it is on the stand-in's one panel
         expect(said).to_contain_text("1.20 m high")
         expect(said).to_contain_text("click each as an object of its own; else correct its category")
         picture(page, "doubt")
