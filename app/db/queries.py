@@ -190,13 +190,15 @@ def job_shapes(session: Session, rows: Sequence[Job]) -> list[schemas.Job]:
     """Jobs as they go over the wire."""
     of = select(Project.id, Project.name, Project.source_path).where(col(Project.id).in_({row.project_id for row in rows}))
     projects = {number: (name, source) for number, name, source in session.exec(of)}
-    waiting: list[int | None] = []
+    waiting: list[tuple[int | None, str]] = []
     if any(row.state == "queued" for row in rows):
-        waiting = list(session.exec(select(Job.id).where(Job.state == "queued").order_by(col(Job.id))))
+        waiting = list(session.exec(select(Job.id, Job.kind).where(Job.state == "queued").order_by(col(Job.id))))
     return [_job_shape(row, *projects.get(row.project_id, ("", None)), waiting) for row in rows]
 
 
-def _job_shape(row: Job, name: str, source: str | None, waiting: list[int | None]) -> schemas.Job:
+def _job_shape(row: Job, name: str, source: str | None, waiting: list[tuple[int | None, str]]) -> schemas.Job:
+    reads = row.kind in READS_RECORDING  # imports and runs do not wait for each other
+    before = [number for number, kind in waiting if (kind in READS_RECORDING) == reads]
     return schemas.Job(
         id=row.id or 0,
         project=row.project_id,
@@ -210,7 +212,7 @@ def _job_shape(row: Job, name: str, source: str | None, waiting: list[int | None
         eta_s=row.eta_s,
         message=row.message,
         error=schemas.ErrorBody(**row.error) if row.error else None,
-        position=waiting.index(row.id) + 1 if row.id in waiting else None,
+        position=before.index(row.id) + 1 if row.id in before else None,
         no_retry=no_retry(row.kind, source),
         attempts=row.attempts,
         who=row.who,

@@ -13,7 +13,7 @@ from sqlalchemy import Engine, text
 from sqlmodel import Session, col, delete, or_, select, update
 
 from app.db.engine import is_shared, now, reading, writing
-from app.db.queries import STAGES, job_row, job_shapes, note_size, project_row
+from app.db.queries import READS_RECORDING, STAGES, job_row, job_shapes, note_size, project_row
 from app.db.tables import Job, JobEvent, Part, Project
 from app.errors import NotFound, told_body
 from app.files import ProjectFiles, project_files, require_free
@@ -42,7 +42,7 @@ Ender = Callable[[Session, Job, Project, ProjectFiles], None]
 _CLAIM = (
     "UPDATE jobs SET state='running', owner=:owner, attempts=attempts+1, started=COALESCE(started, :now), "
     "heartbeat=:now, error=NULL, stage='', stage_fraction=0 "
-    "WHERE id=(SELECT id FROM jobs AS waiting WHERE state='queued' AND NOT EXISTS (SELECT 1 FROM jobs AS other "
+    "WHERE id=(SELECT id FROM jobs AS waiting WHERE state='queued'{kinds} AND NOT EXISTS (SELECT 1 FROM jobs AS other "
     "WHERE other.project_id=waiting.project_id AND other.state IN ('running', 'cancelling')) ORDER BY id LIMIT 1{locked}) "
     "RETURNING id"
 )
@@ -61,7 +61,9 @@ class JobRows:
         self.engine, self.hub, self.settings, self.store = engine, hub, settings, store
         self.owner = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(4)}"
         self.shared = is_shared(engine)
-        self._claim = text(_CLAIM.format(locked=" FOR UPDATE SKIP LOCKED" if self.shared else ""))
+        locked = " FOR UPDATE SKIP LOCKED" if self.shared else ""
+        self._claim = text(_CLAIM.format(kinds="", locked=locked))
+        self._claim_import = text(_CLAIM.format(kinds=f" AND kind IN {READS_RECORDING}", locked=locked))
         self._finishers, self._ended = finishers, ended
 
     def recover(self) -> None:
@@ -100,10 +102,11 @@ class JobRows:
         for row in left:
             self._tell_end(row.id or 0)
 
-    def claim(self) -> int | None:
+    def claim(self, *, imports_only: bool = False) -> int | None:
         """Take the oldest waiting job whose project's workspace nobody writes; no two threads or servers get the same one."""
+        claim = self._claim_import if imports_only else self._claim
         with writing(self.engine) as session:
-            found = session.execute(self._claim, {"owner": self.owner, "now": now(session)}).first()
+            found = session.execute(claim, {"owner": self.owner, "now": now(session)}).first()
         return int(found[0]) if found else None
 
     def beat(self) -> dict[int, bool]:

@@ -1,4 +1,4 @@
-"""The queue: durable rows, one process per stage, at most `heavy_jobs` at a time.
+"""The queue: durable rows, one process per stage, at most `heavy_jobs` at a time, and one import beside them.
 
 A job belongs to the server that runs it. When a server dies, the next one ends what it left running and queues its jobs
 again; finished stages are found in the workspace, so little is done twice. Servers that share a database say every few seconds
@@ -73,8 +73,11 @@ class Runner:
         if self.rows.shared:
             self._seat.join()
         self.rows.recover()
-        for number in range(self.settings.heavy_jobs):
-            thread = threading.Thread(target=self._loop, name=f"jobs-{number}", daemon=True)
+        lanes = [(f"jobs-{number}", False) for number in range(self.settings.heavy_jobs)]
+        if lanes:
+            lanes.append(("jobs-import", True))
+        for name, imports_only in lanes:
+            thread = threading.Thread(target=self._loop, args=(imports_only,), name=name, daemon=True)
             thread.start()
             self._threads.append(thread)
         if self.rows.shared:
@@ -123,7 +126,7 @@ class Runner:
             time.sleep(0.02)
         return False
 
-    def _loop(self) -> None:
+    def _loop(self, imports_only: bool) -> None:
         unfinished: int | None = None  # a job whose end could not be written: a full disk, say
         away: Unavailable | None = None  # why it has no end yet: what it needs is not there now
         while not self._stopping.is_set():
@@ -137,9 +140,9 @@ class Runner:
                     unfinished = away = None
                     continue
                 takes = not self.draining and self._has_memory()
-                job_id = self.rows.claim() if takes else None
+                job_id = self.rows.claim(imports_only=imports_only) if takes else None
                 if job_id is None:
-                    if not (takes and self._sharing.help()):
+                    if imports_only or not (takes and self._sharing.help()):
                         self._wake.wait(1.0)
                         self._wake.clear()
                     continue

@@ -18,6 +18,9 @@ from r2c2r_core.segment.stage import SEGMENTERS
 PALETTE = [  # Okabe-Ito first, then tones that keep 3:1 against them on light and dark frames
     "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00",
     "#cc79a7", "#9467bd", "#8c564b", "#17becf", "#bcbd22", "#7f7f7f",
+    # then, of sRGB, always the one farthest in OKLab from all before it (0.14 at least): 24 objects have a colour each
+    "#ff00ff", "#0000ff", "#ffc3e1", "#00ff00", "#6900b4", "#006900",
+    "#c30078", "#a500ff", "#78f0c3", "#ff87ff", "#00c300", "#5a5aff",
 ]  # fmt: skip
 
 

@@ -180,6 +180,17 @@ def test_one_heavy_job_at_a_time_and_the_others_know_their_place(web: Running) -
     assert web.job(jobs[2], "done")["state"] == "done"
 
 
+def test_an_import_does_not_wait_for_a_run(web: Running) -> None:
+    first, second = web.sample(), web.sample()
+    folder = behave(web, first, segment="hang")
+    run(web, first)
+    web.until(lambda: (folder / "hanging").exists())
+    waiting = run(web, second)
+    imported = web.sample()  # is ready while one run is at work and another waits
+    assert web.get(f"/api/projects/{imported}")["status"] == "ready"
+    assert web.get(f"/api/jobs/{waiting}")["position"] == 1
+
+
 def test_a_project_has_one_job_at_a_time_and_what_it_was_given_stays(start: Callable[..., Any]) -> None:
     with start(heavy_jobs=2) as web:
         project, other = web.sample(), web.sample()
