@@ -143,14 +143,16 @@ def _shared_px(a: PackedMask, b: PackedMask) -> int:
 
 def _disobeyed(track: MaskTrack, prompt: ObjectPrompt, params: Params) -> Iterator[Contradiction]:
     """Clicks on it that its mask leaves out, and clicks off it that its mask takes in."""
+    corrected = {frame.frame for frame in prompt.frames}  # a person says what is seen of it there
     for point in prompt.points:
         packed = track.masks.get(point.frame)
-        if packed is None:
+        if packed is None and (point.label == 0 or point.frame in corrected):
             continue
-        mask, reach = unpack_mask(packed), params.near_click * packed.width
-        if point.label == 1 and not _near(mask, point, reach):
+        if packed is None:
+            said, mend = "is on it, and nothing of it is seen in that frame", "delete it, or click where it has depth"
+        elif point.label == 1 and not _near(unpack_mask(packed), point, params.near_click * packed.width):
             said, mend = "is on it, and its mask leaves that out", "take it away, or click nearer to its middle"
-        elif point.label == 0 and _within(mask, point):
+        elif point.label == 0 and _within(unpack_mask(packed), point):
             said, mend = "is off it, and its mask takes that in", "click off it in a second place there"
         else:
             continue

@@ -12,10 +12,11 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Image, Points, Vector3
-from r2c2r_core.geometry.camera import pixel_rays
-from r2c2r_core.geometry.visibility import DepthNoise
+from r2c2r_core.geometry.camera import Intrinsics, pixel_rays
+from r2c2r_core.geometry.visibility import DepthNoise, look_up
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.segment.holes import find_rim
 from r2c2r_core.segment.surface import SurfaceParts, draw, drawn_size, parts_of
 from r2c2r_core.threads import in_threads
 from r2c2r_core.tuning import param, tuned
@@ -27,7 +28,7 @@ _IMAGE_CACHE_BYTES = 500_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What sensors mistrust beside a step of the depth."""
+    """What sensors mistrust beside a step of the depth, and what lies in a hole of it."""
 
     step_px: float = param(
         6.0,
@@ -37,6 +38,11 @@ class Params:
         source="phones drop 2-5 pixels at either side of a step",
     )
     step_m: float = param(0.08, "m", "between the depths of its two sides", gt=0, source="handles stand out by up to 5 cm")
+    level_m: float = param(0.02, "m", "off a level surface, within which what is round a hole in the depth is on it", gt=0)
+    level_share: float = param(
+        0.5, "share", "of what is round such a hole, above which that is in a level surface, such as a glass hob's worktop"
+    )
+    asked_frames: int = param(24, "count", "of frames, spread over the recording, that may have looked through a hole", ge=1)
 
 
 @dataclass(slots=True, eq=False)
@@ -109,7 +115,10 @@ class Scene:
         return self._filled.get(frame_index, self._fill_depth)
 
     def pick(self, frame_index: int, x_px: float, y_px: float) -> Vector3 | None:
-        """World point under a pixel of the colour image: sensor depth, else the fused surface, else None."""
+        """World point under a pixel of the colour image; None where nothing is known.
+
+        Sensor depth; in a hole of it the level surface round it (a glass hob), else the fused surface.
+        """
         frame = self.frame(frame_index)
         depth = self._depth_near(frame_index, x_px, y_px)
         if depth is None:
@@ -161,16 +170,57 @@ class Scene:
         beside = self.depth_at_step(frame_index, x_px, y_px)
         if beside is not None:
             return beside
-        for image, reach in ((self.depth(frame_index), 1), (self.surface_depth(frame_index, drawn_size(camera)), 1)):
-            height, width = image.shape
-            column = min(int(x_px * width / camera.width), width - 1)
-            row = min(int(y_px * height / camera.height), height - 1)
-            if image[row, column] > 0:
-                return float(image[row, column])
-            patch = image[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) : column + reach + 1]
-            if (patch > 0).any():
-                return float(np.median(patch[patch > 0]))
-        return None
+        measured = _value_near(self.depth(frame_index), camera, x_px, y_px)
+        if measured is not None:
+            return measured
+        fused = _value_near(self.surface_depth(frame_index, drawn_size(camera)), camera, x_px, y_px)
+        level = self._level_depth(frame_index, x_px, y_px)
+        return level if fused is None or (level is not None and level < fused) else fused
+
+    def _level_depth(self, frame_index: int, x_px: float, y_px: float) -> float | None:
+        """Depth at a pixel without any of the level surface that most of the hole's rim lies in, on all sides of the pixel.
+
+        None where there is no such surface, or other frames look through it. Through a glass hob, which returns no light
+        to any frame, the fused surface shows what is behind the worktop.
+        """
+        params, frame = tuned(Params), self.frame(frame_index)
+        rim = find_rim(frame, self.depth(frame_index), x_px, y_px)
+        if rim is None or len(rim.points) == 0:
+            return None
+        heights = np.sort(rim.points[:, 2])
+        ends = np.searchsorted(heights, heights + 2 * params.level_m, side="right")
+        level_m = heights[int(np.argmax(ends - np.arange(len(heights))))] + params.level_m
+        flush = np.abs(rim.points[:, 2] - level_m) <= params.level_m
+        if flush.mean() < params.level_share or not rim.encloses(flush):
+            return None
+        level_m = float(np.median(rim.points[flush, 2]))
+        ray = frame.world_from_camera.rotation @ pixel_rays(np.array([x_px, y_px]), frame.rgb_camera)
+        depth = (level_m - frame.world_from_camera.translation[2]) / ray[2]
+        place = frame.world_from_camera.translation + depth * ray
+        return None if self._seen_through(place) else float(depth)
+
+    def _seen_through(self, point_world: Vector3) -> bool:
+        """Whether most frames that measured anything at or behind a world point measured it behind."""
+        margin_m, before = tuned(Params).step_m, self.seen_from_all(point_world)[:, 2] > 0
+        ahead = [frame for frame, is_before in zip(self.frames, before, strict=True) if is_before]
+        chosen = np.linspace(0, len(ahead) - 1, min(len(ahead), tuned(Params).asked_frames)).round().astype(int)
+        votes = 0
+        for frame in (ahead[i] for i in chosen):
+            sight = look_up(point_world[None], frame.world_from_camera, frame.depth_camera, self.depth(frame.index))
+            votes += int(self.noise.seen_through(sight.seen_m, sight.z_m, margin_m)[0])
+            votes -= int(self.noise.agrees(sight.seen_m, sight.z_m, margin_m)[0])
+        return votes > 0
+
+
+def _value_near(depth_m: DepthMetres, camera: Intrinsics, x_px: float, y_px: float) -> float | None:
+    """Depth at a pixel of the colour image, else the median of those next to it; None where none of them is known."""
+    height, width = depth_m.shape
+    column = min(int(x_px * width / camera.width), width - 1)
+    row = min(int(y_px * height / camera.height), height - 1)
+    if depth_m[row, column] > 0:
+        return float(depth_m[row, column])
+    patch = depth_m[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+    return float(np.median(patch[patch > 0])) if (patch > 0).any() else None
 
 
 def prepare_scene(capture: Capture, cache: Path, *, progress: Progress = SILENT) -> Scene:

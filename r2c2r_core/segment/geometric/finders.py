@@ -19,6 +19,7 @@ from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, find_f
 from r2c2r_core.segment.fronts.sliding import sliding_chance
 from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
 from r2c2r_core.segment.prepared import Hits, PreparedCapture
+from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.found import FoundStanding, FoundThing
 from r2c2r_core.segment.things.revolution import Sight, find_round
 from r2c2r_core.segment.things.standing import find_standing
@@ -61,10 +62,20 @@ def find_object(
             else (f"no flat front under the click: treated as a thing of its own ({prompt.category})",)
         )
         return replace(thing, warnings=warnings)
+    clicks = [click for click in prompt.points if click.label == 1]
     raise ObjectNotSeen(
-        f"{prompt.name}: no surface of its own under {len(positives.clicks)} click(s)",
-        hint="click on its middle, or add a second click",
+        f"{prompt.name}: no surface of its own under {len(clicks)} click(s)",
+        hint=f"click on its middle, or add a second click{_without_depth(prepared.scene, clicks)}",
     )
+
+
+def _without_depth(scene: Scene, clicks: list[PromptPoint]) -> str:
+    """That a click is where the sensor measured nothing; empty where all have depth."""
+    for click in clicks:
+        if not scene.has_depth(click.frame, click.x, click.y):
+            at = f"({click.x:.0f}, {click.y:.0f}) in frame {click.frame}"
+            return f"; the sensor measured no depth at {at} (glass, black gloss), where only what stands out is found"
+    return ""
 
 
 def find_drawn(prepared: PreparedCapture, prompt: ObjectPrompt, drawn: DrawnFront, category: Category) -> Found:

@@ -11,7 +11,7 @@ from r2c2r_core.geometry.masks import pack_mask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.contradiction import Contradiction
-from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt, PromptPoint
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.segment import contradictions
 from r2c2r_core.segment.contradictions import find_contradictions
@@ -90,7 +90,10 @@ def test_clicks_that_the_mask_disobeys() -> None:
     (taken_in,) = found((door, prompt("door_1", "cabinet", 40.5, label=0)))
     assert taken_in.message == "door_1: the click at (40, 60) in frame 4 is off it, and its mask takes that in"
     assert found((door, prompt("door_1", "cabinet", 81.0))) == ()  # on its border, as fingers go
-    assert found((door, prompt("door_1", "cabinet", 120.5, frame=5))) == ()  # a frame that does not show it
+    (unseen,) = found((door, prompt("door_1", "cabinet", 40.5, frame=5)))  # a frame in which nothing of it was found
+    assert unseen.message == "door_1: the click at (40, 60) in frame 5 is on it, and nothing of it is seen in that frame"
+    absent = FrameSaid(frame=5, mask=None)  # a person said so
+    assert found((door, replace(prompt("door_1", "cabinet", 40.5, frame=5), frames=(absent,)))) == ()
 
 
 def test_sizes_outside_their_category() -> None:

@@ -1,12 +1,17 @@
 """What lies under a pixel where the sensor has no depth."""
 
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from r2c2r_core.segment.scene import Scene
+from r2c2r_core.geometry.camera import unproject
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.segment.scene import Scene, prepare_scene
+from tests.core.segment.scenes import Pixels, click_on, dining
 
 NEAR_M, FAR_M = 2.5, 2.83
 STEP_COLUMN = 120  # of 256: the near side ends there
@@ -43,3 +48,48 @@ def test_a_wide_hole_returns_no_light() -> None:
 
 def test_the_corner_of_a_picture_is_answered() -> None:
     assert at(255.9, gap=136) is None
+
+
+HOB_LOW, HOB_HIGH, TABLE_M = np.array([0.2, -0.15]), np.array([0.5, 0.15]), 0.73
+
+
+def in_hob(points_world: np.ndarray) -> np.ndarray:
+    """Which points (..., 3) are on a rectangle of the table's top."""
+    plan = ((points_world[..., :2] > HOB_LOW) & (points_world[..., :2] < HOB_HIGH)).all(axis=-1)
+    return np.asarray(plan & (np.abs(points_world[..., 2] - TABLE_M) < 0.02))
+
+
+def with_hob(*, opening: bool) -> Capture:
+    """The dining table with a sheet of black glass let into it, which returns no light; or with an opening there.
+
+    The first frame measures nothing in the opening either; the others measure the floor through it.
+    """
+    capture, _ = dining()
+    depths = {}
+    for frame in capture.frames:
+        depth = capture.images.depth(frame.index).metres.copy()
+        rows, columns = np.indices(depth.shape)
+        pixels = np.stack([columns, rows], axis=-1) + 0.5
+        on = in_hob(frame.world_from_camera.apply(unproject(pixels, depth, frame.depth_camera).reshape(-1, 3)))
+        on = on.reshape(depth.shape)
+        rays = unproject(pixels, np.ones_like(depth), frame.depth_camera) @ frame.world_from_camera.rotation.T
+        floor = np.divide(
+            -frame.world_from_camera.translation[2], rays[..., 2], out=np.zeros_like(depth), where=rays[..., 2] < 0
+        )
+        depth[on] = floor[on] if opening and frame.index else 0
+        depths[frame.index] = depth
+    surface = capture.surface
+    kept = ~in_hob(surface.vertices_world)[surface.faces].any(axis=1)
+    images = Pixels(cast(Pixels, capture.images).colours, depths)
+    return replace(capture, images=images, surface=replace(surface, faces=surface.faces[kept]))
+
+
+@pytest.mark.parametrize(("opening", "height_m"), [(False, TABLE_M), (True, 0.0)])
+def test_a_click_on_a_glass_hob_is_on_the_worktop_unless_frames_look_through(
+    opening: bool, height_m: float, tmp_path: Path
+) -> None:
+    capture = with_hob(opening=opening)
+    click = click_on(capture, (0.35, 0.0, TABLE_M), 0)
+    picked = prepare_scene(capture, tmp_path).pick(click.frame, click.x, click.y)
+    assert picked is not None
+    assert picked[2] == pytest.approx(height_m, abs=0.02)

@@ -1,0 +1,56 @@
+"""Holes in a depth image, where nothing returned light, and the measured rim round them."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from r2c2r_core.arrays import DepthMetres, Mask, Points
+from r2c2r_core.geometry.camera import unproject
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.tuning import param, tuned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """What counts as a hole, and as its rim."""
+
+    thin_px: int = param(5, "px", "width of what is only an outline between two depths, and no hole", ge=1)
+    about_px: int = param(7, "px", "across a hole's border, where what is round it is measured", ge=3)
+
+
+class Rim(NamedTuple):
+    """Where depth was measured just outside a hole."""
+
+    at: tuple[int, int]  # (column, row) of the depth image that was asked about
+    pixels: np.ndarray  # (n, 2) columns and rows of the depth image
+    points: Points  # (n, 3) world
+
+    def encloses(self, chosen: Mask) -> bool:
+        """Whether the asked pixel is in the convex hull of a part of the rim (n,).
+
+        At a picture's border a hole goes on unseen, and nothing encloses it there.
+        """
+        hull = self.pixels[chosen].astype(np.int32)
+        return len(hull) > 0 and cv2.pointPolygonTest(cv2.convexHull(hull), self.at, measureDist=False) >= 0
+
+
+def find_rim(frame: Frame, depth_m: DepthMetres, x_px: float, y_px: float) -> Rim | None:
+    """The rim of the hole at a pixel of a frame's colour image; None where depth was measured, or only an outline has none."""
+    params, (height, width) = tuned(Params), depth_m.shape
+    column, row = int(x_px * width / frame.rgb_camera.width), int(y_px * height / frame.rgb_camera.height)
+    if depth_m[row, column] > 0:
+        return None
+    unknown = cv2.morphologyEx(
+        (depth_m == 0).astype(np.uint8), cv2.MORPH_OPEN, np.ones((params.thin_px, params.thin_px), np.uint8)
+    )
+    if not unknown[row, column]:
+        return None
+    _, labels = cv2.connectedComponents(unknown)
+    hole = labels == labels[row, column]
+    wide = cv2.dilate(hole.astype(np.uint8), np.ones((params.about_px, params.about_px), np.uint8)) > 0
+    rows, columns = np.nonzero(wide & ~hole & (depth_m > 0))
+    pixels = np.stack([columns, rows], axis=1)
+    seen = unproject(pixels + 0.5, depth_m[rows, columns].astype(np.float64), frame.depth_camera)
+    return Rim((column, row), pixels, frame.world_from_camera.apply(seen))
