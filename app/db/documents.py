@@ -1,5 +1,6 @@
 """The clicks and corrections of a project as the files the core reads."""
 
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from pydantic import ValidationError
@@ -13,10 +14,40 @@ from r2c2r_core.schema.prompts import PromptsFileFront
 
 def prompts_document(session: Session, project_id: str) -> dict[str, Any]:
     """prompts.json of the project as it is now; objects neither clicked nor drawn are left out."""
+    return _document_of(_entries(session, project_id).values())
+
+
+def corrected_prompts(
+    session: Session, project_id: str, finished: dict[str, Any], about: Collection[int | None]
+) -> dict[str, Any]:
+    """prompts.json of the last run, but for these objects as they are now, and without what was deleted since.
+
+    What else was clicked since may be unfinished: a correction does not take it in.
+    """
+    before, now = {entry["name"]: entry for entry in finished["objects"]}, _entries(session, project_id)
+    chosen = []
+    for item in live_objects(session, project_id):
+        if item.id in about and item.id in now:
+            chosen.append(now[item.id])
+        elif item.id not in about and item.result_name in before:
+            chosen.append({**before[item.result_name], "name": item.name})
+    return _document_of(chosen)
+
+
+def _entries(session: Session, project_id: str) -> dict[int, dict[str, Any]]:
+    """Entries of prompts.json by object, of those that are clicked or drawn."""
     clicks, items = clicks_by_object(session, project_id), live_objects(session, project_id)
-    objects = [prompt_entry(item, clicks.get(item.id or 0, [])) for item in items]
-    given = [entry for entry in objects if "front" in entry or any(point["label"] for point in entry["points"])]
-    return {"version": prompts_version(given), "objects": given}
+    entries = {item.id or 0: prompt_entry(item, clicks.get(item.id or 0, [])) for item in items}
+    return {
+        number: entry
+        for number, entry in entries.items()
+        if "front" in entry or any(point["label"] for point in entry["points"])
+    }
+
+
+def _document_of(entries: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    objects = list(entries)
+    return {"version": prompts_version(objects), "objects": objects}
 
 
 def prompt_entry(item: SceneObject, clicks: list[Click]) -> dict[str, Any]:

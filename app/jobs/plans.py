@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlmodel import Session
 
-from app.db.documents import overrides_document, prompts_document
+from app.db.documents import corrected_prompts, overrides_document, prompts_document
 from app.db.queries import STAGES, live_objects
 from app.db.tables import Job, Project
 from app.files import ProjectFiles
@@ -19,7 +19,7 @@ from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.registry import Backend, Registry
 from r2c2r_core.robot.arms import NO_ARM
 from r2c2r_core.segment.stage import SEGMENTERS
-from r2c2r_core.workspace import write_atomically
+from r2c2r_core.workspace import content_key, write_atomically
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +95,31 @@ def request_of(session: Session, job: Job, project: Project, files: ProjectFiles
         config["export"] = {"arm": True}
     if config:
         request["config"] = config
-    request |= {"tools": tools, "seed": payload.get("seed", 0), "inputs": project.inputs}
-    write_json(path.with_name("prompts.json"), prompts_document(session, project.id))
-    write_json(path.with_name("overrides.json"), _placed_overrides(overrides_document(session, project.id), files))
-    write_json(path.with_name(NAMES), {item.id or 0: item.name for item in live_objects(session, project.id)})
+    now = prompts_document(session, project.id)
+    prompts = _prompts_of(session, job, files) or now
+    inputs = project.inputs if prompts == now else content_key(project.inputs, prompts)
+    request |= {"tools": tools, "seed": payload.get("seed", 0), "inputs": inputs}
+    left_out = _names(now) - _names(prompts)
+    overrides = overrides_document(session, project.id)
+    overrides["objects"] = {name: entry for name, entry in overrides["objects"].items() if name not in left_out}
+    named = {item.id or 0: item.name for item in live_objects(session, project.id) if item.name not in left_out}
+    write_json(path.with_name("prompts.json"), prompts)
+    write_json(path.with_name("overrides.json"), _placed_overrides(overrides, files))
+    write_json(path.with_name(NAMES), named)
     write_json(path, request)
     return request
+
+
+def _prompts_of(session: Session, job: Job, files: ProjectFiles) -> dict[str, Any] | None:
+    """The clicks of a run that a correction started; None for any other, and where no run came before."""
+    about = job.payload.get("about")
+    if not about or not files.finished_prompts.is_file():
+        return None
+    return corrected_prompts(session, job.project_id, json.loads(files.finished_prompts.read_text()), about)
+
+
+def _names(document: dict[str, Any]) -> set[str]:
+    return {entry["name"] for entry in document["objects"]}
 
 
 def placed_request(path: Path, files: ProjectFiles) -> dict[str, Any]:

@@ -1,5 +1,8 @@
 """Heavy work: start, watch, cancel, read the log."""
 
+from collections.abc import Sequence
+from typing import Any
+
 from sqlmodel import Session, col, select
 
 from app import schemas
@@ -25,8 +28,11 @@ def run(context: Context, project_id: str, body: schemas.RunRequest) -> schemas.
     return get_job(context, job.id or 0)
 
 
-def queue_run(context: Context, session: Session, project: Project, body: schemas.RunRequest) -> Job:
-    """A waiting run with everything said so far; one under way that already knows it all is that run."""
+def queue_run(context: Context, session: Session, project: Project, body: schemas.RunRequest, about: Sequence[int] = ()) -> Job:
+    """A waiting run with everything said so far; one under way that already knows it all is that run.
+
+    `about` are the objects whose correction starts it: of the others it takes the clicks of the last run.
+    """
     if project.status != "ready":
         raise NotReady("the recording has not been read yet", hint="wait for the import")
     if not any(item.masks_key for item in queries.live_objects(session, project.id)):
@@ -36,16 +42,25 @@ def queue_run(context: Context, session: Session, project: Project, body: schema
     for seam, registry in projects.SEAMS.items():
         registry.require(chosen[seam])
     wishes = {**body.model_dump(), **chosen}
-    payload = {**wishes, "inputs": project.inputs}
+    payload = {**wishes, "inputs": project.inputs, **({"about": sorted(about)} if about else {})}
     active = select(Job).where(Job.project_id == project.id, Job.kind == "run", col(Job.state).in_(("queued", "running")))
     for job in session.exec(active):
         if job.state == "queued" and job.started is None:
-            job.payload = payload  # it reads the clicks when it starts
+            job.payload = _joined(job.payload, payload)  # it reads the clicks when it starts
             session.add(job)
             return job
         if job.payload == payload:
             return job
     return queue_job(context, session, project, "run", payload)
+
+
+def _joined(waiting: dict[str, Any], added: dict[str, Any]) -> dict[str, Any]:
+    """What a waiting run is given once another is asked for: everything, unless both are about single objects."""
+    if "about" not in added:
+        return added
+    if "about" not in waiting:
+        return {**waiting, "inputs": added["inputs"]}
+    return {**added, "about": sorted({*waiting["about"], *added["about"]})}
 
 
 def list_jobs(context: Context, project_id: str | None, limit: int) -> list[schemas.Job]:
@@ -78,9 +93,8 @@ def retry(context: Context, job_id: int) -> schemas.Job:
         if row.state not in ("failed", "cancelled"):
             raise Conflict(f"the job is {row.state}", hint="only failed or cancelled jobs can be retried")
         if row.kind == "run":
-            job = queue_run(
-                context, session, project, schemas.RunRequest(**{k: v for k, v in row.payload.items() if k != "inputs"})
-            )
+            wishes = {name: value for name, value in row.payload.items() if name in schemas.RunRequest.model_fields}
+            job = queue_run(context, session, project, schemas.RunRequest(**wishes), row.payload.get("about", ()))
         else:
             if said := queries.no_retry(row.kind, project.source_path):
                 raise Conflict(said, hint="delete the project, and upload another one")

@@ -58,7 +58,7 @@ def give_verdict(context: Context, project_id: str, object_id: int, body: schema
             _store_verdict(session, item, body, context.who)
             history.set_override(session, item, _override_after(before, body, facts))
         changed = history.override_data(session, item) != before
-        job = _rerun(context, session, project) if body.rerun and changed else None
+        job = _rerun(context, session, project, item) if body.rerun and changed else None
     return reviewed_shape(context, project_id, object_id, job, text)
 
 
@@ -95,7 +95,7 @@ def _store_override(
     text = f"{item.name}: {said or 'nothing'}"
     with history.change(session, item, "review", "correct", text, who=context.who):
         history.set_override(session, item, merged)
-    return _rerun(context, session, project) if body.rerun and merged != before else None, text
+    return _rerun(context, session, project, item) if body.rerun and merged != before else None, text
 
 
 def correct_made(context: Context, project_id: str, name: str, body: schemas.OverridePatch) -> schemas.Reviewed:
@@ -196,9 +196,10 @@ def _check_override(context: Context, project: Project, item: SceneObject, merge
         raise OverrideError(f"{item.name} has no candidate '{wanted}'", hint="choose one of its candidates, or upload a mesh")
 
 
-def _rerun(context: Context, session: Session, project: Project) -> int | None:
+def _rerun(context: Context, session: Session, project: Project, item: SceneObject) -> int | None:
+    """The run that a correction of an object starts; None where nothing is clicked."""
     try:
-        return jobs.queue_run(context, session, project, schemas.RunRequest()).id
+        return jobs.queue_run(context, session, project, schemas.RunRequest(), (item.id or 0,)).id
     except PromptError:
         return None
 

@@ -373,3 +373,43 @@ def test_what_nobody_clicked_is_corrected_by_its_name_left_out_and_brought_back(
     assert web.get(f"/api/projects/{project}/objects/{counter['id']}/override")["dimensions_m"] == [3.0, 0.6, 0.04]
     web.patch(f"/api/projects/{project}/scene/absent/override", {"left_out": True}, 404)
     web.patch(f"/api/projects/{project}/objects/{counter['id']}/override", {"built_as": "frobnicator", "rerun": False}, 422)
+
+
+def clicked(web: Running, project: str) -> dict[str, int]:
+    """How many clicks each object of the newest run has, by its name there."""
+    job = web.get(f"/api/jobs?project={project}")[0]["id"]
+    path = web.settings.data_dir / "projects" / project / "requests" / str(job) / "prompts.json"
+    return {entry["name"]: len(entry["points"]) for entry in json.loads(path.read_text())["objects"]}
+
+
+def test_a_correction_runs_its_object_and_leaves_out_what_is_clicked_meanwhile(web: Running) -> None:
+    project = web.sample()
+    web.job(run(web, project), "done")
+    first, second = (item["id"] for item in web.get(f"/api/projects/{project}/objects")[:2])
+    names = {item["id"]: item["name"] for item in web.get(f"/api/projects/{project}/objects")}
+    before = clicked(web, project)
+    click = {"frame": 0, "x": 40.5, "y": 40.5, "label": 1}
+    web.post(f"/api/projects/{project}/objects/{second}/points", click, status=201)
+    web.patch(f"/api/projects/{project}/objects/{second}", {"name": "renamed"})
+    web.post(f"/api/projects/{project}/objects", {"name": "half_done", "category": "drawer"}, status=201)
+    third = web.get(f"/api/projects/{project}/objects")[-1]["id"]
+    web.post(f"/api/projects/{project}/objects/{third}/points", click, status=201)
+
+    said = web.patch(f"/api/projects/{project}/objects/{first}/override", {"joint_upper": 0.3})
+    web.job(said["job"]["id"], "done")
+    assert clicked(web, project) == {names[first]: before[names[first]], "renamed": before[names[second]]}
+    assert web.get(f"/api/projects/{project}")["result"] == "stale"  # others' clicks are not in it
+
+    web.job(run(web, project), "done")
+    assert clicked(web, project)["half_done"] == 1
+    assert clicked(web, project)["renamed"] == before[names[second]] + 1
+    assert web.get(f"/api/projects/{project}")["result"] == "current"
+
+
+def test_a_correction_of_what_nobody_is_clicking_leaves_the_result_current(web: Running) -> None:
+    project = web.sample()
+    web.job(run(web, project), "done")
+    first = web.get(f"/api/projects/{project}/objects")[0]["id"]
+    said = web.patch(f"/api/projects/{project}/objects/{first}/override", {"joint_upper": 0.3})
+    web.job(said["job"]["id"], "done")
+    assert web.get(f"/api/projects/{project}")["result"] == "current"
