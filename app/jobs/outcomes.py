@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import os
 import shutil
 import time
@@ -113,7 +114,7 @@ def keep_bundle(session: Session, project: Project, files: ProjectFiles) -> Kept
     shutil.copyfile(made, temporary)
     os.replace(temporary, kept)
     row = bundle_row(project, kept, version)
-    row.certificate = _certificate(kept, files.work)
+    row.certificate = _with_speed(row.certificate, files.work)
     return KeptBundle(row)
 
 
@@ -199,16 +200,17 @@ def _free_version(files: ProjectFiles, version: int, digest: str) -> int:
     return version
 
 
-def _certificate(bundle: Path, work: Path) -> dict[str, Any] | None:
-    """The certificate as JSON: the stored noun, else what the bundle's report says."""
-    from app.jobs.plain import plain
+def _with_speed(certificate: dict[str, Any] | None, work: Path) -> dict[str, Any] | None:
+    """The certificate with how fast this machine simulates the scene, which a bundle, the same on every machine, leaves out."""
     from r2c2r_core.workspace import Workspace
 
     noun = Workspace(work).load_latest("export", "scene")
-    if noun is not None:
-        found: dict[str, Any] = plain(noun)
-        return found
-    return _certificate_in(bundle)
+    if certificate is None or noun is None:
+        return certificate
+    steps = {result.loader: [list(pair) for pair in result.steps_per_s] for result in noun.loaders}
+    loaders = [{**loader, "steps_per_s": steps.get(loader["loader"], [])} for loader in certificate.get("loaders", [])]
+    speed = {"realtime_factor": noun.realtime_factor} if math.isfinite(noun.realtime_factor) else {}
+    return {**certificate, "loaders": loaders, **speed}
 
 
 def _certificate_in(bundle: Path) -> dict[str, Any] | None:

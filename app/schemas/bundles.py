@@ -1,6 +1,8 @@
 """Finished bundles and the proof in them."""
 
-from pydantic import Field
+from typing import Any
+
+from pydantic import Field, model_validator
 
 from app.schemas.base import Shape
 
@@ -144,6 +146,12 @@ class Doubt(Shape):
 
     object: str
     why: str
+
+    @model_validator(mode="before")
+    @classmethod
+    def from_pair(cls, stored: Any) -> Any:
+        """Rows of November 2026 hold a pair."""
+        return dict(zip(("object", "why"), stored, strict=True)) if isinstance(stored, list) else stored
 
 
 class Likeness(Shape):

@@ -1,6 +1,8 @@
 """What a finished job leaves."""
 
 import json
+import zipfile
+from dataclasses import replace
 from pathlib import Path
 from sqlite3 import connect
 
@@ -10,8 +12,12 @@ from app.db.engine import open_engine, writing
 from app.db.tables import Job, Project
 from app.files import project_files
 from app.jobs import outcomes
+from r2c2r_core.export.report import report_of
+from r2c2r_core.model.report import Likeness
+from r2c2r_core.workspace import Workspace
 from tests.app.conftest import Running
 from tests.app.test_jobs import run
+from tests.core.export.test_report import certificate
 
 
 def test_the_clicks_of_the_last_run_are_replaced_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -50,3 +56,25 @@ def test_others_may_write_while_a_bundle_is_copied(web: Running, monkeypatch: py
     assert [bundle["current"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [True]
     web.job(run(web, project), "done")
     assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")][-1] == 1
+
+
+@pytest.mark.parametrize("stored_as_pairs", [False, True])
+def test_the_doubts_of_a_certificate_are_shown(web: Running, monkeypatch: pytest.MonkeyPatch, stored_as_pairs: bool) -> None:
+    """Those of a bundle are; and those of a row that an older version wrote, which holds pairs."""
+    made = replace(certificate(), likeness=Likeness(state="doubtful", doubts=(("drawer_1", "is 40 % sure"),)))
+    project = web.sample()
+    work = web.settings.data_dir / "projects" / project / "work"
+    Workspace(work).save("export", "scene", made, {"key": "k", "seconds": 1.0})
+    said = report_of({"tool_version": "1", "objects": []}, made, {})["certificate"]
+    if stored_as_pairs:
+        said["likeness"]["doubts"] = [["drawer_1", "is 40 % sure"]]
+    inside = zipfile.ZipFile.read
+
+    def read(self: zipfile.ZipFile, name: str) -> bytes:
+        return json.dumps({"certificate": said}).encode() if name == "report.json" else inside(self, name)
+
+    monkeypatch.setattr(zipfile.ZipFile, "read", read)
+    web.job(run(web, project), "done")
+    shown = web.get(f"/api/projects/{project}/certificate")
+    assert shown["likeness"] == {"state": "doubtful", "doubts": [{"object": "drawer_1", "why": "is 40 % sure"}]}
+    assert shown["realtime_factor"] == made.realtime_factor
