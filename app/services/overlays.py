@@ -22,18 +22,20 @@ from r2c2r_core.geometry.raster import rasterize, sample_texture
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.depth import decode_depth
 from r2c2r_core.ingest.store import depth_path
+from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.scene import Joint, SceneObject
 from r2c2r_core.synthesize.filmed import widest
 from r2c2r_core.synthesize.marked import part_of
 from r2c2r_core.workspace import content_key
 
-WIDTH = 640
+WIDTH = 1920  # pixels: those of the largest photos, and smooth where a part of a smaller one fills the screen
+_LINE_OF = 960  # pixels of a photo's width for each pixel of a line's
 PHOTOS = 12
 _AT_BORDER = 0.01  # of the image: what reaches nearer to its edge may go on beyond
 FAR_M = 0.03  # a residual of this much has its full colour
 _FAINT = 0.25  # of its opacity, what something else covers: it is there, and not in front
 _OUTLINE = (77, 225, 255)  # BGR
-_EDGE = 0.004  # Laplacian of the inverse depth over its largest value: a step of about 1 cm at 2 m
+_EDGE = 0.0002  # Laplacian of the inverse depth over its largest value: edges between faces; flat ones have less than 0.0001
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +89,8 @@ def overlay(
         item = queries.object_row(session, project_id, object_id, deleted=True)
         name, said = item.result_name, openings.states_said(history.override_data(session, item))
         files = context.files(project)
-    target = files.previews / "overlays" / str(object_id) / f"{index:06d}-{of}-{look}-{_version(files, name, said)}.png"
+    kept = f"{index:06d}-{of}-{look}-{WIDTH}-{_version(files, name, said)}.png"
+    target = files.previews / "overlays" / str(object_id) / kept
     return media.kept_file(files, target, lambda: _drawn(files, index, look, parts_of(files, name, of, index, said)))
 
 
@@ -105,7 +108,7 @@ def point_under(context: Context, project_id: str, object_id: int, index: int, x
         parts = parts_of(files, name, "fitted", index, said) or parts_of(files, name, "placed", index, said)
     except NotReady:
         return None
-    camera = frame.rgb_camera.resized(WIDTH, round(WIDTH * frame.rgb_camera.height / frame.rgb_camera.width))
+    camera = _camera_of(frame)
     _, depth = _render(parts, camera, frame.world_from_camera.inverse)
     scale = camera.width / frame.rgb_camera.width
     column, row = min(int(x * scale), camera.width - 1), min(int(y * scale), camera.height - 1)
@@ -192,15 +195,20 @@ def _drawn(files: ProjectFiles, index: int, look: schemas.OverlayLook, parts: li
     if frame is None:
         raise NotFound(f"the recording has no frame {index}")
     camera_from_world = frame.world_from_camera.inverse
+    camera = _camera_of(frame)
     if look == "residual":
         image = _residual(files, index, parts, frame.depth_camera, camera_from_world)
-        image = cv2.resize(image, (WIDTH, round(WIDTH * image.shape[0] / image.shape[1])), interpolation=cv2.INTER_NEAREST)
+        image = cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_NEAREST)
     else:
-        camera = frame.rgb_camera.resized(WIDTH, round(WIDTH * frame.rgb_camera.height / frame.rgb_camera.width))
         colours, depth = _render(parts, camera, camera_from_world)
         image = _outline(depth) if look == "outline" else np.dstack([colours, (depth > 0).astype(np.uint8) * 255])
         image[..., 3] = np.where(_covered(files, index, depth), _FAINT * image[..., 3], image[..., 3]).astype(np.uint8)
     return cv2.imencode(".png", image)[1].tobytes()
+
+
+def _camera_of(frame: Frame) -> Intrinsics:
+    """The photo's camera, at the size in which overlays are drawn."""
+    return frame.rgb_camera.resized(WIDTH, round(WIDTH * frame.rgb_camera.height / frame.rgb_camera.width))
 
 
 def _covered(files: ProjectFiles, index: int, depth: np.ndarray) -> np.ndarray:
@@ -211,10 +219,14 @@ def _covered(files: ProjectFiles, index: int, depth: np.ndarray) -> np.ndarray:
     raw = cv2.imread(str(depth_path(views.frames_folder(files), index)), cv2.IMREAD_UNCHANGED)
     if raw is None:
         return np.zeros(depth.shape, bool)
-    measured = cv2.resize(decode_depth(raw), depth.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    known = decode_depth(raw)
+    metres, weight = (
+        cv2.resize(one.astype(np.float32), depth.shape[::-1], interpolation=cv2.INTER_LINEAR) for one in (known, known > 0)
+    )
+    measured = metres / np.maximum(weight, 1e-6)  # between pixels: borders without the stairs of the coarser depth image
     spread = cv2.dilate(depth, np.ones((5, 5), np.uint8))
     drawn = np.where(depth > 0, depth, spread)
-    covered: np.ndarray = (measured > 0) & (drawn > measured + FAR_M)
+    covered: np.ndarray = (weight > 0) & (drawn > measured + FAR_M)
     return covered
 
 
@@ -239,13 +251,18 @@ def _outline(depth: np.ndarray) -> np.ndarray:
 
     The inverse depth of a plane is affine in the pixels: its Laplacian is zero on every face, however oblique.
     """
+    width_px = round(depth.shape[1] / _LINE_OF)
     inverse = np.where(depth > 0, 1.0 / np.maximum(depth, 1e-3), 0.0).astype(np.float32)
     bend = np.abs(cv2.Laplacian(inverse, cv2.CV_32F)) / max(float(inverse.max()), 1e-6)
-    rim = bend > _EDGE
+    rim = _widened(bend > _EDGE, width_px)
     image = np.zeros((*depth.shape, 4), np.uint8)
-    image[cv2.dilate(rim.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = (26, 19, 16, 200)
+    image[_widened(rim, 1 + 2 * width_px)] = (26, 19, 16, 200)
     image[rim] = (*_OUTLINE, 255)
     return image
+
+
+def _widened(line: np.ndarray, width_px: int) -> np.ndarray:
+    return np.asarray(cv2.dilate(line.astype(np.uint8), np.ones((width_px, width_px), np.uint8)) > 0)
 
 
 def _residual(files: ProjectFiles, index: int, parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) -> np.ndarray:

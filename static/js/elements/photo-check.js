@@ -20,6 +20,12 @@ import { sayError } from "./toasts.js";
 /** @typedef {"ghost" | "outline" | "residual"} Look */
 
 /** @type {Record<Look, string>} */
+/** @type {Record<Look, string>} */
+const LEGENDS = {
+  outline: "Lines: edges of the model; faint: behind something.",
+  ghost: "The model over the photo; faint: behind something.",
+  residual: "Red: the mesh stands before the measured surface. Blue: behind it. Full colour at 3 cm. Pale: they agree.",
+};
 const LOOKS = { outline: "Outline", ghost: "Ghost", residual: "Distance" };
 const PIN_R = 0.008; // of the photo's width
 const HOLD_PX = 9; // on the screen
@@ -175,7 +181,7 @@ export class PhotoCheck extends LiveElement {
       this.#legend.textContent = "No photo to check this object on: run the pipeline first.";
       return this.#strip.replaceChildren();
     }
-    this.#photo.src = this.#frameUrl(photo, 960);
+    this.#photo.src = this.#frameUrl(photo, this.#near ? photo.width : 960);
     this.#photo.alt = `Frame ${photo.frame}`;
     this.#over.src = this.#overlayUrl(photo, this.#of, this.#look);
     this.#over.alt = `${MODELS[this.#of]}, ${LOOKS[this.#look].toLowerCase()}`;
@@ -189,10 +195,8 @@ export class PhotoCheck extends LiveElement {
     this.#drawPins();
     this.#drawBox();
     this.#fade();
-    this.#legend.textContent =
-      this.#look === "residual"
-        ? "Red: the mesh stands before the measured surface. Blue: behind it. Full colour at 3 cm. Pale: they agree."
-        : `Frame ${photo.frame}, photo ${this.#at + 1} of ${all.photos.length}. Hold B for the photo alone; double click pins a comment.`;
+    const keys = `Frame ${photo.frame}, photo ${this.#at + 1} of ${all.photos.length}. Hold B for the photo alone; double click pins a comment.`;
+    this.#legend.textContent = `${LEGENDS[this.#look]} ${this.#look === "residual" ? "" : keys}`.trim();
     this.#strip.replaceChildren(...all.photos.map((other, k) => this.#thumb(other, k)));
   }
 
