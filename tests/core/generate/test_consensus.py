@@ -145,10 +145,10 @@ def guesses(*changes):
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        ({"unseen_error_m": 0.34}, "c1 fits as well, but its side that was not filmed is 34 cm from where it is most likely"),
+        ({"unseen_error_m": 0.34}, "c1 fits as well, but its unseen side is 34 cm from its most likely place"),
         (
             {"mask_iou": 0.93, "unseen_error_m": 0.34},
-            "c1 fits better, but its side that was not filmed is 34 cm from where it is most likely",
+            "c1 fits better, but its unseen side is 34 cm from its most likely place",
         ),
         ({"stands": 0.0}, "c1 fits as well, but it would tip over"),
         ({"mask_iou": 0.92, "carved": 1.0}, "c1 fits better, but it copies the masks with their errors"),
@@ -171,7 +171,7 @@ def test_proportions_are_given_only_where_they_count():
 def test_where_the_fit_decided_the_reason_says_no_more():
     """The rank is that of the fit: what nobody saw has no part in it."""
     reason = choose_candidate(guesses({"unseen_error_m": 0.01}, {"mask_iou": 0.8})).reason
-    assert "the best of 2 by fit" in reason
+    assert "rank 1 of 2 by fit" in reason
     assert "but" not in reason
 
 
