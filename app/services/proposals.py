@@ -125,9 +125,9 @@ def _without_covered(context: Context, project_id: str, found: _Found) -> list[d
     shown = masks.on_frames(context, project_id, {line["frame"] for line in found.lines})
     left = []
     for line in found.lines:
-        outline = bits_mask(line["mask"])
-        near = [one for one in shown[line["frame"]] if _may_cover(one["mask"], line["mask"])]
-        shares = {one["object"]: covered_share(outline, bits_mask(one["mask"])) for one in near}
+        near = {one["object"]: one["mask"] for one in shown[line["frame"]] if _may_cover(one["mask"], line["mask"])}
+        outline = bits_mask(line["mask"]) if near else None
+        shares = {} if outline is None else {number: covered_share(outline, bits_mask(mask)) for number, mask in near.items()}
         if not any(is_taken(share) for share in shares.values()):
             most = tuned(Params).overlap
             partly = [

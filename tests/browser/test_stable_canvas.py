@@ -72,3 +72,22 @@ def test_a_bar_between_two_panels_is_where_its_person_left_it(new_context: NewCo
     page.keyboard.press("\\")
     assert box_of(pane)["width"] == before + 64
     assert serious(page, "annotate") == []
+
+
+def test_the_tools_are_one_stop_of_the_tab_key(new_context: NewContext, server: Server) -> None:
+    page = signed_in(new_context(viewport={"width": 1280, "height": 720}), server, "ann")
+    page.goto(f"{sample(page)}/annotate?frame=3")
+    ready(page)
+    rail = page.get_by_role("toolbar", name="Tools")
+    page.get_by_role("separator", name="Width of the list of objects").focus()
+    while page.evaluate("!document.activeElement.closest('.rail')"):
+        page.keyboard.press("Shift+Tab")
+    expect(rail.get_by_role("slider", name="Mask opacity")).to_be_focused()
+    page.keyboard.press("Shift+Tab")
+    expect(rail.get_by_role("button", name="Add")).to_be_focused()
+    page.keyboard.press("ArrowDown")
+    expect(rail.get_by_role("button", name="Take away")).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(rail.get_by_role("button", name="Take away")).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("Shift+Tab")
+    assert page.evaluate("!document.activeElement.closest('.rail')")

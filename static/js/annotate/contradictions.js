@@ -3,8 +3,7 @@
  * Says "change" when that is another than before.
  */
 
-import { contradictionsOn } from "../lib/contradictions.js";
-import { decodeBox } from "../lib/masks.js";
+import { contradictionsOn, shownOn } from "../lib/contradictions.js";
 
 /** @typedef {import("./scene-objects.js").SceneObjects} SceneObjects */
 /** @typedef {import("./masks.js").Masks} Masks */
@@ -51,18 +50,14 @@ export class Contradictions extends EventTarget {
 
   /** @param {FrameInfo} frame */
   async #look(frame) {
-    const shown = this.#objects.sorted.flatMap((object) => {
+    const masks = this.#objects.sorted.flatMap((object) => {
       const mask = this.#masks.on(object.id, frame.index)?.mask;
-      if (!mask?.box_width) return [];
-      const scale = mask.width / frame.width;
-      const here = object.points.filter((point) => point.frame === frame.index);
-      const clicks = here.map(({ x, y, label }) => ({ x: x * scale, y: y * scale, label }));
-      return [{ object: object.id, name: object.name, mask, clicks }];
+      return mask ? [{ object, mask }] : [];
     });
     const look = ++this.#looks;
-    const decoded = await Promise.all(shown.map(async (one) => ({ ...one, pixels: await decodeBox(one.mask) })));
+    const shown = await shownOn(masks, frame);
     if (look !== this.#looks) return; // a newer one is under way
-    const said = contradictionsOn(decoded);
+    const said = contradictionsOn(shown);
     if (JSON.stringify(said) === JSON.stringify(this.#said)) return;
     this.#said = said;
     this.dispatchEvent(new Event("change"));

@@ -6,6 +6,7 @@
 import { getMasks } from "../api.js";
 import * as changes from "../changes.js";
 import { say, sayError } from "../elements/toasts.js";
+import { isComing } from "../lib/listing.js";
 import { decodeBox } from "../lib/masks.js";
 import { encoded, isEmpty, runsOf, wholeMask } from "../lib/painting.js";
 import { outbox } from "../outbox.js";
@@ -147,7 +148,7 @@ export class Painter extends EventTarget {
 
   /** Whether masks of it may be about to change: while it is found, and while changes are on their way. @param {number} object */
   #isComing(object) {
-    return outbox.waiting > 0 || ["waiting", "running"].includes(this.#known.objects.get(object)?.segment ?? "");
+    return outbox.waiting > 0 || isComing(this.#known.objects.get(object) ?? { segment: "" });
   }
 
   /** What was painted last: it may not have come back yet. @type {{ object: number, frame: number, mask: Mask, bits: MaskBits, version: number | null } | null} */

@@ -4,6 +4,8 @@
  * Says "change" when any of it is to be drawn anew, "choose" when another one or none is chosen, "gone" {id}.
  */
 
+import { isComing } from "../lib/listing.js";
+
 /** @typedef {import("../api-types").SceneObject} SceneObject */
 
 const LOCKED = "r2c2r-locked";
@@ -51,7 +53,7 @@ export class SceneObjects extends EventTarget {
 
   /** Of how many masks are still to come. */
   get following() {
-    return this.sorted.filter(({ segment }) => segment === "waiting" || segment === "running").length;
+    return this.sorted.filter(isComing).length;
   }
 
   /** In the order they were made. */

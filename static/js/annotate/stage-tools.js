@@ -3,7 +3,7 @@
  * depth, shape and comments. Its status (the segmenter, the last change) stands among the frames, where nothing moves for it. Says "opacity", "sign" and "evidence" when they are changed, "paint" what is to be painted.
  */
 
-import { h, icon, segments, slider } from "../dom.js";
+import { h, icon, rove, segments, slider } from "../dom.js";
 import { SegmenterChip } from "./segmenter-chip.js";
 
 /** @type {[string, string, string][]} */
@@ -64,6 +64,7 @@ export class StageTools extends EventTarget {
     this.#takes.addEventListener("click", () => this.#mean(0));
     this.#evidence.addEventListener("click", () => this.dispatchEvent(new Event("evidence")));
     this.#mean(1);
+    rove(this.element);
   }
 
   /** Of the masks, 0 to 1. */

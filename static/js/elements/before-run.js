@@ -3,9 +3,9 @@
 import { getLanes, getMasks, listFrames, listObjects } from "../api.js";
 import { h } from "../dom.js";
 import { framesToLook, spoiling } from "../lib/before-run.js";
-import { contradictionsOn } from "../lib/contradictions.js";
+import { contradictionsOn, shownOn } from "../lib/contradictions.js";
 import { counted } from "../lib/format.js";
-import { decodeBox } from "../lib/masks.js";
+import { isComing } from "../lib/listing.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
 /** @typedef {import("../lib/before-run.js").Told} Told */
@@ -19,8 +19,11 @@ export class BeforeRun {
     const widths = new Map(frames.map(({ index, width }) => [index, width]));
     const looked = await Promise.all(
       framesToLook(lanes).map(async (frame) => {
-        const masks = await getMasks(project, frame, signal);
-        return { frame, said: contradictionsOn(await shown(objects, masks, frame, widths.get(frame) ?? 1)) };
+        const masks = (await getMasks(project, frame, signal)).flatMap(({ object, mask }) => {
+          const known = objects.find(({ id }) => id === object);
+          return known ? [{ object: known, mask }] : [];
+        });
+        return { frame, said: contradictionsOn(await shownOn(masks, { index: frame, width: widths.get(frame) ?? 1 })) };
       }),
     );
     if (!signal.aborted) this.#draw(project, objects, spoiling(objects, looked));
@@ -45,7 +48,7 @@ export class BeforeRun {
     const unsure = objects.flatMap(({ id, points, doubts }) =>
       doubts.map((text) => ({ object: id, frame: points[0]?.frame ?? null, text })),
     );
-    const coming = objects.filter(({ segment }) => segment === "waiting" || segment === "running").length;
+    const coming = objects.filter(isComing).length;
     this.element.hidden = !told.length && !unsure.length && !coming;
     this.element.replaceChildren(
       h("h2", {}, told.length ? "Mend this before the run" : "Before the run"),
@@ -65,28 +68,4 @@ export class BeforeRun {
         : []),
     );
   }
-}
-
-/**
- * The masks of a frame as contradictions are found in them.
- * @param {SceneObject[]} objects
- * @param {import("../api-types").FrameMask[]} masks
- * @param {number} frame
- * @param {number} width of the frame
- */
-function shown(objects, masks, frame, width) {
-  const known = new Map(objects.map((object) => [object.id, object]));
-  return Promise.all(
-    masks.flatMap(({ object, mask }) => {
-      const of = known.get(object);
-      if (!of || !mask.box_width) return [];
-      const here = of.points.filter((point) => point.frame === frame);
-      const clicks = here.map(({ x, y, label }) => ({
-        x: (x * mask.width) / width,
-        y: (y * mask.width) / width,
-        label,
-      }));
-      return [decodeBox(mask).then((pixels) => ({ object, name: of.name, mask, clicks, pixels }))];
-    }),
-  );
 }

@@ -29,7 +29,7 @@ export class FilmStrip extends LiveElement {
   #slider = h("input", { type: "range", min: "0", max: "0", value: "0", "aria-label": "Frame" });
   #text = h("output", { class: "mono" });
   /** What stands beside the number of the frame: how things are, at a width of its own. */
-  status = h("div", { class: "beside" });
+  status = h("div");
   #play = h("button", { type: "button", class: "quiet", "aria-label": "Play or pause" }, icon("play"));
 
   connected() {

@@ -7,7 +7,7 @@
 import { h, icon, LiveElement, renew, reveal } from "../dom.js";
 import { inkOn } from "../lib/colour.js";
 import { counted, usableName } from "../lib/format.js";
-import { listed, OF_PEOPLE, ORDERS, span, STATES } from "../lib/listing.js";
+import { isComing, listed, OF_PEOPLE, ORDERS, span, STATES } from "../lib/listing.js";
 import { SelectionBar } from "./selection-bar.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
@@ -206,9 +206,8 @@ export class ObjectList extends LiveElement {
       h("div", { class: "head" }, badge, pick, lock, eye, remove),
       h("div", { class: "row muted state" }, state(entry), this.#stop(object), assigned(object)),
       current && !locked ? this.#fields(object) : null,
-      ...[...said, ...object.doubts.map((text) => ({ object: id, text }))].map((said) =>
-        h("div", { class: "contradicted", role: "status" }, said.text, this.#merge(said, name)),
-      ),
+      ...said.map((one) => h("div", { class: "contradicted", role: "status" }, one.text, this.#merge(one, name))),
+      ...object.doubts.map((text) => h("div", { class: "contradicted doubt", role: "status", title: text }, text)),
       ...notices.map((notice) => h("div", { class: "muted" }, notice)),
     );
     item.style.setProperty("--swatch", colour);
@@ -228,7 +227,7 @@ export class ObjectList extends LiveElement {
 
   /** @param {SceneObject} object */
   #stop(object) {
-    if (object.segment !== "running" && object.segment !== "waiting") return null;
+    if (!isComing(object)) return null;
     const stop = button("stop", `Stop finding ${object.name}`, object.id, "Stop");
     stop.addEventListener("click", () => this.emit("stop", object.id));
     return stop;
@@ -327,8 +326,7 @@ function state({ object, current, sure }) {
   /** @type {(detail: string, ...told: (Node | string | null)[]) => HTMLElement} */
   const line = (detail, ...told) =>
     h("span", { title: `${detail}${told[0]}` }, h("span", { class: "detail" }, detail), ...told);
-  if (object.segment === "running" || object.segment === "waiting")
-    return line(`${clicks} · `, "finding it in all frames…");
+  if (isComing(object)) return line(`${clicks} · `, "finding it in all frames…");
   if (object.segment === "failed") return h("span", { class: "chip bad" }, "no mask");
   if (!object.mask_frames) return line("", clicks);
   if (object.segment === "partial") return line(`${clicks} · `, `stopped after ${frames}`);

@@ -29,6 +29,7 @@ export class Splitter {
     this.element.addEventListener("pointerdown", (event) => this.#grasp(event));
     this.element.addEventListener("dblclick", () => this.fold(!this.folded));
     this.element.addEventListener("keydown", (event) => this.#press(event));
+    this.element.addEventListener("focus", () => this.element.setAttribute("aria-valuenow", String(this.#shown)));
     this.#draw();
   }
 

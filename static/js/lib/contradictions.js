@@ -3,6 +3,8 @@
  * object. The run judges the same over many frames (r2c2r_core/segment/contradictions.py, where the figures come from).
  */
 
+import { decodeBox } from "./masks.js";
+
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {{ x: number, y: number, label: number }} Click in pixels of the mask */
 /** @typedef {{ object: number, name: string, mask: MaskBits, pixels: Uint8Array, clicks: Click[] }} Shown pixels: of the mask's box */
@@ -11,6 +13,24 @@
 const OVERLAP = 0.1; // of the smaller mask
 const SAME = 0.5;
 const NEAR = 0.01; // of the image's width: a click this near to a mask is on it
+
+/**
+ * The masks of a frame as contradictions are found in them.
+ * @param {{ object: import("../api-types").SceneObject, mask: MaskBits }[]} masks
+ * @param {{ index: number, width: number }} frame
+ * @returns {Promise<Shown[]>}
+ */
+export function shownOn(masks, { index, width }) {
+  return Promise.all(
+    masks.flatMap(({ object, mask }) => {
+      if (!mask.box_width) return [];
+      const scale = mask.width / width;
+      const here = object.points.filter((point) => point.frame === index);
+      const clicks = here.map(({ x, y, label }) => ({ x: x * scale, y: y * scale, label }));
+      return [decodeBox(mask).then((pixels) => ({ object: object.id, name: object.name, mask, clicks, pixels }))];
+    }),
+  );
+}
 
 /**
  * @param {Shown[]} shown on one frame

@@ -82,3 +82,6 @@ export function span(shown, from, to) {
 export function meanOf(lane) {
   return lane.size ? [...lane.values()].reduce((sum, sure) => sum + sure, 0) / lane.size : null;
 }
+
+/** Whether the object's masks are being found, or wait for it. @param {{ segment: string }} object */
+export const isComing = ({ segment }) => segment === "waiting" || segment === "running";
