@@ -3,7 +3,8 @@
  * depth, shape and comments. Its status (the segmenter, the last change) stands among the frames, where nothing moves for it. Says "opacity", "sign" and "evidence" when they are changed, "paint" what is to be painted.
  */
 
-import { h, icon, rove, segments, slider } from "../dom.js";
+import { h, icon, segments, slider } from "../dom.js";
+import { rove } from "./rove.js";
 import { SegmenterChip } from "./segmenter-chip.js";
 
 /** @type {[string, string, string][]} */

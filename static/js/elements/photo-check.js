@@ -167,6 +167,11 @@ export class PhotoCheck extends LiveElement {
     return this.#current?.frame ?? null;
   }
 
+  /** Whether it knows no photo: masks may have come before anybody listened. */
+  get isEmpty() {
+    return !this.#all?.photos.length;
+  }
+
   get #current() {
     return this.#all?.photos[this.#at];
   }
@@ -178,7 +183,7 @@ export class PhotoCheck extends LiveElement {
     if (!all || !photo || !all.of.length) {
       this.#tools.replaceChildren();
       this.marks.element.hidden = true;
-      this.#legend.textContent = "No photo to check this object on: run the pipeline first.";
+      this.#legend.textContent = all ? missing(all) : "";
       return this.#strip.replaceChildren();
     }
     this.#photo.src = this.#frameUrl(photo, this.#near ? photo.width : 960);
@@ -379,6 +384,13 @@ export class PhotoCheck extends LiveElement {
   #overlayUrl(photo, of, look) {
     return `/media/${this.project}/overlay/${this.#object}/${photo.frame}.png?of=${of}&look=${look}&v=${this.#all?.version ?? ""}`;
   }
+}
+
+/** Why there is nothing to look at. @param {ObjectPhotos} all */
+function missing({ of }) {
+  return of.length
+    ? "No mask of it yet: its photos are shown once it is found."
+    : "No model to lay over the photos yet: run the pipeline first.";
 }
 
 /** Which photo is of a frame, or of the one nearest to it. @param {Photo[]} photos @param {number} frame */

@@ -85,8 +85,13 @@ export class ReviewPage extends LiveElement {
     on(this.#comments, "comments", (open) => this.#centre.photos.setComments(open));
     on(this.#comments, "show-comment", (comment) => this.#showComment(comment));
     on(live, "review", again);
-    on(live, "hello", ({ reset }) => reset && again());
+    on(live, "hello", ({ reset }) => (reset ? again() : this.#centre.photos.isEmpty && this.#centre.show()));
     on(live, "job", ({ job }) => this.#hear(job));
+    on(
+      live,
+      "segment",
+      ({ object, state }) => state === "done" && object === this.#objects.number && this.#centre.show(),
+    );
     on(outbox, "caught-up", again);
     document.addEventListener("keydown", (event) => isForPage(event) && this.#commands.press(event), { signal });
     document.addEventListener("keyup", ({ key }) => key.toLowerCase() === "b" && this.#centre.photos.blink(false), {

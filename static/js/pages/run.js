@@ -12,6 +12,12 @@ import { live } from "../live.js";
 /** @typedef {import("../api-types").Job} Job */
 
 const SOON_MS = 500;
+/** What a run has to do. */
+const WORK = {
+  none: "Everything is computed.",
+  current: "The result is up to date: running again does no work.",
+  stale: "Only what changed is computed.",
+};
 
 export class RunPage extends LiveElement {
   project = "";
@@ -51,7 +57,7 @@ export class RunPage extends LiveElement {
       const objects = counted(project.counts.objects, "object");
       this.#start.disabled = project.counts.objects === 0;
       this.#lead.textContent = project.counts.objects
-        ? `${objects}. ${project.result === "current" ? "The result is up to date: running again does no work." : "Only what changed is computed."}`
+        ? `${objects}. ${WORK[project.result]}`
         : "Click at least one object on the Annotate page first.";
       if (project.result !== "none") await this.#drawResult(project.result);
       if (project.status === "ready") await this.#before.look(this.project, this.signal);
