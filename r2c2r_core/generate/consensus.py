@@ -132,19 +132,19 @@ def _costs(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule) 
 
 
 def _papers_choice(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], rule: Rule) -> str:
-    """What the published rule (nearest to the mean box and volume) takes, a sentence; empty without a choice."""
+    """What the published rule (nearest to the mean box and volume) takes, to end the sentence; empty without a choice."""
     if len(allowed) < 3 or rule == "mean":
         return ""
     from_mean = _oddness(candidates, allowed, "mean")
     theirs = min(allowed, key=lambda i: (round(float(from_mean[i]), 12), i))
     taken = "takes it too" if theirs == best else f"would take {candidates[theirs].candidate_id}"
-    return f" The paper's rule (nearest to the mean box and volume) {taken}."
+    return f"; the paper's rule (nearest to the mean box and volume) {taken}"
 
 
 def _reason(
     candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray], rule: Rule
 ) -> str:
-    """Up to three sentences for the reviewer: how well it fits, why not its rival, what the paper's rule takes."""
+    """One sentence for the reviewer: how well it fits, why not its rival, what the paper's rule takes."""
     chosen, count = candidates[best], len(allowed)
     passed_over = len(candidates) - count
     skipped = f" ({passed_over} rejected)" if passed_over else ""
@@ -156,17 +156,17 @@ def _reason(
     shape = f"its proportions differ {100 * costs['oddness'][best]:.1f} % from the {middle}, " if counted else ""
     beside = _papers_choice(candidates, best, allowed, rule)
     if "mask_iou" not in chosen.metrics:
-        return f"{name}: {shape}one of {count}{skipped}; its fit to masks and depth is known only after alignment.{beside}"
+        return f"{name}: {shape}one of {count}{skipped}; its fit to masks and depth is known only after alignment{beside}."
     place = 1 + sum(1 for i in allowed if costs["fit"][i] < costs["fit"][best] - 1e-12)
     depth = chosen.metrics.get("depth_residual_m")
     but = _passed_over(candidates, best, allowed, costs)
     residual = f" and its surface within {1000 * depth:.0f} mm of the measured depth" if depth is not None else ""
     agrees = f"its outline agrees {100 * chosen.metrics['mask_iou']:.0f} % with the masks{residual}"
-    return f"{name}: {shape}{agrees}, rank {place} of {count} by fit to both{skipped}.{but}{beside}"
+    return f"{name}: {shape}{agrees}, rank {place} of {count} by fit to both{skipped}{but}{beside}."
 
 
 def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray]) -> str:
-    """Why not the one that fits masks and depth best of the others, where their fit does not say it; a sentence or nothing."""
+    """Why not the one that fits masks and depth best of the others, where their fit does not say it; begins with "; "."""
     params = tuned(Params)
     fit = costs["fit"]
     rival = min((i for i in allowed if i != best and "mask_iou" in candidates[i].metrics), key=lambda i: fit[i], default=None)
@@ -181,4 +181,4 @@ def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[i
         faces=candidates[rival].metrics.get("faces", 0.0),
     )
     fits = "fits better" if fit[rival] < fit[best] - params.fits_alike else "fits as well"
-    return f" {candidates[rival].candidate_id} {fits}, but {said}."
+    return f"; {candidates[rival].candidate_id} {fits}, but {said}"
