@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 import viser.transforms as vtf
 
+from app.viewer.boxes import box_edges
 from app.viewer.clip import Span, clip_of, span_of
 from app.viewer.heat import EDGE_M, HEATS
 from app.viewer.picking import Hit, first_face
@@ -22,6 +23,7 @@ from r2c2r_core.model.scene import ArticulatedScene, Link
 Draw = Literal["meshes", "wireframe", "colliders", "both", "distance", "unobserved"]
 _COLLIDER, _WIRE, _CUT = (86, 180, 233), (120, 130, 145), (230, 60, 150)
 _CUT_M = 0.004  # how thick the edges of a cut are
+_CHOSEN, _CHOSEN_PX = (20, 130, 255), 3  # the box round the chosen object
 
 
 @dataclass(slots=True)
@@ -66,6 +68,7 @@ class Assembly:
     frames: dict[str, Any] = field(default_factory=dict)
     joints: dict[str, JointValue] = field(default_factory=dict)
     hidden: frozenset[str] = frozenset()
+    boxes: list[Any] = field(default_factory=list)  # round the chosen object
     ahead: tuple[float, float] = (0.0, -1.0)  # where fronts face, where none opens
     span: Span = field(init=False)  # of all of it, closed and uncut
     parts: dict[str, tuple[Vector3, Vector3]] = field(init=False)  # by object: what it reaches, as shares of the span
@@ -85,6 +88,20 @@ class Assembly:
         self.hidden = frozenset(names)
         for body in self.plan.bodies:
             self.frames[body.name].visible = body.object_name not in self.hidden
+
+    def choose(self, name: str) -> None:
+        """Draw a box round each body of the chosen object, which moves with it; no box where no object has that name."""
+        for box in self.boxes:
+            box.remove()
+        self.boxes = []
+        for body in self.plan.bodies:
+            points = [shape.vertices for shape in self.shapes[body.name] if len(shape.vertices)]
+            if body.object_name == name and points:
+                ends = box_edges(np.vstack(points).min(axis=0), np.vstack(points).max(axis=0))
+                node = f"{self.frames[body.name].name}/chosen"
+                self.boxes.append(
+                    self.server.scene.add_line_segments(node, ends, _CHOSEN, thickness=_CHOSEN_PX, thickness_units="screen")
+                )
 
     @property
     def bounds(self) -> tuple[Vector3, Vector3]:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import viser.transforms as vtf
 
+from app.viewer.boxes import box_edges
 from r2c2r_core.geometry.transforms import Rigid3
 
 NODE = "/moved/up"  # what is moved hangs here
-_EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 _FRONT, _SIDE = (255, 225, 77), (242, 245, 250)
 
 
@@ -46,8 +46,8 @@ def add(scene: Any, world_from_object: Rigid3, size_m: Sequence[float]) -> Gizmo
     look: dict[str, Any] = {"scale": max(0.8 * max(size_m), 0.3), "disable_sliders": True, "depth_test": False}
     lower = scene.add_transform_controls("/moved", active_axes=(True, True, False), **look)
     upper = scene.add_transform_controls(NODE, active_axes=(False, False, True), disable_rotations=True, **look)
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * np.asarray(size_m)
-    ends = np.array([[corners[a], corners[b]] for a, b in _EDGES], np.float32)
+    half = np.asarray(size_m) / 2
+    ends = box_edges(-half, half)
     front = np.all(ends[:, :, 1] < 0, axis=1)  # the object's front is at -Y
     colours = np.where(np.reshape(front, (-1, 1, 1)), np.array(_FRONT), np.array(_SIDE)).astype(np.uint8)
     scene.add_line_segments(f"{NODE}/box", ends, np.broadcast_to(colours, (len(ends), 2, 3)), thickness=0.006)

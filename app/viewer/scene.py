@@ -252,6 +252,7 @@ class View:
             self.assembled = made_from
         assert self.assembly is not None
         self.assembly.hide(wish.get("hidden") or ())
+        self.assembly.choose(self.chosen)
         self._look_at_all(*self.assembly.bounds)
         return f"{len(self.joints)} joints" + (", colliders" if wish.get("draw") in ("colliders", "both") else "")
 

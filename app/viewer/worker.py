@@ -24,6 +24,9 @@ from r2c2r_core.workspace import Workspace
 AMBIENT = 1.6  # textures carry the room's light already: shown darker than the scan beside them, they look wrong
 
 
+BACKGROUND = ((176, 186, 198), (226, 231, 236))  # RGB, upper and lower: a white kitchen stands out from both
+
+
 class NotOpen(InputError):
     """The view was closed; whoever asked opens it and asks again."""
 
@@ -110,6 +113,17 @@ def _prepared(server: Any) -> Any:
     server.scene.configure_default_lights(cast_shadow=False)
     server.initial_camera.position = server.initial_camera.position  # said: otherwise each page has a place of its own
     server.scene.add_light_ambient("/light", intensity=AMBIENT)
+    shades = np.linspace(*BACKGROUND, 256).round().astype(np.uint8)[:, None]
+    server.scene.set_background_image(np.tile(shades, (1, 8, 1)), format="png")
+    server.scene.add_grid(
+        "/floor",
+        infinite_grid=True,
+        cell_size=0.25,
+        section_size=1.0,
+        cell_color=(196, 202, 210),
+        section_color=(150, 158, 170),
+        fade_distance=12.0,
+    )
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     return server
 

@@ -44,6 +44,21 @@ def test_a_joint_moves_its_body_as_its_axis_says() -> None:
     assert np.arccos((np.trace(turned) - 1) / 2) == pytest.approx(upper)
 
 
+def test_a_box_is_drawn_round_each_body_of_the_chosen_object_and_goes_with_the_choice() -> None:
+    server = MagicMock()
+    server.scene.add_frame.side_effect = lambda node, **_: SimpleNamespace(name=node)
+    server.scene.add_line_segments.side_effect = lambda node, ends, *_, **__: MagicMock(node=node, ends=ends)
+    shown = assemble(server, "/scene", kitchen(), Style(), MagicMock())
+    mine = {shown.frames[body.name].name for body in shown.plan.bodies if body.object_name == "cabinet_1"}
+    shown.choose("cabinet_1")
+    boxes = list(shown.boxes)
+    assert {box.node.rsplit("/", 1)[0] for box in boxes} == mine
+    assert all(np.ptp(box.ends, axis=(0, 1)).min() > 0 for box in boxes)
+    shown.choose("")
+    assert all(box.remove.called for box in boxes)
+    assert shown.boxes == []
+
+
 def test_a_ray_meets_the_first_face_and_nothing_that_is_hidden() -> None:
     shown = assemble(MagicMock(), "/scene", kitchen(), Style(), MagicMock())
     cabinet = next(item for item in kitchen().objects if item.name == "cabinet_1")
