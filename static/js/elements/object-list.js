@@ -5,6 +5,7 @@
  */
 
 import { h, icon, LiveElement, renew, reveal } from "../dom.js";
+import { usedFirst } from "../lib/categories.js";
 import { inkOn } from "../lib/colour.js";
 import { counted, usableName } from "../lib/format.js";
 import { isComing, listed, OF_PEOPLE, ORDERS, span, STATES } from "../lib/listing.js";
@@ -21,6 +22,9 @@ export class ObjectList extends LiveElement {
   new = h("button", { type: "button", class: "primary" }, icon("plus"), "New object");
   #list = h("ul", { class: "object-list" });
   #categories = h("datalist", { id: "categories" });
+  /** @type {import("../api-types").Category[]} */
+  #known = [];
+  #offered = "";
   #search = h("input", { type: "search", placeholder: "Name or category", "aria-label": "Find objects" });
   #found = h("span", { class: "muted", role: "status" });
   #order = options("Order of the objects", ORDERS);
@@ -57,11 +61,20 @@ export class ObjectList extends LiveElement {
     this.#bar.tell = (type, detail) => this.emit(type, detail);
   }
 
-  /** @param {{ name: string, label: string }[]} categories */
+  /** @param {import("../api-types").Category[]} categories */
   setCategories(categories) {
-    this.#categories.replaceChildren(
-      ...categories.map((category) => h("option", { value: category.name }, category.label)),
-    );
+    this.#known = categories;
+    this.#offer();
+  }
+
+  /** What is used here is offered first. */
+  #offer() {
+    const used = this.#entries.map(({ object }) => object.category);
+    const names = usedFirst(this.#known, used);
+    const now = names.map(({ name }) => name).join();
+    if (now === this.#offered) return;
+    this.#offered = now;
+    this.#categories.replaceChildren(...names.map(({ name, label }) => h("option", { value: name }, label)));
   }
 
   /** Whom objects may be assigned to. @param {string[]} names */
@@ -77,6 +90,7 @@ export class ObjectList extends LiveElement {
   /** @param {Listed[]} entries in the order they were made */
   setObjects(entries) {
     this.#entries = toldOnce(entries);
+    this.#offer();
     this.#draw();
   }
 

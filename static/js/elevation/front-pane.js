@@ -4,6 +4,7 @@
  */
 
 import { h, renew } from "../dom.js";
+import { byOpening } from "../lib/categories.js";
 import { heightOf, widthOf } from "../lib/elevation.js";
 import { usableName } from "../lib/format.js";
 import { inOrder } from "../lib/front-rows.js";
@@ -90,10 +91,12 @@ export class FrontPane extends EventTarget {
   /** @param {Category[]} categories */
   setCategories(categories) {
     this.#sideways = new Set(categories.filter(({ sideways }) => sideways).map(({ name }) => name));
-    const others = categories.map(({ name }) => name).filter((name) => !QUICK.includes(name));
+    const option = (/** @type {Category} */ { name, label }) => h("option", { value: name }, label);
     this.#category.replaceChildren(
       ...QUICK.map((name, k) => h("option", { value: name }, `${k + 1}  ${name}`)),
-      ...others.map((name) => h("option", { value: name }, name)),
+      ...byOpening(categories).map(({ text, of }) =>
+        h("optgroup", { label: text }, ...of.filter(({ name }) => !QUICK.includes(name)).map(option)),
+      ),
     );
   }
 

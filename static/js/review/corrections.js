@@ -1,6 +1,7 @@
 /** What a person may correct about one object: hinge, limits, size, place. Each is an override; what depends on it runs again. */
 
 import { h, numberField } from "../dom.js";
+import { byOpening, usedFirst } from "../lib/categories.js";
 import { slidesSideways } from "../lib/joints.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
@@ -14,7 +15,6 @@ import { slidesSideways } from "../lib/joints.js";
  * @property {(template: string | null) => void} buildAs
  */
 
-const OPENS = { revolute: "turns", prismatic: "slides", none: "does not open" };
 const SIDES = /** @type {const} */ (["automatic", "left", "right", "top", "bottom"]);
 const DEGREES = Math.PI / 180;
 
@@ -61,7 +61,7 @@ function hasCorrection({ override }) {
  */
 function kind(group, { categories, categorise, buildAs }) {
   const known = h("datalist", { id: "known-categories" });
-  known.append(...categories.map(({ name, label }) => h("option", { value: name }, label)));
+  known.append(...usedFirst(categories, []).map(({ name, label }) => h("option", { value: name }, label)));
   const field = h("input", {
     value: group.category,
     list: "known-categories",
@@ -71,13 +71,14 @@ function kind(group, { categories, categorise, buildAs }) {
   const select = h("select", { "aria-label": `How ${group.name} opens` });
   const said = group.override.built_as ?? "";
   select.append(h("option", { value: "", selected: !said }, "as its category"));
-  for (const [joint, text] of Object.entries(OPENS)) {
-    const set = h("optgroup", { label: text });
-    const firsts = categories.filter((one, k) => categories.findIndex(({ label }) => label === one.label) === k); // aliases after
-    for (const { name, label } of firsts.filter((one) => one.joint === joint))
-      set.append(h("option", { value: name, selected: name === said }, label));
-    select.append(set);
-  }
+  for (const { text, of } of byOpening(categories))
+    select.append(
+      h(
+        "optgroup",
+        { label: text },
+        ...of.map(({ name, label }) => h("option", { value: name, selected: name === said }, label)),
+      ),
+    );
   select.addEventListener("change", () => buildAs(select.value || null));
   return [
     h("label", {}, h("span", { class: "muted" }, "Category"), field, known),

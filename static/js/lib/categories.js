@@ -1,0 +1,28 @@
+/** Categories as lists offer them; no DOM. */
+
+/** @typedef {import("../api-types").Category} Category */
+
+/** How what is of a category opens, by its joint. */
+const OPENS = { revolute: "turns", prismatic: "slides", none: "does not open" };
+
+/**
+ * Each category once, under the first of its names, by how it opens.
+ * @param {Category[]} categories
+ * @returns {{ text: string, of: Category[] }[]}
+ */
+export function byOpening(categories) {
+  const firsts = categories.filter((one, k) => categories.findIndex(({ label }) => label === one.label) === k);
+  return Object.entries(OPENS).map(([joint, text]) => ({ text, of: firsts.filter((one) => one.joint === joint) }));
+}
+
+/**
+ * Those that are used in this kitchen first, the most used at the head; then all others, synonyms last.
+ * @param {Category[]} categories
+ * @param {string[]} used one for each object
+ * @returns {Category[]}
+ */
+export function usedFirst(categories, used) {
+  const times = (/** @type {Category} */ { name }) => used.filter((one) => one === name).length;
+  const isFirst = (/** @type {Category} */ one) => categories.find(({ label }) => label === one.label) === one;
+  return categories.toSorted((a, b) => times(b) - times(a) || Number(isFirst(b)) - Number(isFirst(a)));
+}

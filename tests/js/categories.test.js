@@ -1,0 +1,31 @@
+import assert from "node:assert/strict";
+import test from "node:test";
+import { byOpening, usedFirst } from "../../static/js/lib/categories.js";
+
+const category = (/** @type {string} */ name, /** @type {string} */ label, /** @type {string} */ joint) => ({
+  name,
+  label,
+  joint,
+  sideways: false,
+});
+const ALL = [
+  category("drawer", "drawer", "prismatic"),
+  category("pull_out", "drawer", "prismatic"),
+  category("cabinet", "cabinet", "revolute"),
+  category("door", "cabinet", "revolute"),
+  category("mug", "mug", "none"),
+];
+
+test("each category is offered once, by how it opens", () => {
+  const names = byOpening(ALL).map(({ text, of }) => [text, ...of.map(({ name }) => name)]);
+  assert.deepEqual(names, [
+    ["turns", "cabinet"],
+    ["slides", "drawer"],
+    ["does not open", "mug"],
+  ]);
+});
+
+test("what a kitchen uses comes first, synonyms last", () => {
+  const names = usedFirst(ALL, ["mug", "door", "mug"]).map(({ name }) => name);
+  assert.deepEqual(names, ["mug", "door", "drawer", "cabinet", "pull_out"]);
+});
