@@ -51,7 +51,7 @@ docs: env
 	NO_MKDOCS_2_WARNING=1 "$(BIN)/mkdocs" build --strict --quiet
 
 bench: env
-	"$(BIN)/python" benchmarks/run.py $(BENCH)
+	"$(BIN)/python" benchmarks/guard.py $(BENCH)
 
 clean:
 	rm -rf "$(VENV)" "$(DATA)" build dist

@@ -1,4 +1,4 @@
-"""The Franka kitchen of the `gymnasium-robotics` wheel as a phone's recording with a truth.
+"""The Franka kitchen of the `gymnasium-robotics` wheel (1.4.2) as a phone's recording with a truth.
 
     python benchmarks/franka.py WHEEL_OR_FOLDER OUT [--frames 120] [--size 640x480] [--seed 0] [--scale 0.575]
 

@@ -2,7 +2,7 @@
 
 import json
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
@@ -138,6 +138,11 @@ def mask_overlap(folder: Path, name: str, found: Path) -> float:
         file = found / f"{frame:06d}.png"
         overlaps.append(mask_iou(true, read_mask(file, like=true)) if file.exists() else 0.0)
     return float(np.mean(overlaps)) if overlaps else 0.0
+
+
+def clicked_overlaps(folder: Path, prompts: Prompts, masks: Path, matched: Mapping[str, str | None]) -> dict[str, float]:
+    """`mask_overlap` of every clicked object; `matched` gives its name in the bundle, whose masks are in `masks`/NAME."""
+    return {each.name: mask_overlap(folder, each.name, masks / (matched.get(each.name) or "-")) for each in prompts.objects}
 
 
 def _middle(prompt: ObjectPrompt, masks: dict[int, Mask | None]) -> tuple[PromptPoint, ...]:

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from recordings import mask_overlap, random_clicks, recording_in, write_prompts
+from recordings import clicked_overlaps, random_clicks, recording_in, write_prompts
 from whole_way import Outcome, whole_way
 
 from r2c2r_core.kitchen.names import category_of
@@ -58,10 +58,7 @@ def run_folder(folder: Path, work: Path, seed: int) -> dict[str, Any]:
     write_prompts(prompts, clicks)
     outcome = whole_way(recording_in(folder), clicks, folder / "truth.json", work)
     found = {} if outcome.evaluation is None else {item["name"]: item for item in outcome.evaluation["objects"]}
-    overlaps = {
-        prompt.name: mask_overlap(folder, prompt.name, work / "masks" / (found.get(prompt.name, {}).get("matched") or "-"))
-        for prompt in prompts.objects
-    }
+    overlaps = clicked_overlaps(folder, prompts, work / "masks", {name: item["matched"] for name, item in found.items()})
     truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))["objects"]
     return row_of(outcome, [item for item in truth if item["name"] in overlaps], overlaps)
 

@@ -26,11 +26,16 @@ class Outcome:
     present: frozenset[str] = frozenset()  # objects of the bundle
 
 
-def whole_way(recording: Path, prompts: Path, truth: Path, work: Path) -> Outcome:
-    """Run the commands; `work` is emptied before, and keeps bundle.zip, run.log, certificate.json and evaluation.json."""
-    shutil.rmtree(work, ignore_errors=True)
-    work.mkdir(parents=True)
+def whole_way(recording: Path, prompts: Path, truth: Path, work: Path, *, anew: bool = True) -> Outcome:
+    """Run the commands; `work` keeps bundle.zip, run.log, certificate.json and evaluation.json.
+
+    With `anew` it is emptied before; else stages whose inputs and code did not change are read from it.
+    """
+    if anew:
+        shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True, exist_ok=True)
     bundle, masks, answer = work / "bundle.zip", work / "masks", work / "evaluation.json"
+    bundle.unlink(missing_ok=True)
     run = [*CLI, "run", str(recording), "--prompts", str(prompts), "-o", str(bundle)]
     cost = run_measured([*run, "--workdir", str(work / "work"), "--masks", str(masks)], cwd=REPOSITORY, log=work / "run.log")
     if not bundle.exists():

@@ -81,11 +81,19 @@ def evaluate_bundle(bundle: Path, truth: Path, *, masks: Path | None = None) -> 
         raise BundleError(f"{masks}: no such folder", hint="give the folder that r2c2r run --masks wrote")
     record = read_bundle(bundle)
     truths = read_truth(truth, record.world_from_capture)
-    matches = match_objects(truths, record.objects)
-    rows = tuple(_row(true, found, truth.parent / "truth_masks", masks) for true, found in zip(truths, matches, strict=True))
-    taken = {found.name for found in matches if found is not None}
+    rows = compare_objects(truths, record.objects, truth.parent / "truth_masks", masks)
+    taken = {row.matched for row in rows}
     surplus = tuple(thing.name for thing in record.objects if thing.name not in taken)
     return Evaluation(rows=rows, scene=scene_metrics(rows), surplus=surplus)
+
+
+def compare_objects(
+    truths: tuple[ObjectRecord, ...], found: tuple[ObjectRecord, ...], truth_masks: Path, masks: Path | None
+) -> tuple[ObjectRow, ...]:
+    """Every true object with its figures; without `masks`, those of masks are None."""
+    return tuple(
+        _row(true, match, truth_masks, masks) for true, match in zip(truths, match_objects(truths, found), strict=True)
+    )
 
 
 def match_objects(truths: tuple[ObjectRecord, ...], found: tuple[ObjectRecord, ...]) -> list[ObjectRecord | None]:

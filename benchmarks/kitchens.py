@@ -1,0 +1,86 @@
+"""The kitchens of the accuracy guard, and the commands that draw them."""
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from whole_way import CLI, REPOSITORY
+
+from r2c2r_core.synthetic.choices import STYLES
+
+_SCRIPTS = Path(__file__).resolve().parent
+_WITH_LZFSE = (  # it imports the codec by the name of another package
+    "import lzfse, runpy, sys; sys.modules['liblzfse'] = lzfse; del sys.argv[0]; "
+    "runpy.run_path(sys.argv[0], run_name='__main__')"
+)
+_OPENED_FILM = ("--frames", "120", "--size", "480x360")
+
+
+class Generators(NamedTuple):
+    """Files of other makers that some kitchens are drawn from."""
+
+    second: Path | None  # make_kitchen.py
+    franka: Path | None  # the gymnasium-robotics wheel, 1.4.2 or later
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuardedKitchen:
+    """How a kitchen is drawn, clicked and measured."""
+
+    command: Callable[[Generators, str], list[str | Path | None]]  # from the generators and the folder to draw into
+    random_clicks: bool = False  # rather than those of its prompts.json
+    edges_only: bool = False  # the edges of fronts from the segmenter alone
+
+
+def _own(*options: str) -> Callable[[Generators, str], list[str | Path | None]]:
+    return lambda _, out: [*CLI, "sample", out, *options]
+
+
+def _second(seed: int) -> GuardedKitchen:
+    options = ("--seed", str(seed), "--frames", "120")
+    return GuardedKitchen(
+        command=lambda by, out: [sys.executable, "-c", _WITH_LZFSE, by.second, out, *options], random_clicks=True
+    )
+
+
+def _second_opened(seed: int) -> GuardedKitchen:
+    script, options = _SCRIPTS / "second_opened.py", ("--seed", str(seed), *_OPENED_FILM)
+    return GuardedKitchen(command=lambda by, out: [sys.executable, script, by.second, out, *options])
+
+
+KITCHENS: dict[str, GuardedKitchen] = {
+    **{f"sample-{seed}": GuardedKitchen(command=_own("--seed", str(seed))) for seed in range(5)},
+    **{f"second-{seed}": _second(seed) for seed in range(100, 105)},
+    "franka": GuardedKitchen(
+        command=lambda by, out: [sys.executable, _SCRIPTS / "franka.py", by.franka, out], random_clicks=True
+    ),
+    "opened-ours-21": GuardedKitchen(command=_own("--opened", "--seed", "21", "--layout", "straight", *_OPENED_FILM)),
+    "opened-second-101": _second_opened(101),
+    **{
+        f"{style}-{seed}": GuardedKitchen(
+            command=_own("--style", style, "--seed", str(seed), "--frames", "60", "--size", "640x480"), edges_only=True
+        )
+        for style in STYLES
+        for seed in (120, 121)
+    },
+}
+FAST = ("sample-0", "sample-3", "second-101", "second-103", "franka", "opened-ours-21")
+
+
+def drawn(name: str, workdir: Path, generators: Generators) -> Path | None:
+    """The kitchen's folder, drawn where it is not there; None where its generator is not given."""
+    folder, unfinished = workdir / name, workdir / f"unfinished-{name}"
+    if folder.exists():
+        return folder
+    command = KITCHENS[name].command(generators, str(unfinished))
+    if None in command:
+        return None
+    shutil.rmtree(unfinished, ignore_errors=True)
+    workdir.mkdir(parents=True, exist_ok=True)
+    subprocess.run([str(word) for word in command], cwd=REPOSITORY, check=True, stdout=subprocess.DEVNULL)
+    unfinished.rename(folder)
+    return folder
