@@ -130,7 +130,7 @@ def _handled(truth: Mapping[str, ObjectRecord], work: Workspace) -> Iterator[Cla
         item = SimpleNamespace(handle=track.front.handle, dimensions_m=size, spec=category_of(track.category))
         with tuning(changed({"synthesize.joints": _AS_IT_IS})):
             hinge = handle_hinge(cast(MeasuredObject, item))
-        x, _, z = true.world_from_object.inverse.apply(turning[0].origin[None])[0] / true.dimensions_m
+        x, _, z = true.world_from_object.inverse.apply(turning[0].origin) / true.dimensions_m
         if hinge is not None and abs(x) > abs(z):
             right = float(hinge.side == ("left" if x < 0 else "right"))
             yield {"of": "hinge", "kind": hinge.source, "object": name, "claim": hinge.confidence, "right": right}

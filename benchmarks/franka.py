@@ -153,7 +153,7 @@ def _owner(model: Any, data: Any, geom: int, things: tuple[TrueObject, ...], sca
     body = model.body(model.geom_bodyid[geom]).name
     lines = [*_BODIES.values(), *_FRONTS.values()]
     for index, (thing, names) in enumerate(zip(things, lines, strict=True)):
-        own = thing.kitchen_from_object.inverse.apply(scale * data.geom_xpos[geom][None])[0]
+        own = thing.kitchen_from_object.inverse.apply(scale * data.geom_xpos[geom])
         if body in names and (names not in _FRONTS.values() or abs(own[0]) <= thing.dimensions_m[0] / 2 + 0.01):
             return index
     return -1

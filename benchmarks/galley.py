@@ -152,8 +152,8 @@ def _moved_motion(motion: JointMotion, new_from_old: Rigid3) -> JointMotion:
     assert motion.pivot_world is not None
     return replace(
         motion,
-        axis_world=new_from_old.turn(motion.axis_world[None])[0],
-        pivot_world=new_from_old.apply(motion.pivot_world[None])[0],
+        axis_world=new_from_old.turn(motion.axis_world),
+        pivot_world=new_from_old.apply(motion.pivot_world),
         covariance=None,
         states={index + _SECOND: state for index, state in motion.states.items()},
     )

@@ -92,7 +92,7 @@ def _scored(thing: ObjectRecord, joint: JointRecord, twist: np.ndarray) -> dict[
         return {"type": 0.0}
     local = turn / length if turns else shift / np.linalg.norm(shift)
     place = np.cross(turn, shift) / length**2 if turns else np.zeros(3)
-    found = Line(origin=thing.world_from_object.apply(place[None])[0], axis=thing.world_from_object.turn(local[None])[0])
+    found = Line(origin=thing.world_from_object.apply(place), axis=thing.world_from_object.turn(local))
     return {"type": 1.0} | _errors(joint, found)
 
 

@@ -162,8 +162,8 @@ def record_of(item: SceneObject) -> ObjectRecord:
         JointRecord(
             name=joint.name,
             type=joint.type,
-            axis=pose.turn(joint.axis_object[None])[0],
-            origin=pose.apply(joint.origin_object[None])[0],
+            axis=pose.turn(joint.axis_object),
+            origin=pose.apply(joint.origin_object),
             lower=joint.lower,
             upper=joint.upper,
             limit_source=joint.sources["limits"],

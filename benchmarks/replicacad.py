@@ -206,7 +206,7 @@ def _joint(name: str, link: Link, pose: Rigid3) -> TrueJoint:
     axis, limit = link.joint.find("axis"), link.joint.find("limit")
     assert axis is not None
     assert limit is not None
-    world_axis = link.place.turn(_numbers(axis.attrib["xyz"])[None])[0]
+    world_axis = link.place.turn(_numbers(axis.attrib["xyz"]))
     limits = (float(limit.attrib["lower"]), float(limit.attrib["upper"]))
     return joint_of(name, link.joint.attrib["type"], world_axis, link.place.translation, limits, pose)
 

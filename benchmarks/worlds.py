@@ -179,7 +179,7 @@ def joint_of(
 ) -> TrueJoint:
     """A joint of a closed thing, turned so that it opens towards positive values."""
     opens = 1.0 if limits[1] > -limits[0] else -1.0
-    side = pose.inverse.apply(np.asarray(origin)[None])[0][0]
+    side = pose.inverse.apply(np.asarray(origin))[0]
     return TrueJoint(
         name=f"{name}_joint",
         type=kind,

@@ -63,7 +63,7 @@ def _crop_around(files: ProjectFiles, points: Points) -> schemas.PromptsFileCrop
     local = points @ room_axes
     low, high = local.min(axis=0) - _ROOM_M, local.max(axis=0) + _ROOM_M
     capture_from_world = level.world_from_capture.inverse
-    corner = capture_from_world.apply((room_axes @ low)[None])[0]
+    corner = capture_from_world.apply(room_axes @ low)
     edges = capture_from_world.turn(np.diag(high - low) @ room_axes.T)
     return schemas.PromptsFileCrop(corner_m=corner.round(6).tolist(), edges_m=edges.round(6).tolist())
 

@@ -47,7 +47,7 @@ def _axes(item: SceneObject) -> list[dict[str, Any]]:
     pose = item.world_from_object
     found = []
     for joint in item.joints:
-        origin, axis = pose.apply(joint.origin_object[None])[0], pose.rotation @ joint.axis_object
+        origin, axis = pose.apply(joint.origin_object), pose.rotation @ joint.axis_object
         half = float(np.abs(joint.axis_object) @ item.dimensions_m) / 2 + _REACH_M
         start, end = (
             (origin - half * axis, origin + half * axis) if joint.type == "revolute" else (origin, origin + joint.upper * axis)

@@ -324,8 +324,8 @@ def _leaf(object_id: int, item: SceneObject, joint: Joint) -> schemas.Leaf:
         most=widest(joint.axis_object, joint.type, item.dimensions_m),
         pose=(item.world_from_object @ Rigid3(np.eye(3), (low + high) / 2)).matrix.tolist(),
         size_m=(high - low).tolist(),
-        axis=item.world_from_object.turn(joint.axis_object[None])[0].tolist(),
-        pivot=item.world_from_object.apply(joint.origin_object[None])[0].tolist(),
+        axis=item.world_from_object.turn(joint.axis_object).tolist(),
+        pivot=item.world_from_object.apply(joint.origin_object).tolist(),
         opening=openings.opening_of(object_id, item, joint),
     )
 

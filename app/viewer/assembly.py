@@ -141,7 +141,7 @@ class Assembly:
         poses, best = self.poses(), None
         for body, shape in self._shown():
             body_from_world = poses[body.name].inverse
-            start, along = body_from_world.apply(origin[None])[0], body_from_world.rotation @ direction
+            start, along = body_from_world.apply(origin), body_from_world.rotation @ direction
             distance = first_face(start, along, shape.vertices, shape.faces)
             if distance is not None and (best is None or distance < best.distance_m):
                 best = Hit(body.object_name, origin + distance * direction, distance)

@@ -13,6 +13,7 @@ from r2c2r_core.align.refine import rim_unit
 from r2c2r_core.align.residuals import Anchors, Rows, all_rows, finest_gate
 from r2c2r_core.align.shape import Shape, spins_alike
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.least_squares import Normal
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.placement import Spread
 from r2c2r_core.model.track import FrontPanel
@@ -74,15 +75,12 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
     params = tuned(Params)
     joined = Rows(*(np.concatenate(column) for column in zip(*rows, strict=True)))
     jacobian = joined.jacobian * unit
-    weighted = jacobian * joined.weight[:, None]
-    floor = 1e-3 * np.eye(7)
-    normal, pull = weighted.T @ jacobian + floor, weighted.T @ joined.residual
+    normal = Normal.of(jacobian, joined.residual, joined.weight) + Normal(1e-3 * np.eye(7), np.zeros(7))
     steps = []
     for frame in np.unique(joined.frame_index[joined.frame_index >= 0]):
         own = joined.frame_index == frame
-        rest = normal - weighted[own].T @ jacobian[own]
-        steps.append(-np.linalg.solve(rest, pull - weighted[own].T @ joined.residual[own]))
-    noise = np.linalg.inv(normal) * max(1.0, params.full_frames / max(len(steps), 1))
+        steps.append((normal - Normal.of(jacobian[own], joined.residual[own], joined.weight[own])).step())
+    noise = np.linalg.inv(normal.information) * max(1.0, params.full_frames / max(len(steps), 1))
     if len(steps) < 2:
         return noise
     apart = np.array(steps) - np.mean(steps, axis=0)

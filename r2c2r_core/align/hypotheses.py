@@ -11,6 +11,7 @@ from r2c2r_core.align.observe import Observation
 from r2c2r_core.align.shape import Shape
 from r2c2r_core.align.view import View, mask_box
 from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.geometry.least_squares import geman_mcclure
 from r2c2r_core.geometry.registration import umeyama_batch
 from r2c2r_core.geometry.transforms import Similarity3, rotation_about_z, rotation_between
 from r2c2r_core.model.track import MaskTrack
@@ -156,7 +157,7 @@ def settle(
             which, scales, rotations, shifts, first_scales, distance, matched = (
                 values[few] for values in (which, scales, rotations, shifts, first_scales, distance, matched)
             )
-        weight = 1.0 / (1.0 + (distance / gate) ** 2) ** 2
+        weight = geman_mcclure(distance, gate)
         target = np.broadcast_to(sample[None], matched.shape)
         scales, rotations, shifts = umeyama_batch(matched, target, weight)
         bounded = np.clip(scales, params.resized[0] * first_scales, params.resized[1] * first_scales)

@@ -138,8 +138,8 @@ def _rough_centre(capture: Capture, track: MaskTrack, frame: Frame) -> Vector3:
         return np.asarray(known.mean(axis=0))
     points = masked_points(frame, capture.images.depth(frame.index), unpack_mask(track.masks[frame.index]))
     if not len(points):
-        return np.asarray(frame.world_from_camera.apply(np.array([[0.0, 0.0, 1.0]]))[0])
-    return np.asarray(frame.world_from_camera.apply(np.median(points, axis=0)[None])[0])
+        return np.asarray(frame.world_from_camera.apply(np.array([0.0, 0.0, 1.0])))
+    return np.asarray(frame.world_from_camera.apply(np.median(points, axis=0)))
 
 
 def _centre(points: Points, track: MaskTrack) -> Vector3:

@@ -10,6 +10,7 @@ from r2c2r_core.align.observe import Observation
 from r2c2r_core.align.residuals import Anchors, Rows, all_rows, finest_gate, pivot_of, point_rows
 from r2c2r_core.align.shape import Shape
 from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.geometry.least_squares import Normal
 from r2c2r_core.geometry.transforms import Similarity3
 
 
@@ -38,20 +39,15 @@ def loosest_motion(
     pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted]
 ) -> tuple[np.ndarray, float]:
     """The step (7,) of turn and shift that all the evidence together holds least, of a metre at the rim, and its spread (m)."""
-    normal, _ = normal_equations(all_rows(pose, shape, observation, anchors, lifted, finest_gate(observation)))
+    normal = sum_rows(all_rows(pose, shape, observation, anchors, lifted, finest_gate(observation)))
     unit = rim_unit(observation.size_m)[:6]
-    values, vectors = np.linalg.eigh(normal[:6, :6] * np.outer(unit, unit))
+    values, vectors = np.linalg.eigh(normal.information[:6, :6] * np.outer(unit, unit))
     return np.append(unit * vectors[:, 0], 0.0), float(1.0 / np.sqrt(max(values[0], 1e-12)))
 
 
-def normal_equations(rows: list[Rows]) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted normal matrix (7, 7) and right side (7,)."""
-    normal, right = np.zeros((7, 7)), np.zeros(7)
-    for part in rows:
-        weighted = part.jacobian * part.weight[:, None]
-        normal += weighted.T @ part.jacobian
-        right -= weighted.T @ part.residual
-    return normal, right
+def sum_rows(rows: list[Rows]) -> Normal:
+    """Normal equations of all factors, over turn, shift and log scale."""
+    return sum((Normal.of(part.jacobian, part.residual, part.weight) for part in rows), Normal(np.zeros((7, 7)), np.zeros(7)))
 
 
 def rim_unit(size_m: float) -> np.ndarray:
@@ -62,16 +58,15 @@ def rim_unit(size_m: float) -> np.ndarray:
 
 def _solve(rows: list[Rows], size_m: float, free_scale: bool) -> np.ndarray:
     """The damped step (7,), bounded to 6 degrees, a tenth of the size and 8 % of scale."""
-    normal, right = normal_equations(rows)
-    unit = rim_unit(size_m)
-    scaled = normal * np.outer(unit, unit)
+    normal, unit = sum_rows(rows), rim_unit(size_m)
+    scaled, right = normal.information * np.outer(unit, unit), unit * normal.pull
     # One observation of half a size stops directions that nothing holds.
     scaled += np.eye(7) * (1e-6 * np.trace(scaled) / 7 + 4.0 / max(size_m, 1e-3) ** 2)
     if not free_scale:
         scaled[6, :], scaled[:, 6] = 0.0, 0.0
         scaled[6, 6] = 1.0
         right[6] = 0.0
-    step = unit * np.linalg.solve(scaled, unit * right)
+    step = unit * np.linalg.solve(scaled, right)
     limits = np.array([np.radians(6)] * 3 + [0.1 * size_m] * 3 + [0.08])
     return np.asarray(step / max(1.0, float((np.abs(step) / limits).max())))
 

@@ -18,6 +18,7 @@ from r2c2r_core.align.view import Params as ViewParams
 from r2c2r_core.align.view import View
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.camera import ray_slopes
+from r2c2r_core.geometry.least_squares import geman_mcclure
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.tuning import param, tuned
@@ -124,7 +125,7 @@ def point_rows(pose: Similarity3, shape: Shape, observation: Observation, pivot:
     normals = shape.normals[nearest] @ pose.rotation.T
     residual = np.einsum("nj,nj->n", normals, placed - observed)
     apart = np.linalg.norm(placed - observed, axis=1)
-    weight = 1.0 / (1.0 + (apart / gate) ** 2) ** 2 / observation.noise_m**2
+    weight = geman_mcclure(apart, gate) / observation.noise_m**2
     if shape.oriented:
         weight[np.einsum("nj,nj->n", normals, observation.towards_camera) < params.away] = 0.0
     weight *= params.points / len(observed)
@@ -161,7 +162,7 @@ def keypoint_rows(pose: Similarity3, lifted: Sequence[Lifted], pivot: Vector3, g
     across = np.linalg.norm(apart - along[:, None] * rays, axis=1)
     params = tuned(Params)
     near = np.abs(along) < params.noise * np.concatenate([m.noise_m for m in matched]) + gate
-    weight = near / (1.0 + (across / gate) ** 2) ** 2 / (params.keypoint_px * pixel_m + params.keypoint_m) ** 2
+    weight = near * geman_mcclure(across, gate) / (params.keypoint_px * pixel_m + params.keypoint_m) ** 2
     weight *= min(1.0, params.keypoints / max(int(np.count_nonzero(near & (across < gate))), 1))
     helper = np.where(np.abs(rays[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     first = np.cross(rays, helper)
@@ -200,7 +201,7 @@ def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector
 
 def pivot_of(pose: Similarity3, shape: Shape) -> Vector3:
     """The middle of the placed mesh."""
-    return np.asarray(pose.apply(((shape.points.min(axis=0) + shape.points.max(axis=0)) / 2)[None])[0])
+    return np.asarray(pose.apply((shape.points.min(axis=0) + shape.points.max(axis=0)) / 2))
 
 
 def _outline_of_view(shape: Shape, vertices: Points, behind: np.ndarray, view: View, pivot: Vector3, gate: float) -> Rows:
@@ -220,7 +221,7 @@ def _outline_of_view(shape: Shape, vertices: Points, behind: np.ndarray, view: V
     x, y = ray_slopes(columns, rows, view.camera)
     points = view.world_from_camera.apply(np.stack([x, y, np.ones(len(x))], axis=1) * depth[:, None])
     direction = np.stack([g[:, 0], g[:, 1], -g[:, 0] * x - g[:, 1] * y], axis=1)
-    weight = usable / (1.0 + (residual / gate) ** 2) ** 2 / np.maximum(metres_per_px, tuned(Params).outline_m) ** 2
+    weight = usable * geman_mcclure(residual, gate) / np.maximum(metres_per_px, tuned(Params).outline_m) ** 2
     jacobian = _jacobian(points - pivot, view.world_from_camera.turn(direction))
     return Rows(jacobian, residual, weight, np.full(len(residual), view.frame_index))
 
@@ -257,7 +258,7 @@ def _panel_rows(pose: Similarity3, shape: Shape, front: FrontPanel, pivot: Vecto
         for edge, wanted in ((inner_low - overhang, -size / 2), (inner_high + overhang, size / 2)):
             middle = np.median(face, axis=0)
             middle[axis] = edge
-            point = front.world_from_front.apply(middle[None])[0]
+            point = front.world_from_front.apply(middle)
             rows.append(
                 (_jacobian((point - pivot)[None], axes[:, axis][None])[0], float(edge - wanted), trust / params.edge_m**2)
             )

@@ -66,8 +66,8 @@ def _hinge_agrees(truth: ObjectRecord, found: ObjectRecord, a: JointRecord, b: J
 
 def _side(thing: ObjectRecord, joint: JointRecord) -> str:
     """left, right, top or bottom: where the hinge line passes the box's centre."""
-    axis = thing.world_from_object.inverse.turn(joint.axis[None])[0]
-    origin = thing.world_from_object.inverse.apply(joint.origin[None])[0]
+    axis = thing.world_from_object.inverse.turn(joint.axis)
+    origin = thing.world_from_object.inverse.apply(joint.origin)
     if abs(axis[2]) > abs(axis[0]):
         # Of two leaves each hinge lies on its own half, so the sign alone tells left from right.
         return "left" if origin[0] < 0 else "right"

@@ -171,7 +171,7 @@ def joint_line(origin: Any, axis: Any, world_from_file: Rigid3) -> tuple[Vector3
     length = float(np.linalg.norm(direction))
     if length < 1e-9:
         raise ValueError("a joint axis of length 0")
-    return world_from_file.apply(_vector(origin)[None])[0], world_from_file.turn(direction[None] / length)[0]
+    return world_from_file.apply(_vector(origin)), world_from_file.turn(direction / length)
 
 
 def _true_motion(entry: dict[str, Any]) -> MotionRecord:

@@ -157,7 +157,7 @@ def _free(pose: Rigid3, start: object, way: Vector3, half_m: tuple[float, float]
 def _opening(body: Body, joint: Joint, spot: Vector3) -> Vector3:
     axis = np.asarray(body.axis_body)
     way = axis if joint.type == "prismatic" else np.cross(axis, spot)
-    return np.asarray(body.world_from_body.turn((way / np.linalg.norm(way))[None])[0])
+    return np.asarray(body.world_from_body.turn(way / np.linalg.norm(way)))
 
 
 def _joined(boxes: Sequence[Box]) -> list[list[Box]]:

@@ -133,8 +133,8 @@ def _joint_entry(item: SceneObject, body: Body, plan: Plan) -> dict[str, Any]:
     return {
         "name": body.joint_name,
         "type": joint.type,
-        "axis": _plain(item.world_from_object.turn(joint.axis_object[None])[0]),
-        "origin": _plain(item.world_from_object.apply(joint.origin_object[None])[0]),
+        "axis": _plain(item.world_from_object.turn(joint.axis_object)),
+        "origin": _plain(item.world_from_object.apply(joint.origin_object)),
         "lower": _plain(joint.lower),
         "upper": _plain(joint.upper),
         "uncut": _plain(joint.uncut),

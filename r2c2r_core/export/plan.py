@@ -172,7 +172,7 @@ def _moved_box(box: Box, new_from_old: Rigid3) -> Box:
 
 def _moved_inertial(inertial: Inertial, new_from_old: Rigid3) -> Inertial:
     turn = new_from_old.rotation
-    com = new_from_old.apply(inertial.com_link[None])[0]
+    com = new_from_old.apply(inertial.com_link)
     return Inertial(mass_kg=inertial.mass_kg, com_link=com, inertia=turn @ inertial.inertia @ turn.T)
 
 

@@ -141,7 +141,7 @@ def _body_differences(expected: HeldBody, found: HeldBody) -> Iterator[str]:
 def _expected_joint(joint: UrdfJoint, world_from_child: Rigid3) -> HeldJoint:
     values = {"lower": 0.0, "upper": 0.0, "effort": 0.0, "velocity": 0.0, "damping": 0.0, "friction": 0.0}
     values |= {k: v for k, v in ((joint.limit or {}) | (joint.dynamics or {})).items() if k in values}
-    axis = world_from_child.turn(joint.axis[None])[0]
+    axis = world_from_child.turn(joint.axis)
     return HeldJoint(type=joint.type, axis_world=axis, origin_world=world_from_child.translation, **values)
 
 
@@ -150,7 +150,7 @@ def _expected_body(link: UrdfLink, world_from_link: Rigid3) -> HeldBody:
     turn = world_from_link.rotation
     return HeldBody(
         mass_kg=link.inertial.mass_kg,
-        com_world=world_from_link.apply(link.inertial.com_link[None])[0],
+        com_world=world_from_link.apply(link.inertial.com_link),
         inertia_world=turn @ link.inertial.inertia @ turn.T,
         rotation_world=turn,
         origin_world=world_from_link.translation,

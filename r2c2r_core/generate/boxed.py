@@ -84,7 +84,7 @@ def appliance_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hyp
         depth = max(behind.depth_m * _scale(behind, variation), seen_m)
         high[1] = low[1] + depth
         found = relief(variation) if relief is not None else NO_RELIEF
-        at = box.world_from_object.inverse.apply(front.world_from_front.translation[None])[0] if front is not None else low
+        at = box.world_from_object.inverse.apply(front.world_from_front.translation) if front is not None else low
         made = _box_with_relief(BoxPart(low, high), box.world_from_object, at, found, handle)
         error = abs(depth - depths[0].depth_m) + _handle_error(found, handle)
         return replace(made, parameters={**made.parameters, "depth_m": depth}, unseen_error_m=error)
@@ -144,7 +144,7 @@ def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vec
     width, thought, height = (float(v) for v in box.dimensions_m)
     end = rear_edge(low, high, evidence.pool, box.world_from_object)
     measured = end - float(low[1])
-    front = Rigid3(box.world_from_object.rotation, box.world_from_object.apply(np.array([[0.0, float(low[1]), 0.0]]))[0])
+    front = Rigid3(box.world_from_object.rotation, box.world_from_object.apply(np.array([0.0, float(low[1]), 0.0])))
     assumed = depths_behind(evidence.capture, front, width, height, category)
     if measured > tuned(Params).most_hidden * category.depth.usual and _side_seen(box, evidence.pool):
         return distinct([DepthBehind(measured, "seen"), DepthBehind(thought, "box"), *assumed]), 0.0
@@ -171,7 +171,7 @@ def _measured_box(evidence: Evidence, box: ThingBox, variation: Variation) -> tu
 
 def _face_points(view: View, box: ThingBox, half: Vector3, axis: int, sign: float, erosion_px: float) -> np.ndarray:
     """Coordinates along `axis` of the view's points on one face, where the view looks at that face."""
-    eye = box.world_from_object.inverse.apply(view.eye_world[None])[0]
+    eye = box.world_from_object.inverse.apply(view.eye_world)
     towards = eye - np.where(np.arange(3) == axis, sign * half, 0.0)
     if sign * towards[axis] < tuned(Params).looked_at * np.linalg.norm(towards):
         return np.zeros(0)

@@ -17,6 +17,7 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.generate.evidence import View
 from r2c2r_core.geometry.boxes import box_corners, upright_box
 from r2c2r_core.geometry.camera import project, sample_nearest, unproject
+from r2c2r_core.geometry.least_squares import cauchy, cauchy_loss
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.tuning import param, tuned
@@ -164,28 +165,17 @@ class _Problem:
         self._scales: np.ndarray = scales
 
     def fitted(self, start: np.ndarray, rounds: int) -> tuple[np.ndarray, float]:
-        """Parameters after damped Gauss-Newton steps with Cauchy weights, and their robust cost."""
-        current, damping = start, 1e-3
-        residual = self._residuals(current)
-        cost = self._cost(residual)
-        for _ in range(rounds):
-            slope = self._slope(current, residual)
-            weight = self._weights / (1.0 + (residual / self._scales) ** 2)
-            system = slope.T @ (slope * weight[:, None])
-            step = np.linalg.solve(system + damping * np.diag(np.diag(system) + 1e-9), -slope.T @ (residual * weight))
-            tried = current + np.clip(step, -0.1, 0.1)
-            tried_residual = self._residuals(tried)
-            tried_cost = self._cost(tried_residual)
-            if tried_cost < cost:
-                gain, current, residual, cost = cost - tried_cost, tried, tried_residual, tried_cost
-                damping = max(damping / 5, 1e-6)
-                if gain < 1e-4 * cost:
-                    break
-            else:
-                damping *= 10
-                if damping > 1e3:
-                    break
-        return current, cost
+        """Parameters of the least robust cost from `start` (Cauchy kernel, trust region), and that cost."""
+        from scipy.optimize import least_squares
+
+        sigma = self._weights**-0.5
+        solved = least_squares(
+            lambda parameters: self._residuals(parameters) / sigma,
+            start,
+            loss=cauchy_loss(self._scales / sigma),
+            max_nfev=rounds,
+        )
+        return solved.x, 2.0 * float(solved.cost)
 
     def median_distance(self, parameters: np.ndarray) -> float:
         """Of the depth points from the box's surface, metres."""
@@ -195,17 +185,11 @@ class _Problem:
         """Standard deviation of width, depth and height by the curvature at the fit, some rows left out."""
         residual = self._residuals(parameters)
         slope = self._slope(parameters, residual)
-        weight = self._weights / (1.0 + (residual / self._scales) ** 2)
+        weight = self._weights * cauchy(residual, self._scales)
         weight[list(left_out)] = 0.0
         covariance = np.linalg.pinv(slope.T @ (slope * weight[:, None]) + 1e-3 * np.eye(6))
         difference = np.array([[0, -1, 1, 0, 0, 0], [0, 0, 0, -1, 1, 0], [0, 0, 0, 0, 0, 1]], dtype=np.float64)
         return np.asarray(np.sqrt(np.diag(difference @ covariance @ difference.T)))
-
-    def _cost(self, residual: np.ndarray) -> float:
-        bounded = np.isfinite(self._scales)
-        scale = np.where(bounded, self._scales, 1.0)
-        loss = np.where(bounded, scale**2 * np.log1p((residual / scale) ** 2), residual**2)
-        return float(self._weights @ loss)
 
     def _slope(self, parameters: np.ndarray, residual: np.ndarray) -> np.ndarray:
         step = 1e-4

@@ -83,7 +83,7 @@ def object_centre(capture: Capture, track: MaskTrack, frame: Frame) -> Vector3:
     view = _load_view(capture, track.masks[frame.index], frame, 1.0)
     points = masked_points(view)
     if len(points) == 0:
-        return frame.world_from_camera.apply(np.array([[0.0, 0.0, 1.5]]))[0]
+        return frame.world_from_camera.apply(np.array([0.0, 0.0, 1.5]))
     return np.median(points, axis=0)
 
 

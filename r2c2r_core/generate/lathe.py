@@ -12,6 +12,7 @@ from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.generate.evidence import View
 from r2c2r_core.generate.symmetry import Revolution
 from r2c2r_core.geometry.camera import project, sample_nearest, unproject
+from r2c2r_core.geometry.least_squares import cauchy
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.tuning import param, tuned
 
@@ -127,10 +128,10 @@ def _balanced_centre(points: Points, profile: Revolution, balance: np.ndarray, s
     distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-6)
     body = (points[:, 2] > profile.heights_m[0]) & (points[:, 2] < profile.heights_m[-1])
     residual = distance - np.interp(points[:, 2], profile.heights_m, profile.radii_m)
-    weight = np.where(body, 1.0 / (1.0 + (residual / scale_m) ** 2), 0.0)
+    weight = np.where(body, cauchy(residual, scale_m), 0.0)
     rows = (offset / distance[:, None]) * weight[:, None]
     # masks fix the axis sideways; how far away it is they only tell through pose errors, so depth weighs more
-    share = tuned(Params).mask_weight * weight.sum() / max(len(balance), 1) / (1.0 + (balance[:, 2:] / scale_m) ** 2)
+    share = tuned(Params).mask_weight * weight.sum() / max(len(balance), 1) * cauchy(balance[:, 2:], scale_m)
     system = np.concatenate([rows, balance[:, :2] * share])
     target = np.concatenate([residual * weight, balance[:, 2] * share[:, 0]])
     step = np.linalg.lstsq(system, target, rcond=None)[0]
@@ -200,7 +201,7 @@ def _silhouette_top(
     rim = float(revolution.radii_m[-1])
     tops = []
     for view in views:
-        eye = world_from_local.inverse.apply(view.eye_world[None])[0]
+        eye = world_from_local.inverse.apply(view.eye_world)
         away = np.append(revolution.centre - eye[:2], 0.0)
         points = _axis_points(revolution, heights) + rim * away / max(float(np.linalg.norm(away)), 1e-9)
         pixel = project((view.world_from_camera.inverse @ world_from_local).apply(points), view.rgb_camera)

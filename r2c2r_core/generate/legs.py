@@ -17,6 +17,7 @@ from r2c2r_core.generate.carved import Carving
 from r2c2r_core.generate.evidence import View
 from r2c2r_core.generate.relief import BoxPart
 from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.geometry.least_squares import cauchy, fit_linear
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.tuning import param, tuned
@@ -218,12 +219,9 @@ def _steady_line(middles: Points) -> tuple[np.ndarray, np.ndarray] | None:
     if len(np.unique(np.round(middles[:, 2] / params.step_m))) < params.least_steps:
         return None
     system = np.column_stack([middles[:, 2], np.ones(len(middles))])
-    weight: np.ndarray = np.ones(len(middles))
-    solution: np.ndarray = np.zeros((2, 2))
-    for _ in range(10):
-        solution = np.linalg.lstsq(system * weight[:, None], middles[:, :2] * weight[:, None], rcond=None)[0]
-        off = np.linalg.norm(system @ solution - middles[:, :2], axis=1)
-        weight = 1.0 / np.sqrt(1.0 + (off / params.line_m) ** 2)
+    start = np.linalg.lstsq(system, middles[:, :2], rcond=None)[0]
+    solution, _ = fit_linear(system, middles[:, :2], cauchy, params.line_m, rounds=9, start=start)
+    off = np.linalg.norm(system @ solution - middles[:, :2], axis=1)
     return (solution[0], solution[1]) if np.median(off) < params.steady_m else None
 
 

@@ -60,7 +60,7 @@ def _continued(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where pixels' rays cross the plane of a face (y), and how far behind the crossing, along y, the surface they hit lies."""
     params = tuned(Params)
-    eye = world_from_local.inverse.apply(view.eye_world[None])[0]
+    eye = world_from_local.inverse.apply(view.eye_world)
     face = high[axis] if side > 0 else low[axis]
     if side * (eye[axis] - face) <= 0.05:
         return np.zeros(0), np.zeros(0)

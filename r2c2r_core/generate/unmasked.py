@@ -81,7 +81,7 @@ def _hits_and_known(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Of the two depth pixels at each (height, distance to either side of the axis): how many lie on the body, or on either."""
     params = tuned(Params)
-    eye = world_from_local.inverse.apply(view.eye_world[None])[0]
+    eye = world_from_local.inverse.apply(view.eye_world)
     away = revolution.centre - eye[:2]
     away /= max(float(np.linalg.norm(away)), 1e-9)
     rim = float(revolution.radii_m[-1])

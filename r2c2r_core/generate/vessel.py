@@ -94,7 +94,7 @@ def _shown(revolution: Revolution, azimuth: float, views: Sequence[View], world_
     body = np.array([[*revolution.centre, z] for z in heights])
     held = []
     for view in views:
-        eye = world_from_local.inverse.apply(view.eye_world[None])[0]
+        eye = world_from_local.inverse.apply(view.eye_world)
         towards = (revolution.centre - eye[:2]) / max(float(np.linalg.norm(revolution.centre - eye[:2])), 1e-9)
         if abs(out @ [towards[1], -towards[0]]) * (radius + _reaches_m()[2]) < params.beside * radius:
             continue

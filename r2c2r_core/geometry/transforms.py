@@ -18,7 +18,7 @@ from typing import overload
 
 import numpy as np
 
-from r2c2r_core.arrays import Matrix3, Matrix4, Points, Vector3
+from r2c2r_core.arrays import Matrix3, Matrix4, PointField, Vector3
 
 CAMERA_CV_FROM_GL = np.diag([1.0, -1.0, -1.0])
 """OpenCV camera axes from OpenGL / ARKit camera axes (x right, y up, z back)."""
@@ -55,12 +55,12 @@ class Rigid3:
             return Similarity3(other.scale, rotation, translation)
         return Rigid3(rotation, translation)
 
-    def apply(self, points: Points) -> Points:
-        """Points (n, 3) of the source frame, in the destination frame."""
+    def apply(self, points: PointField) -> PointField:
+        """Points (..., 3) of the source frame, in the destination frame."""
         return points @ self.rotation.T + self.translation
 
-    def turn(self, directions: Points) -> Points:
-        """Directions (n, 3) of the source frame, in the destination frame."""
+    def turn(self, directions: PointField) -> PointField:
+        """Directions (..., 3) of the source frame, in the destination frame."""
         return directions @ self.rotation.T
 
     @staticmethod
@@ -100,8 +100,8 @@ class Similarity3:
         moved = self.scale * self.rotation @ other.translation + self.translation
         return Similarity3(self.scale * scale, self.rotation @ other.rotation, moved)
 
-    def apply(self, points: Points) -> Points:
-        """Points (n, 3) of the source frame, in the destination frame."""
+    def apply(self, points: PointField) -> PointField:
+        """Points (..., 3) of the source frame, in the destination frame."""
         return self.scale * points @ self.rotation.T + self.translation
 
 

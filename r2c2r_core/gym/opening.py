@@ -69,7 +69,7 @@ class OpenEnv(RobotEnv):
     def view(self) -> tuple[Vector3, Vector3]:
         """The front."""
         pose = self.travel.world_from_closed
-        return pose.apply(self.travel.part.front.centre[None])[0], -pose.rotation[:, 1]
+        return pose.apply(self.travel.part.front.centre), -pose.rotation[:, 1]
 
     def _progress(self) -> tuple[float, float]:
         """Share opened, and metres to the grasp."""
@@ -80,7 +80,7 @@ class OpenEnv(RobotEnv):
     def _state(self) -> np.ndarray:
         rig, travel = self.rig, self.travel
         goal = self.way.opens.world_from_tool(travel, travel.position(rig))
-        inside = goal.inverse.apply(rig.world_from_tool.translation[None])[0]
+        inside = goal.inverse.apply(rig.world_from_tool.translation)
         speed = float(rig.data.qvel[rig.model.joint(self.joint).dofadr[0]]) / travel.upper
         touching = any(pull.body == travel.part.body and pull.geom in rig.pads for pull in rig.pulls())
         share = travel.position(rig) / travel.upper

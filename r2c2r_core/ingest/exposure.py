@@ -14,6 +14,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Faces, Points
 from r2c2r_core.geometry.camera import project, sample_nearest
+from r2c2r_core.geometry.least_squares import cauchy
 from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.ingest.planes import sample_surface
 from r2c2r_core.model.capture import Frame, FrameImages
@@ -115,7 +116,7 @@ def solve_gains(looks: Looks, frames: int) -> np.ndarray:
         for channel in range(3):
             gains[:, channel] = _solved(looks, looks.log_rgb[:, channel], weight, frames, params.held)
         residual = np.linalg.norm(looks.log_rgb + gains[looks.frame] - _surface(looks, gains, weight)[looks.point], axis=1)
-        weight = np.where(shows[looks.frame], 1.0 / (1.0 + (residual / params.outlier) ** 2), 0.0)
+        weight = np.where(shows[looks.frame], cauchy(residual, params.outlier), 0.0)
     gains -= np.median(gains[shows], axis=0)
     return np.clip(np.where(shows[:, None], gains, 0.0), -params.most, params.most)
 

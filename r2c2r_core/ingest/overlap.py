@@ -9,6 +9,7 @@ import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Points
 from r2c2r_core.geometry.camera import Intrinsics, depth_points, project, sample_nearest, unproject
+from r2c2r_core.geometry.least_squares import geman_mcclure
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame, FrameImages
 from r2c2r_core.tuning import param, tuned
@@ -117,7 +118,7 @@ def match(first: SmallView, second: SmallView, world_from_first: Rigid3, world_f
     agree = np.einsum("nd,nd->n", first.point_normals @ facing.T, normals) > tuned(Params).normal_cos
     ok = inside & (measured > 0) & (there[:, 2] > 0.05) & agree & (np.abs(gap) < reach_m) & (apart < 2.0 * reach_m + 0.05)
     sigma = 0.004 + 0.002 * measured[ok] ** 2  # of fused Kinect and LiDAR depth
-    robust = 1.0 / (1.0 + (gap[ok] / np.maximum(2.0 * sigma, 0.3 * reach_m)) ** 2) ** 2  # Geman-McClure
+    robust = geman_mcclure(gap[ok], np.maximum(2.0 * sigma, 0.3 * reach_m))
     return Match(
         moved[ok], world_from_second.apply(still[ok]), world_from_second.turn(normals[ok].astype(np.float64)), robust / sigma**2
     )

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from r2c2r_core.geometry.least_squares import Normal
 from r2c2r_core.geometry.transforms import Rigid3, nearest_rotation
 from r2c2r_core.ingest.cloud import spread_frames
 from r2c2r_core.ingest.overlap import SmallView, match, overlaps, small_view
@@ -173,10 +174,10 @@ def bring_together(
                     -np.cross(found.still - current[j].translation, found.normals),
                 ]
             )
-            weighted = slopes * (found.weights * (params.independent / len(found.weights)))[:, None]
+            normal = Normal.of(slopes, found.gaps_m, found.weights * (params.independent / len(found.weights)))
             rows = np.r_[6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
-            matrix[np.ix_(rows, rows)] += weighted.T @ slopes
-            pull[rows] -= weighted.T @ found.gaps_m
+            matrix[np.ix_(rows, rows)] += normal.information
+            pull[rows] += normal.pull
         corrections += np.linalg.solve(matrix, pull).reshape(count, 6)
         current = [_corrected(pose, c) for pose, c in zip(poses, corrections, strict=True)]
     return current

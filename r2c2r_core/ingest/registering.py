@@ -46,7 +46,7 @@ def register_depth(
     for position, frame in enumerate(frames):
         progress.at(position / len(frames), f"registering depth {position + 1}/{len(frames)}")
         changed = as_colour_sees(frame, found)
-        shift_m = frame.world_from_camera.inverse.apply(changed.world_from_camera.translation[None])[0]
+        shift_m = frame.world_from_camera.inverse.apply(changed.world_from_camera.translation)
         write_depth(
             store, frame.index, redrawn(images.depth(frame.index).metres, frame.depth_camera, changed.depth_camera, shift_m)
         )

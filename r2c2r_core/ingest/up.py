@@ -8,6 +8,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import OverrideError
+from r2c2r_core.geometry.least_squares import cauchy
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.planes import Plane
 from r2c2r_core.tuning import param, tuned
@@ -91,7 +92,7 @@ def find_up(planes: Sequence[Plane], guess: Vector3, within_deg: float) -> tuple
             off_deg, sign = _off_deg(plane, up)
             if off_deg > reach_deg:
                 continue
-            weight = plane.area_m2 / (1.0 + (off_deg / 1.5) ** 2)
+            weight = plane.area_m2 * float(cauchy(off_deg, 1.5))
             matrix += sign * weight * np.outer(plane.normal, plane.normal)
             weight_sum += weight
             area_m2 += plane.area_m2

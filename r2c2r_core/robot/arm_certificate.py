@@ -49,7 +49,7 @@ def certify_with_arm(
     arm, gripper = arm_in(scene), gripper_in(scene)
     joints = joints_of(arm.model)
     travels = {joint: travel for joint in joints if (travel := travel_of(arm, joint)) is not None}
-    handles = [t.world_from_closed.apply((t.part.bar or t.part.front).centre[None])[0] for t in travels.values()]
+    handles = [t.world_from_closed.apply((t.part.bar or t.part.front).centre) for t in travels.values()]
     floor = free_floor(arm.model, arm.data, arm.own, handles)
     ways: dict[str, Way] = {}
     reached: dict[str, dict[Stand, Reach]] = {joint: {} for joint in joints}

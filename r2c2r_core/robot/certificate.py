@@ -200,7 +200,7 @@ def film_of_joint(rig: Rig, travel: Travel, surfaces: Surfaces, least_m: float =
     """A film of its front, at least so much on all sides of it."""
     pose, front = travel.world_from_closed, travel.part.front
     reach_m = max(0.8 * float(front.size[0]), 0.8 * float(front.size[2]), least_m)
-    return film_of(surfaces, rig.model, pose.apply(front.centre[None])[0], _level(-pose.rotation[:, 1]), reach_m)
+    return film_of(surfaces, rig.model, pose.apply(front.centre), _level(-pose.rotation[:, 1]), reach_m)
 
 
 def _seen_from(rig: Rig, pick: Pick) -> Vector3:

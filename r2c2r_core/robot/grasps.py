@@ -216,7 +216,7 @@ def _edges(travel: Travel) -> Iterable[Vector3]:
     across, up = np.eye(3)[0], np.eye(3)[2]
     if not travel.hinged:
         return (up, across, -across, -up)
-    arm = travel.part.front.centre - travel.world_from_closed.inverse.apply(travel.anchor[None])[0]
+    arm = travel.part.front.centre - travel.world_from_closed.inverse.apply(travel.anchor)
     arm -= (arm @ _axis_body(travel)) * _axis_body(travel)
     side = 0 if abs(arm[0]) > abs(arm[2]) else 2
     return (np.eye(3)[side] * np.sign(arm[side]),)

@@ -37,7 +37,7 @@ class Travel:
         """Metres that a point of the part travels per radian, or per metre."""
         if not self.hinged:
             return 1.0
-        arm = self.world_from_closed.apply(point_body[None])[0] - self.anchor
+        arm = self.world_from_closed.apply(point_body) - self.anchor
         return float(np.linalg.norm(np.cross(self.axis, arm)))
 
     def position(self, rig: Rig) -> float:

@@ -61,7 +61,7 @@ def attempt(rig: Rig, travel: Travel, way: Way, watch: Watch | None = None) -> M
         share = travel.position(rig) / travel.upper
         touching = _touches(rig, travel.part.body, measured)
         if command.phase == "open":
-            at = travel.world_from_body(travel.position(rig)).inverse.apply(rig.world_from_tool.translation[None])[0]
+            at = travel.world_from_body(travel.position(rig)).inverse.apply(rig.world_from_tool.translation)
             if held_at is None:
                 held_at = at
                 measured.reach_m = float(np.linalg.norm(at - way.opens.body_from_tool.translation))
@@ -142,7 +142,7 @@ def _seconds(travel: Travel, hold: Hold) -> float:
 
 
 def _lost(rig: Rig, travel: Travel, hold: Hold) -> bool:
-    handle = travel.world_from_body(travel.position(rig)).apply(hold.body_from_tool.translation[None])[0]
+    handle = travel.world_from_body(travel.position(rig)).apply(hold.body_from_tool.translation)
     return bool(np.linalg.norm(rig.world_from_tool.translation - handle) > _LOST_M)
 
 

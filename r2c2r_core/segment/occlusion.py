@@ -175,7 +175,7 @@ def _plane_depth(
 ) -> np.ndarray:
     left, top, right, bottom = box
     seen = frame.world_from_camera.inverse
-    local_normal, local_point = seen.rotation @ normal, seen.apply(point[None])[0]
+    local_normal, local_point = seen.rotation @ normal, seen.apply(point)
     x, y = ray_slopes(np.arange(left, right), np.arange(top, bottom), camera)
     slope = x[None] * local_normal[0] + y[:, None] * local_normal[1] + local_normal[2]
     with np.errstate(divide="ignore"):

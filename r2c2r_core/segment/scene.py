@@ -123,7 +123,7 @@ class Scene:
         depth = self._depth_near(frame_index, x_px, y_px)
         if depth is None:
             return None
-        return frame.world_from_camera.apply((pixel_rays(np.array([x_px, y_px]), frame.rgb_camera) * depth)[None])[0]
+        return frame.world_from_camera.apply(pixel_rays(np.array([x_px, y_px]), frame.rgb_camera) * depth)
 
     def ray(self, frame_index: int, x_px: float, y_px: float) -> tuple[Vector3, Vector3]:
         """Camera centre and unit direction (world) through a pixel of the colour image."""

@@ -129,7 +129,7 @@ def motion_at(item: SceneObject, joint: Joint, position: float) -> Rigid3:
     axis = item.world_from_object.rotation @ joint.axis_object
     if joint.type == "prismatic":
         return Rigid3(np.eye(3), axis * position)
-    pivot = item.world_from_object.apply(joint.origin_object[None])[0]
+    pivot = item.world_from_object.apply(joint.origin_object)
     rotation = rotation_about(axis, position)
     return Rigid3(rotation, pivot - rotation @ pivot)
 

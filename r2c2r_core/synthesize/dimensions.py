@@ -100,7 +100,7 @@ class MeasuredObject:
     @property
     def front_centre(self) -> Vector3:
         """Centre of the front face, in the world."""
-        return self.world_from_object.apply(np.array([[0.0, -self.dimensions_m[1] / 2, 0.0]]))[0]
+        return self.world_from_object.apply(np.array([0.0, -self.dimensions_m[1] / 2, 0.0]))
 
 
 def measure_object(

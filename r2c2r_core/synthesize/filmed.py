@@ -106,7 +106,7 @@ def as_filmed(motion: Motion, found: JointMotion | None, placed_pose: Rigid3) ->
     """
     if found is None or found.covariance is None or found.pivot_world is None:
         return motion
-    axis, pivot = _axis(found, placed_pose), placed_pose.inverse.apply(found.pivot_world[None])[0]
+    axis, pivot = _axis(found, placed_pose), placed_pose.inverse.apply(found.pivot_world)
     shift = pivot - motion.origin_object
     shift = shift - motion.axis_object * float(shift @ motion.axis_object)
     if motion.type == "prismatic":
@@ -152,7 +152,7 @@ def _drawer(motions: tuple[JointMotion, ...]) -> JointMotion | None:
 
 def _axis(motion: JointMotion, world_from_object: Rigid3) -> np.ndarray:
     assert motion.axis_world is not None  # what is fixed is no motion of a leaf
-    return np.asarray(world_from_object.inverse.turn(motion.axis_world[None])[0])
+    return np.asarray(world_from_object.inverse.turn(motion.axis_world))
 
 
 def _way(motion: JointMotion, world_from_object: Rigid3) -> Way:

@@ -94,8 +94,8 @@ def as_marked(found: JointMotion | None, marks: Marks, motion: Motion, world_fro
     return JointMotion(
         part=motion.part,
         kind=motion.type,
-        axis_world=world_from_object.turn(motion.axis_object[None])[0],
-        pivot_world=world_from_object.apply(motion.origin_object[None])[0],
+        axis_world=world_from_object.turn(motion.axis_object),
+        pivot_world=world_from_object.apply(motion.origin_object),
         covariance=None,
         states=_said(marks),
         largest=max(0.0, *marks.values()),

@@ -24,7 +24,7 @@ def hand_patches(joint: str) -> list[Patch]:
 
 def hand_pose(front: Front, grip: np.ndarray, state: float, eye: np.ndarray, right: np.ndarray) -> Rigid3:
     """Where the hand is: on the grip (a point of the closed front), its arm towards the person behind the camera."""
-    place = front.pose(state).apply(grip[None])[0]
+    place = front.pose(state).apply(grip)
     shoulder = eye - [0.0, 0.0, _SHOULDER_DROP_M] + _SHOULDER_ASIDE_M * right
     along = shoulder - place
     along = along / np.linalg.norm(along)

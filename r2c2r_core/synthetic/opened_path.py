@@ -67,7 +67,7 @@ def _outwards(front: Front) -> np.ndarray:
     """Level, from the closed front into the room."""
     if front.run is None:
         return np.array([0.0, -1.0, 0.0])
-    return front.run.kitchen_from_run.turn(np.array([[0.0, -1.0, 0.0]]))[0]
+    return front.run.kitchen_from_run.turn(np.array([0.0, -1.0, 0.0]))
 
 
 def _stand(

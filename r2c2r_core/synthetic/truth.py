@@ -218,7 +218,7 @@ def _fixed(thing: Fixed, run: Run) -> TrueObject:
 
 
 def _posed(joint: TrueJoint, kitchen_from_run: Rigid3) -> TrueJoint:
-    axis, origin = kitchen_from_run.turn(joint.axis[None])[0], kitchen_from_run.apply(joint.origin[None])[0]
+    axis, origin = kitchen_from_run.turn(joint.axis), kitchen_from_run.apply(joint.origin)
     return replace(joint, axis=axis, origin=origin)
 
 
@@ -259,8 +259,8 @@ def _appliance(thing: Appliance) -> TrueObject:
     hinges: tuple[Hinge, ...] = ("left", "right") if thing.drawer_m else (thing.hinge,)
     joints = [_swinging(thing, pose, hinge, name) for hinge, name in zip(hinges, thing.fronts, strict=False)]
     if thing.drawer_m:
-        face = pose.apply(np.array([[0.0, -depth / 2, (thing.drawer_m - height) / 2]]))[0]
-        out = pose.turn(np.array([[0.0, -1.0, 0.0]]))[0]
+        face = pose.apply(np.array([0.0, -depth / 2, (thing.drawer_m - height) / 2]))
+        out = pose.turn(np.array([0.0, -1.0, 0.0]))
         joints.append(
             TrueJoint(name=thing.fronts[-1], type="prismatic", axis=out, origin=face, lower=0.0, upper=0.6 * depth, hinge=None)
         )
@@ -280,7 +280,7 @@ def _swinging(thing: Appliance, pose: Rigid3, hinge: Hinge, name: str) -> TrueJo
         name=name,
         type="revolute",
         axis=np.array([0.0, 0.0, -1.0 if hinge == "left" else 1.0]),
-        origin=pose.apply(np.array([[edge, -depth / 2, thing.drawer_m / 2]]))[0],
+        origin=pose.apply(np.array([edge, -depth / 2, thing.drawer_m / 2])),
         lower=0.0,
         upper=thing.open_limit,
         hinge=hinge,
@@ -291,8 +291,8 @@ def _joint_entry(joint: TrueJoint, capture_from_kitchen: Rigid3) -> dict[str, ob
     return {
         "name": joint.name,
         "type": joint.type,
-        "axis": capture_from_kitchen.turn(joint.axis[None])[0].tolist(),
-        "origin": capture_from_kitchen.apply(joint.origin[None])[0].tolist(),
+        "axis": capture_from_kitchen.turn(joint.axis).tolist(),
+        "origin": capture_from_kitchen.apply(joint.origin).tolist(),
         "lower": joint.lower,
         "upper": joint.upper,
         "hinge": joint.hinge,

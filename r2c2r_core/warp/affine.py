@@ -64,7 +64,7 @@ def warp_vertices(vertices: Points, faces: Faces, axis_map: AxisMap, front_y: fl
     out = vertices[:, 1] < front_y - tuned(Params).handle_m
     for group in handle_groups(vertices, faces, out):
         centre = (vertices[group].min(axis=0) + vertices[group].max(axis=0)) / 2
-        moved = vertices[group] + (axis_map.apply(centre[None])[0] - centre)
+        moved = vertices[group] + (axis_map.apply(centre) - centre)
         moved[:, 1] = target_front + (vertices[group, 1] - front_y)
         warped[group] = moved
     return warped

@@ -78,7 +78,7 @@ def from_front(page: Page, name: str) -> tuple[float, float]:
     depth = (target - place) / np.linalg.norm(target - place)
     right = np.cross(depth, [0.0, 0.0, 1.0])
     item = next(item for item in kitchen().objects if item.name == name)
-    front = item.world_from_object.apply(np.array([[0.0, -item.dimensions_m[1] / 2, 0.0]]))[0]
+    front = item.world_from_object.apply(np.array([0.0, -item.dimensions_m[1] / 2, 0.0]))
     offset = front - place
     frame = box_of(page.get_by_title("3D view of the project"))
     scale = frame["height"] / 2 / np.tan(USUAL_FOV / 2) / (offset @ depth)

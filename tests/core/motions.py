@@ -28,7 +28,7 @@ def motion(
         part=part,
         kind="revolute" if way in _AXES else "prismatic",
         axis_world=place.turn(np.array([{**_AXES, **_WAYS}[way]]))[0],
-        pivot_world=place.apply(pivot[None])[0],
+        pivot_world=place.apply(pivot),
         covariance=np.diag([1e-6] * 3 + [4e-6] * 3),
         states={frame: State(value=value, sigma=0.004) for frame, value in states.items()},
         largest=max(states.values()),

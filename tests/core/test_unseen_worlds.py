@@ -66,8 +66,8 @@ def test_depth_and_truth_are_of_one_frame(drawn: Path) -> None:
 def test_the_true_hinge_opens_the_door_towards_positive_values(drawn: Path) -> None:
     (thing,) = read_truth(drawn / "truth.json", Rigid3())
     (joint,) = thing.joints
-    free_edge = thing.world_from_object.apply(np.array([[SIZE_M[0] / 2, -SIZE_M[1] / 2, 0.0]]))[0]
-    outward = thing.world_from_object.turn(np.array([[0.0, -1.0, 0.0]]))[0]
+    free_edge = thing.world_from_object.apply(np.array([SIZE_M[0] / 2, -SIZE_M[1] / 2, 0.0]))
+    outward = thing.world_from_object.turn(np.array([0.0, -1.0, 0.0]))
     assert np.cross(joint.axis, free_edge - joint.origin) @ outward > 0
     assert (joint.lower, joint.upper) == (0.0, 1.6)
 

@@ -121,7 +121,7 @@ def _joint(entry: ManifestJoint, joint: UrdfJoint | None, poses: dict[str, Rigid
     if pose is None:
         return
     axis = np.asarray(entry.axis, dtype=np.float64)
-    turned = pose.turn(joint.axis[None])[0]
+    turned = pose.turn(joint.axis)
     if not float(np.linalg.norm(axis - turned)) < 1e-3:
         yield finding("manifest-joint", where, f"its axis differs from the URDF's by {np.linalg.norm(axis - turned):.3g}")
     offset = np.asarray(entry.origin, dtype=np.float64) - pose.translation

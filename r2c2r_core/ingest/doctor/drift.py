@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from r2c2r_core.geometry.camera import depth_points, unproject
+from r2c2r_core.geometry.least_squares import Normal, cauchy
 from r2c2r_core.ingest.doctor.pairs import Disagreement, Pairs, Views, compare, overlaps, spread, tolerance_m
 from r2c2r_core.tuning import param, tuned
 
@@ -73,12 +74,10 @@ def _step(
     n, m = n[used] @ to_world.T, m[used] @ to_world.T + views.translation[second]
     p = _points(views, first)[used] @ views.rotation[first].T + views.translation[first]
     apart = ((m - p) * n).sum(axis=1)
-    weight = 1.0 / (1.0 + (apart / tolerance_m(compared.expected_m[0][used])) ** 2)
+    weight = cauchy(apart, tolerance_m(compared.expected_m[0][used]))
     centre = p.mean(axis=0) if len(p) else np.zeros(3)
     jacobian = np.hstack([np.cross(p - centre, n), n])
-    normal_matrix = (jacobian * weight[:, None]).T @ jacobian
-    damped = normal_matrix + tuned(Params).damping * (weight.sum() + 1e-9) * np.eye(6)
-    solved = np.linalg.solve(damped, (jacobian * weight[:, None]).T @ apart)
+    solved = Normal.of(jacobian, -apart, weight).step(tuned(Params).damping * (weight.sum() + 1e-9))
     turn = Rotation.from_rotvec(solved[:3]).as_matrix()
     return turn, centre + solved[3:] - turn @ centre
 

@@ -5,12 +5,13 @@ Which change of colour is which edge is not known: a Gaussian mixture weighs the
 spread shrinks from centimetres to the noise (graduated non-convexity), from several depths to start from.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from r2c2r_core.geometry.least_squares import cauchy_loss
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.segment.appliances.edges import (
@@ -207,9 +208,8 @@ def _annealed(
             edges = [
                 _Edges(view, at.target_px, at.weight * np.sqrt(n)) for view, at, n in zip(views, found, counted, strict=True)
             ]
-            solved = least_squares(
-                _residuals, box, args=(evidence, edges), loss=_kernel, f_scale=params.kernel, x_scale=_SCALE, max_nfev=8
-            )
+            loss = _loss(len(_residuals(box, evidence, edges)))
+            solved = least_squares(_residuals, box, args=(evidence, edges), loss=loss, x_scale=_SCALE, max_nfev=8)
             moved, box = np.abs(solved.x - box).max(), solved.x
             if moved < _STILL or not views:
                 break
@@ -217,16 +217,15 @@ def _annealed(
     gain = sum(
         float(n @ associate(displacements(parts, view), view, spread).gain) for view, n in zip(views, counted, strict=True)
     )
-    known = (_residuals(box, evidence, []) / params.kernel) ** 2
-    return Solution(box, solved.jac.T @ solved.jac, float(0.5 * params.kernel**2 * _kernel(known)[0].sum() - gain))
+    known = _residuals(box, evidence, []) ** 2
+    return Solution(box, solved.jac.T @ solved.jac, float(0.5 * _loss(len(known))(known)[0].sum() - gain))
 
 
-def _kernel(squares: np.ndarray) -> np.ndarray:
-    """Cauchy's kernel and its two derivatives (3, n) at squared residuals; what was thought before is taken as it is."""
-    with_kernel = 1.0 + squares
-    rho = np.stack([np.log(with_kernel), 1.0 / with_kernel, -1.0 / with_kernel**2])
-    rho[0, :_THOUGHT], rho[1, :_THOUGHT], rho[2, :_THOUGHT] = squares[:_THOUGHT], 1.0, 0.0
-    return rho
+def _loss(count: int) -> Callable[[np.ndarray], np.ndarray]:
+    """Cauchy kernel of that many residuals; the first ones, priors, are squared."""
+    scale = np.full(count, tuned(Params).kernel)
+    scale[:_THOUGHT] = np.inf
+    return cauchy_loss(scale)
 
 
 def _residuals(box: np.ndarray, evidence: Evidence, edges: Sequence[_Edges]) -> np.ndarray:

@@ -63,7 +63,7 @@ def dark_beyond(scene: Scene, region: PlaneRegion, click: PromptPoint, point: Ve
     There black glass may go on: in a tall unit it parts the plane of the fronts above from that of those below.
     """
     params, frame = tuned(Params), scene.frame(click.frame)
-    local, reach = region.world_from_plane.inverse.apply(point[None])[0], 0.0
+    local, reach = region.world_from_plane.inverse.apply(point), 0.0
     for axis, half, usual in ((0, region.width_m / 2, kind.width.usual), (2, region.height_m / 2, kind.height.usual)):
         for sign in (-1.0, 1.0):
             beyond = np.repeat(local[None], len(params.dark_m), axis=0)

@@ -82,7 +82,7 @@ def _leaves_near(prepared: PreparedCapture, point: Vector3) -> list[Leaf]:
     """The panels of the runs that it stands before or on."""
     found = []
     for region in prepared.planes:
-        local = region.world_from_plane.inverse.apply(point[None])[0]
+        local = region.world_from_plane.inverse.apply(point)
         reach = tuned(Params).reach_m
         if not -reach < local[1] < tuned(Params).off_m or abs(local[0]) > region.width_m / 2 + reach:
             continue
@@ -95,7 +95,7 @@ def _leaves_near(prepared: PreparedCapture, point: Vector3) -> list[Leaf]:
 
 def _holds(leaf: Leaf, point: Vector3) -> bool:
     """Whether a point lies on a closed leaf."""
-    local = leaf.world_from_front.inverse.apply(point[None])[0]
+    local = leaf.world_from_front.inverse.apply(point)
     return bool(abs(local[1]) < tuned(Params).off_m and abs(local[0]) < leaf.half_m[0] and abs(local[2]) < leaf.half_m[1])
 
 
@@ -149,6 +149,6 @@ def _as_opened(
         return 0.0, 0.0, 0.0, 0, point
     log = evidence(lay_out(leaf, hypothesis), scene, frame)
     best = int(np.argmax(np.where(on, log, -np.inf)))
-    closed = leaf.world_from_front.apply(np.array([[local[best, 0], 0.0, local[best, 2]]]))[0]
+    closed = leaf.world_from_front.apply(np.array([local[best, 0], 0.0, local[best, 2]]))
     near = np.abs(np.arange(len(log)) - best) <= tuned(Params).near_steps
     return float(log[best]), float(log[~near & ~on].max(initial=-np.inf)), float(log[0]), best, closed

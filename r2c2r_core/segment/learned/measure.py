@@ -143,7 +143,7 @@ def _beyond(region: PlaneRegion, scene: Scene, masks: Mapping[int, PackedMask]) 
         rows = np.array([0, 0, mask.box_height, mask.box_height]) + mask.top
         rays = pixel_rays(np.stack([columns, rows], axis=1).astype(np.float64), frame.rgb_camera)
         inward = region.world_from_plane.inverse.rotation @ frame.world_from_camera.rotation
-        eye = region.world_from_plane.inverse.apply(frame.world_from_camera.translation[None])[0]
+        eye = region.world_from_plane.inverse.apply(frame.world_from_camera.translation)
         rays = rays @ inward.T
         if (rays[:, 1] < 0.15).any():  # seen too flatly to say where a ray meets it
             continue

@@ -71,7 +71,7 @@ class PlaneGrid:
     def pixel_from_cell(self, frame: Frame, camera: Intrinsics) -> Matrix3:
         """Homography from continuous cells to continuous pixels; its third row gives z in metres."""
         rotation = self.world_from_plane.rotation
-        origin = self.world_from_plane.apply(np.array([[self.left_m, 0.0, self.top_m]]))[0]
+        origin = self.world_from_plane.apply(np.array([self.left_m, 0.0, self.top_m]))
         world = np.column_stack([rotation[:, 0] * self.cell_m, -rotation[:, 2] * self.cell_m, origin])
         seen = frame.world_from_camera.inverse
         local = seen.rotation @ world

@@ -6,6 +6,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.camera import project, unproject
+from r2c2r_core.geometry.least_squares import fit_linear, geman_mcclure
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.motion.leaf import Leaf, corners
@@ -56,12 +57,8 @@ def fix_plane(leaf: Leaf, expected: Rigid3, scene: Scene, frame: Frame) -> Plane
         near = np.abs(off) < gate
         if near.sum() < params.least_points:
             return None
-        held, towards, scale_2 = y[near], design[near], params.scale_m**2 + sigma[near] ** 2
-        for _ in range(5):
-            off = held - towards @ plane
-            weighted = towards.T / (scale_2 * (1 + off**2 / scale_2) ** 2)
-            information = weighted @ towards
-            plane = np.linalg.solve(information + 1e-9 * np.eye(3), weighted @ held)
+        scale = np.hypot(params.scale_m, sigma[near])
+        plane, information = fit_linear(design[near], y[near], geman_mcclure, scale, rounds=5, start=plane)
     spans = np.ptp(np.quantile(local[near][:, [0, 2]], [0.03, 0.97], axis=0), axis=0)
     far = abs(plane[0]) > params.near_m or (np.abs(plane[1:]) > params.near_rad).any()
     if far or (spans < params.spans * np.array([leaf.width_m, leaf.height_m])).any():

@@ -152,8 +152,8 @@ def _measured(
     return JointMotion(
         part=part,
         kind="revolute" if turns else "prismatic",
-        axis_world=place.turn(joint.axis[None])[0],
-        pivot_world=place.apply(pivot[None])[0],
+        axis_world=place.turn(joint.axis),
+        pivot_world=place.apply(pivot),
         covariance=joint.covariance_in(place.rotation),
         states={scene.frames[k].index: state for k, state in states.items()},
         largest=largest,

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.least_squares import fit_linear, geman_mcclure
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.depth_cloud import DepthCloud, Region, gather_cloud
@@ -246,15 +247,10 @@ def _fit_floor(cloud: DepthCloud) -> np.ndarray:
     """The floor's plane (a, b, c) from the voxels near it, by reweighted least squares; the room's where few are."""
     params = tuned(Params)
     at = cloud.positions[np.abs(cloud.positions[:, 2]) < params.floor_slack_m]
-    plane: np.ndarray = np.zeros(3)
     if len(at) < 100:
-        return plane
+        return np.zeros(3)
     system = np.column_stack([at[:, :2], np.ones(len(at))])
-    for _ in range(15):
-        off = at[:, 2] - system @ plane
-        weight = 1.0 / (1.0 + (off / 0.01) ** 2)
-        plane = np.linalg.lstsq(system * weight[:, None], at[:, 2] * weight, rcond=None)[0]
-    return plane
+    return fit_linear(system, at[:, 2], geman_mcclure, 0.01, rounds=15)[0]
 
 
 def _height_of(floor: np.ndarray, points: Points) -> np.ndarray:

@@ -26,7 +26,7 @@ def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre
         return 0.0
     depth = scene.depth(frame.index)
     camera = frame.depth_camera
-    local = frame.world_from_camera.inverse.apply(centre[None])[0]
+    local = frame.world_from_camera.inverse.apply(centre)
     if local[2] < 0.2:
         return 0.0
     u, v = project(local, camera)

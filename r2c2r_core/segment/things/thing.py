@@ -274,7 +274,7 @@ def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> 
     """The sharpest, nearest depth images that see a ball, everything outside it removed."""
     rated, (nearest, farthest) = [], tuned(Params).depth_range_m
     for frame in scene.frames:
-        local = frame.world_from_camera.inverse.apply(centre[None])[0]
+        local = frame.world_from_camera.inverse.apply(centre)
         camera = frame.depth_camera
         if not nearest < local[2] < farthest:
             continue
@@ -285,7 +285,7 @@ def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> 
     for _, index in sorted(rated)[:most]:
         frame = scene.frame(index)
         depth, camera = scene.depth(index), frame.depth_camera
-        local = frame.world_from_camera.inverse.apply(centre[None])[0]
+        local = frame.world_from_camera.inverse.apply(centre)
         x, y = ray_slopes(np.arange(camera.width), np.arange(camera.height), camera)
         away = (x[None] * depth - local[0]) ** 2 + (y[:, None] * depth - local[1]) ** 2 + (depth - local[2]) ** 2
         inside = (depth > 0) & (away < reach_m**2)

@@ -255,9 +255,9 @@ def blank_cabinet(*, handle: bool = True) -> tuple[TexturedMesh, Capture, MaskTr
         box_mesh((2.0, 0.6, 0.04), (0, 0.27, 0.822)),
     ]
     pose = Similarity3(1.0, rotation_about_z(-0.3), np.array([0.2, 0.1, 0.0]))
-    middle = pose.apply(np.array([[0.0, 0.0, 0.45]]))[0]
+    middle = pose.apply(np.array([0.0, 0.0, 0.45]))
     front = FrontPanel(world_from_front=Rigid3(pose.rotation, middle), width_m=0.6, height_m=0.7, handle=None, confidence=0.9)
-    eyes = [tuple(pose.apply(np.array([[x, -1.3, 1.1]]))[0]) for x in np.linspace(-0.9, 0.9, 8)]
+    eyes = [tuple(pose.apply(np.array([x, -1.3, 1.1]))) for x in np.linspace(-0.9, 0.9, 8)]
     thing = moved(join(*parts), pose)
     return thing, *film(
         thing,

@@ -44,5 +44,5 @@ def test_the_overlap_does_not_depend_on_the_world() -> None:
 def test_the_yaw_of_a_round_thing_costs_nothing_its_place_does() -> None:
     bottle = replace(box((0.08, 0.08, 0.3), at(0.0, 0.3)), turns_freely=True)
     assert box_iou(bottle, box((0.08, 0.08, 0.3), at(0.0, 1.1))) == pytest.approx(1.0, abs=1e-6)
-    aside = Rigid3(rotation_about_z(1.1), at(0.0, 0.3).apply(np.array([[0.04, 0.0, 0.0]]))[0])
+    aside = Rigid3(rotation_about_z(1.1), at(0.0, 0.3).apply(np.array([0.04, 0.0, 0.0])))
     assert box_iou(bottle, box((0.08, 0.08, 0.3), aside)) == pytest.approx(1 / 3, abs=1e-6)

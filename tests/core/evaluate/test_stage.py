@@ -113,7 +113,7 @@ def test_a_door_hinged_on_the_other_edge_is_wrong_and_a_drawer_called_a_door_too
     pose = Rigid3.from_matrix(np.array(door["world_from_object"]))
     hinge = pose.inverse.apply(np.array([door["joints"][0]["origin"]]))[0]
     hinge[0] = -hinge[0]
-    door["joints"][0]["origin"] = pose.apply(hinge[None])[0].tolist()
+    door["joints"][0]["origin"] = pose.apply(hinge).tolist()
     door["joints"][0]["axis"] = (-np.array(door["joints"][0]["axis"])).tolist()
     by_name["drawer_1"]["joints"][0]["type"] = "revolute"
     evaluation = evaluate_bundle(*write(tmp_path, truth, manifest))

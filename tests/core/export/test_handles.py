@@ -55,7 +55,7 @@ def test_a_handle_turns_with_its_cabinet_and_opens_across_its_hinge() -> None:
     assert np.arccos((np.trace(about_z) - 1) / 2) == pytest.approx(0.7)
     body = next(b for b in planned(cabinet("a", yaw=0.7)).bodies if b.joint is not None)
     arm = turned.world_from_handle.translation - body.world_from_body.translation
-    axis = body.world_from_body.turn(body.axis_body[None])[0]
+    axis = body.world_from_body.turn(body.axis_body)
     assert float(turned.opening_world @ arm) == pytest.approx(0.0, abs=0.03)  # the handle stands before the hinge's plane
     assert float(turned.opening_world @ np.cross(axis, arm)) > 0
 

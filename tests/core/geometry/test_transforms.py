@@ -84,6 +84,13 @@ def test_applying_a_product_is_applying_one_after_the_other(
     np.testing.assert_allclose(product_of(a, b).apply(points), a.apply(b.apply(points)), atol=ATOL)
 
 
+@every_group
+def test_points_keep_the_shape_of_their_array(group: str, rng: np.random.Generator) -> None:
+    a, points = GROUPS[group](1.0, rng), rng.normal(size=(4, 5, 3))
+    np.testing.assert_allclose(a.apply(points), a.apply(points.reshape(-1, 3)).reshape(4, 5, 3), atol=ATOL)
+    np.testing.assert_allclose(a.apply(points[1, 2]), a.apply(points)[1, 2], atol=ATOL)
+
+
 @every_size
 @pytest.mark.parametrize("groups", list(product(GROUPS, GROUPS, GROUPS)), ids="-".join)
 def test_products_are_associative(groups: tuple[str, str, str], size: float, rng: np.random.Generator) -> None:
@@ -133,7 +140,7 @@ def test_points_move_as_their_homogeneous_coordinates_do_however_many(group: str
     moved = a.apply(points)
     assert moved.shape == (count, 3)
     np.testing.assert_allclose(moved, homogeneous[:, :3], atol=ATOL)
-    np.testing.assert_allclose(moved, np.array([a.apply(p[None])[0] for p in points]).reshape(count, 3), atol=ATOL)
+    np.testing.assert_allclose(moved, np.array([a.apply(p) for p in points]).reshape(count, 3), atol=ATOL)
 
 
 @every_group

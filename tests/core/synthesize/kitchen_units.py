@@ -129,7 +129,7 @@ def track_of(unit: Unit) -> MaskTrack:
     pose, half = unit.world_from_object, np.array(unit.size) / 2
     front = None
     if unit.kind != "thing" and unit.with_track_front:
-        centre = pose.apply((np.array([0.0, -half[1], 0.0]) + np.array(unit.front_noise))[None])[0]
+        centre = pose.apply(np.array([0.0, -half[1], 0.0]) + np.array(unit.front_noise))
         front = FrontPanel(
             world_from_front=Rigid3(pose.rotation, centre),
             width_m=unit.size[0],

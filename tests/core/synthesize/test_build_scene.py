@@ -111,7 +111,7 @@ def test_every_inertia_is_physical(kitchen: ArticulatedScene) -> None:
             moments = np.linalg.eigvalsh(link.inertial.inertia)
             assert moments[0] > 0
             assert moments[0] + moments[1] >= moments[2] * (1 - 1e-9)
-            com = link.object_from_link.apply(link.inertial.com_link[None])[0]
+            com = link.object_from_link.apply(link.inertial.com_link)
             assert (np.abs(com) <= item.dimensions_m / 2 + 0.06).all()
             assert 0.01 <= link.inertial.mass_kg < 120
 
@@ -134,7 +134,7 @@ def test_positive_opens_outwards(kitchen: ArticulatedScene) -> None:
     for item in kitchen.objects:
         for joint in item.joints:
             link = next(k for k in item.links if k.name == joint.child)
-            middle = link.object_from_link.apply(link.boxes[0].link_from_box.translation[None])[0]
+            middle = link.object_from_link.apply(link.boxes[0].link_from_box.translation)
             arm = middle - joint.origin_object
             velocity = joint.axis_object if joint.type == "prismatic" else np.cross(joint.axis_object, arm)
             assert velocity[1] < 0, joint.name
@@ -270,7 +270,7 @@ def test_a_hinge_filmed_off_its_fronts_edge_is_where_it_was_filmed() -> None:
     origins = []
     for off in (0.003, 0.03):
         place = track.front.world_from_front
-        inside = Rigid3(place.rotation, place.apply(np.array([[off, 0.0, 0.0]]))[0])
+        inside = Rigid3(place.rotation, place.apply(np.array([off, 0.0, 0.0])))
         moved = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
         item = build_scene(capture(), [moved], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
         origins.append(item.joints[0].origin_object[0])
@@ -283,7 +283,7 @@ def test_a_hinge_filmed_near_its_fronts_edge_is_between_them_and_its_leaf_swings
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
     place = track.front.world_from_front
-    inside = Rigid3(place.rotation, place.apply(np.array([[0.008, 0.008, 0.0]]))[0])
+    inside = Rigid3(place.rotation, place.apply(np.array([0.008, 0.008, 0.0])))
     track = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
     item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
     edge = np.array([-item.dimensions_m[0] / 2, -item.dimensions_m[1] / 2])
@@ -360,7 +360,7 @@ def test_each_door_of_a_pair_has_the_motion_of_its_own() -> None:
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
     place = track.front.world_from_front
-    half = Rigid3(place.rotation, place.apply(np.array([[0.2, 0.0, 0.0]]))[0])
+    half = Rigid3(place.rotation, place.apply(np.array([0.2, 0.0, 0.0])))
     seen = motion({5: 1.2}, "right", stop_seen=True, world_from_front=half, size_m=(0.4, 0.7), part="right")
     track = replace(track, motions=(seen,))
     item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
@@ -379,7 +379,7 @@ def test_a_drawer_filmed_below_a_refrigerators_doors_is_built_there(category: st
     )
     assert track.front is not None
     place = track.front.world_from_front
-    middle = Rigid3(place.rotation, place.apply(np.array([[0.0, 0.0, -0.575]]))[0])
+    middle = Rigid3(place.rotation, place.apply(np.array([0.0, 0.0, -0.575])))
     seen = motion({5: 0.3}, "out", world_from_front=middle, size_m=(width_m, 0.6), part="drawer")
     scene = build_scene(
         capture(), [replace(track, motions=(seen,))], [placement], [asset], Overrides(objects={}), SynthesizeConfig()

@@ -66,7 +66,7 @@ def test_the_handle_stays_where_it_was_in_the_world() -> None:
     assert before.handle is not None
     assert after.handle is not None
     for item, handle in ((before, before.handle), (after, after.handle)):
-        world = item.world_from_object.apply(np.array([[handle.left_m, 0.0, 0.0]]))[0]
+        world = item.world_from_object.apply(np.array([handle.left_m, 0.0, 0.0]))
         assert world[0] == pytest.approx(0.315 + 0.1, abs=1e-9), item.name
 
 

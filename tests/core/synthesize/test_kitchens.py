@@ -89,7 +89,7 @@ def test_fronts_stay_where_the_scan_saw_them(kitchen: tuple[list[Unit], Layout])
     true, layout = kitchen
     for unit, item in zip(true, layout.objects, strict=True):
         half = np.array([0.0, -unit.size[1] / 2, 0.0])
-        assert np.linalg.norm(item.front_centre - unit.world_from_object.apply(half[None])[0]) < 0.01, unit.name
+        assert np.linalg.norm(item.front_centre - unit.world_from_object.apply(half)) < 0.01, unit.name
         assert abs(np.arctan2(item.outward[0], -item.outward[1]) - unit.yaw) % (2 * np.pi) < np.deg2rad(0.5)
         assert abs(item.dimensions_m[0] - unit.size[0]) < 0.01
     assert max(layout.moves_m.values()) < 0.01

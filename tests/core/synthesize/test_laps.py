@@ -104,7 +104,7 @@ def test_a_rear_leaf_that_was_cut_to_its_panel_is_as_high_as_the_front_one_and_r
     assert item.dimension_sources[2] == "inferred"
     assert item.dimensions_m[0] == pytest.approx(WIDTH_M, abs=0.004)
     grip = next(box for box in item.links[1].boxes if box.role == "handle")
-    at = item.world_from_object.apply(grip.link_from_box.translation[None])[0]
+    at = item.world_from_object.apply(grip.link_from_box.translation)
     assert at[[0, 2]] == pytest.approx([x + 0.03 + 0.22, z - 0.04 + 0.1], abs=0.004)  # where it was seen
     assert min(joint.upper for each in scene.objects[:2] for joint in each.joints) > 0.5
 

@@ -51,7 +51,7 @@ def test_boxes_keep_apart_and_neighbouring_fronts_leave_a_gap_of_2_to_4_mm(kitch
 
 def test_positive_joint_values_open_outwards(kitchen: Kitchen) -> None:
     for thing in true_objects(kitchen):
-        centre = thing.kitchen_from_object.apply(np.array([[0.0, -thing.dimensions_m[1] / 2, 0.0]]))[0]
+        centre = thing.kitchen_from_object.apply(np.array([0.0, -thing.dimensions_m[1] / 2, 0.0]))
         outward = thing.kitchen_from_object.rotation @ [0.0, -1.0, 0.0]
         for joint in thing.joints:
             motion = joint.axis if joint.type == "prismatic" else np.cross(joint.axis, centre - joint.origin)
@@ -115,8 +115,8 @@ def test_the_capture_frame_is_y_up_and_begins_at_the_first_camera() -> None:
     kitchen = plan_kitchen(3)
     eye = np.array([1.0, -2.0, 1.5])
     to_capture = capture_from_kitchen(kitchen, eye)
-    assert to_capture.apply(eye[None])[0] == pytest.approx(np.zeros(3), abs=1e-12)
-    assert to_capture.turn(np.array([[0.0, 0.0, 1.0]]))[0] == pytest.approx([0.0, 1.0, 0.0])
+    assert to_capture.apply(eye) == pytest.approx(np.zeros(3), abs=1e-12)
+    assert to_capture.turn(np.array([0.0, 0.0, 1.0])) == pytest.approx([0.0, 1.0, 0.0])
     assert np.linalg.det(to_capture.rotation) == pytest.approx(1.0)
 
 

@@ -49,7 +49,7 @@ def test_fronts_face_the_room_and_open_into_it(kitchen: Kitchen) -> None:
     for thing in true_objects(kitchen):
         rotation = thing.kitchen_from_object.rotation
         outward, rightward = rotation @ [0.0, -1.0, 0.0], rotation @ [1.0, 0.0, 0.0]
-        face = thing.kitchen_from_object.apply(np.array([[0.0, -thing.dimensions_m[1] / 2, 0.0]]))[0]
+        face = thing.kitchen_from_object.apply(np.array([0.0, -thing.dimensions_m[1] / 2, 0.0]))
         for joint in thing.joints:
             assert joint.upper > 0.15
             if thing.category == "sliding_door":

@@ -104,7 +104,7 @@ def test_the_covariance_is_of_centre_yaw_and_sizes() -> None:
 
     def measures(of: np.ndarray) -> np.ndarray:
         middle = np.array([of[1] + of[2], of[3] + of[4], of[5] + of[6]]) / 2
-        centre = world_from_front.apply((rotation_about_z(of[0]) @ middle)[None])[0]
+        centre = world_from_front.apply(rotation_about_z(of[0]) @ middle)
         return np.array([*centre, 0.7 + of[0], of[2] - of[1], of[4] - of[3], of[6] - of[5]])
 
     sigma = np.array([2.0, 1.0, 3.0, 1.0, 5.0, 2.0, 1.0]) * 1e-3

@@ -47,7 +47,7 @@ def _plane(behind_m: float, *, hole: bool) -> PlaneRegion:
     support = np.ones((round(HEIGHT_M / 0.02), round(WIDTH_M / 0.02)), bool)
     if hole:
         support[8:37, 30:55] = False
-    origin = place.apply(np.array([[0.0, behind_m, 0.0]]))[0]
+    origin = place.apply(np.array([0.0, behind_m, 0.0]))
     return PlaneRegion(type(place)(place.rotation, origin), WIDTH_M, HEIGHT_M, support, 0.02, float(support.sum()) * 4e-4)
 
 
@@ -58,7 +58,7 @@ CLICK = PromptPoint(frame=1, x=96.0, y=76.0, label=1)
 def test_a_click_on_black_glass_lies_on_the_plane_of_what_is_round_it() -> None:
     place = dark_place(cast(Scene, Film(glass=True)), (REAR, FACE), CLICK)
     assert place is not None
-    local = LEAF.world_from_front.inverse.apply(place[None])[0]
+    local = LEAF.world_from_front.inverse.apply(place)
     assert abs(local[1]) < 1e-6
     assert (np.abs(local[[0, 2]]) < LEAF.half_m).all()
 
@@ -84,7 +84,7 @@ def test_a_hole_that_goes_on_beyond_the_picture_is_no_front_s() -> None:
 def _band(top_m: float, bottom_m: float) -> PlaneRegion:
     """What is seen of LEAF's face between two heights, over its middle."""
     place, height = LEAF.world_from_front, top_m - bottom_m
-    origin = place.apply(np.array([[0.0, 0.0, (top_m + bottom_m) / 2]]))[0]
+    origin = place.apply(np.array([0.0, 0.0, (top_m + bottom_m) / 2]))
     support = np.ones((round(height / 0.02), round(WIDTH_M / 0.02)), bool)
     return PlaneRegion(type(place)(place.rotation, origin), WIDTH_M, height, support, 0.02, WIDTH_M * height)
 
@@ -101,7 +101,7 @@ def test_black_glass_between_two_parts_of_a_plane_is_surrounded_by_both() -> Non
 
 def test_a_front_may_go_on_beyond_its_plane_only_where_that_has_no_depth() -> None:
     glass, wood = (cast(Scene, Film(glass=shown)) for shown in (True, False))
-    under = ABOVE.world_from_plane.apply(np.array([[0.0, 0.0, -ABOVE.height_m / 2]]))[0]  # its lower border
+    under = ABOVE.world_from_plane.apply(np.array([0.0, 0.0, -ABOVE.height_m / 2]))  # its lower border
     oven = category_of("oven")
     assert oven is not None
     assert dark_beyond(glass, ABOVE, CLICK, under, oven) >= oven.height.usual

@@ -75,9 +75,9 @@ def filmed(
     for number, state in enumerate(states):
         t = number / max(len(states) - 1, 1) - 0.5
         eye = LEAF.world_from_front.apply(
-            np.array([[(3.2 if niche else 1.4) * t, -1.7 + 0.2 * np.cos(9 * t), 0.45 + 0.15 * np.sin(7 * t)]])
-        )[0]
-        pose = look_at(eye, LEAF.world_from_front.apply(np.array([[0.2 * t, -0.15, -0.05]]))[0])
+            np.array([(3.2 if niche else 1.4) * t, -1.7 + 0.2 * np.cos(9 * t), 0.45 + 0.15 * np.sin(7 * t)])
+        )
+        pose = look_at(eye, LEAF.world_from_front.apply(np.array([0.2 * t, -0.15, -0.05])))
         turning = Rigid3(np.eye(3), np.array(pivot_off))
         leaf = LEAF.world_from_front @ turning @ moving.pose(state) @ turning.inverse
         before = [_arm()] if number in hands else []

@@ -32,7 +32,7 @@ class OnePhoto:
 def test_a_dark_hand_on_a_handle_is_no_part_of_the_front_that_it_draws() -> None:
     """It stands no further before the face than a handle does: depth alone keeps it."""
     place = LEAF.world_from_front @ joint("out").pose(HELD_M)
-    pose = look_at(place.apply(np.array([[0.3, -1.5, 0.4]]))[0], place.translation)
+    pose = look_at(place.apply(np.array([0.3, -1.5, 0.4])), place.translation)
     front = (place, (-0.25, 0.0, -0.3), (0.25, 0.018, 0.3))
     alone, both = (cast_rays(solids, pose) for solids in ([front], [front, (place, *HAND)]))
     hand = both != alone

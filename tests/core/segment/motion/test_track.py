@@ -37,7 +37,7 @@ def test_each_joint_is_told_from_the_others_and_measured(way: str) -> None:
     motion = find_motion(LEAF, scene(way, states))
     assert motion is not None
     assert motion.kind == ("revolute" if way in RAD else "prismatic")
-    axis = LEAF.world_from_front.turn(joint(way).axis[None])[0]
+    axis = LEAF.world_from_front.turn(joint(way).axis)
     assert motion.axis_world is not None
     assert np.degrees(np.arccos(min(float(motion.axis_world @ axis), 1.0))) < 0.5
     values = np.array([motion.states[k].value for k in range(len(states))], dtype=float)
@@ -68,7 +68,7 @@ def test_a_hinge_behind_its_edge_is_found_there(way: str) -> None:
     assert motion is not None
     assert motion.pivot_world is not None
     assert motion.covariance is not None
-    found = LEAF.world_from_front.inverse.apply(motion.pivot_world[None])[0] - joint(way).pivot
+    found = LEAF.world_from_front.inverse.apply(motion.pivot_world) - joint(way).pivot
     axis = joint(way).axis
     error = np.array(off) - found
     error -= axis * (axis @ error)
