@@ -138,7 +138,7 @@ def _joint_entry(item: SceneObject, body: Body, plan: Plan) -> dict[str, Any]:
         "lower": _plain(joint.lower),
         "upper": _plain(joint.upper),
         "uncut": _plain(joint.uncut),
-        "source": {key: joint.sources.get(key, "default") for key in ("axis", "origin", "limits")},
+        "source": {key: joint.sources.get(key, "default") for key in ("axis", "origin", "lower", "limits")},
         "confidence": _plain(joint.confidence),
         "motion": None if joint.motion is None else _motion_entry(joint.motion),
         "randomize": _ranges_entry(randomize.of_joint(joint)),

@@ -77,7 +77,7 @@ class Joint:
     velocity: float
     damping: float
     friction: float
-    sources: dict[str, Source]  # axis, origin, limits
+    sources: dict[str, Source]  # axis, origin, lower (limit), limits (the upper one)
     uncut: float | None = None  # the upper limit before an obstacle cut it short; None where nothing did
     confidence: float | None = None  # in the side it is hinged on, 0..1; None where the category leaves no choice
     motion: JointMotion | None = None  # as it was filmed; None where it was not seen to move

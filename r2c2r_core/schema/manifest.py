@@ -31,7 +31,10 @@ class ManifestJointSource(Document):
 
     axis: Source = Field(description="measured, inferred, default or person")
     origin: Source = Field(description="measured, inferred, default or person")
-    limits: Source = Field(description="measured, at_least (as far as it was seen to open), inferred, default or person")
+    lower: Source = Field(default="default", description="of the lower limit: default (the closed state) or person")
+    limits: Source = Field(
+        description="of the upper limit: measured, at_least (as far as it was seen to open), inferred, default or person"
+    )
 
 
 class ManifestBlocker(Document):

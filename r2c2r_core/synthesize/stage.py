@@ -299,7 +299,7 @@ def _joint(
 ) -> Joint:
     """The joint of one moving part; what a person gave, or the scan showed, replaces the category's."""
     axis: Source = hinge.source if hinge is not None else "inferred" if seen is None else seen.source
-    lower, upper, limits = _limits(item, motion, said, seen)
+    lower, upper, limits = _limits(item, motion, said or JointLimits(None, None), seen)
     return Joint(
         name=_joint_name(item.name, motion.part),
         type=motion.type,
@@ -313,7 +313,7 @@ def _joint(
         velocity=feel.velocity,
         damping=feel.damping,
         friction=feel.friction,
-        sources={"axis": axis, "origin": "inferred" if seen is None else seen.source, "limits": limits},
+        sources={"axis": axis, "origin": "inferred" if seen is None else seen.source} | limits,
         confidence=hinge.confidence if hinge is not None else None,
         motion=seen,
     )
@@ -326,17 +326,14 @@ def _kept_shut(joint: Joint, leaf: Link) -> Joint:
 
 
 def _limits(
-    item: MeasuredObject, motion: Motion, said: JointLimits | None, seen: JointMotion | None
-) -> tuple[float, float, Source]:
-    """Lower and upper limit and where they come from: a person, the scan of an opened front, or the category.
-
-    What a person said of one end leaves the other as it was found.
-    """
-    upper, source = opening(motion, seen, widest(motion.axis_object, motion.type, item.dimensions_m))
-    if said is None or said == (None, None):
-        return 0.0, upper, source
+    item: MeasuredObject, motion: Motion, said: JointLimits, seen: JointMotion | None
+) -> tuple[float, float, dict[str, Source]]:
+    """Lower and upper limit, and the source of each ("limits" is the upper one's): a person, the scan, or the category."""
+    found, source = opening(motion, seen, widest(motion.axis_object, motion.type, item.dimensions_m))
     lower = 0.0 if said.lower is None else said.lower
-    return lower, max(lower, upper if said.upper is None else said.upper), "person"
+    upper = max(lower, found if said.upper is None else said.upper)
+    of_upper: Source = source if said.upper is None and upper == found else "person"
+    return lower, upper, {"lower": "default" if said.lower is None else "person", "limits": of_upper}
 
 
 def _open_ended(joint: Joint) -> str | None:

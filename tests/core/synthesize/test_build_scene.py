@@ -172,7 +172,8 @@ def test_limits_of_one_of_several_joints_name_it() -> None:
     usual = {joint.name: joint.upper for joint in built(pair).objects[0].joints}
     left, right = sorted(item.joints, key=lambda joint: joint.name)
     assert (left.lower, left.upper, left.sources["limits"]) == (0.0, 1.0, "person")
-    assert (right.lower, right.upper, right.sources["limits"]) == (0.1, usual[right.name], "person")
+    assert (right.lower, right.sources["lower"]) == (0.1, "person")
+    assert (right.lower, right.upper, right.sources["limits"]) == (0.1, usual[right.name], "default")
     assert any("what was said of a joint lid was not used: its joints are left_door, right_door" in w for w in item.warnings)
 
 
@@ -188,7 +189,7 @@ def test_a_lower_limit_by_a_person_keeps_the_measured_upper_one() -> None:
     track = replace(track, motions=(motion({5: 0.43}, stop_seen=True),))
     asked = Overrides(objects={"a": ObjectOverride(joint_lower=0.05)})
     joint = build_scene(capture(), [track], [placement], [asset], asked, SynthesizeConfig()).objects[0].joints[0]
-    assert (joint.lower, joint.sources["limits"]) == (0.05, "person")
+    assert (joint.lower, joint.sources["lower"], joint.sources["limits"]) == (0.05, "person", "measured")
     assert joint.upper == pytest.approx(0.43, abs=1e-6)
 
 
