@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -204,3 +205,50 @@ def test_the_readme_names_every_command_and_stays_short() -> None:
     commands = next(action.choices for action in build_parser()._actions if isinstance(action, argparse._SubParsersAction))
     assert [command for command in commands if f"`r2c2r {command}`" not in readme] == []
     assert len(readme.splitlines()) <= 150  # it is for users: the rest lives in docs/
+
+
+MAX_CORE_LINES, MAX_PARAMS = 64_500, 1_300
+"""Of r2c2r_core. A change that needs more raises the number here, in its own commit, and says why."""
+
+
+def test_the_core_and_its_tuned_numbers_do_not_grow() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "r2c2r_core").rglob("*.py")]
+    lines, params = sum(text.count("\n") for text in texts), sum(len(re.findall(r"\bparam\(", text)) for text in texts)
+    assert (lines <= MAX_CORE_LINES, params <= MAX_PARAMS) == (True, True), f"{lines} lines, {params} param( calls"
+
+
+OVERRIDES = {"do_GET", "do_POST", "do_DELETE", "log_message", "get_response"}  # called by http.server and Starlette
+
+
+def test_every_public_function_is_used_outside_the_tests() -> None:
+    product = {path: path.read_text(encoding="utf-8") for name in ("r2c2r_core", "app") for path in (ROOT / name).rglob("*.py")}
+    users = [
+        path.read_text(encoding="utf-8")
+        for name in ("benchmarks", "training", "alembic")
+        for path in (ROOT / name).rglob("*.py")
+    ]
+    words = Counter(word for text in (*product.values(), *users) for word in re.findall(r"\w+", text))
+    defined = [
+        (path, node.name)
+        for path, text in product.items()
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not node.decorator_list
+    ]
+    unused = [f"{path.relative_to(ROOT)}: {name}" for path, name in defined if words[name] < 2 and name not in OVERRIDES]
+    assert [line for line in unused if not line.rpartition(" ")[2].startswith("__")] == []
+
+
+RIDDLES = ("What", "Which", "Whatever", "Nobody", "Of")
+
+
+def test_the_first_line_of_a_docstring_names_its_subject() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}: {text.splitlines()[0]}"
+        for name in ("r2c2r_core", "app")
+        for path in sorted((ROOT / name).rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        and (text := ast.get_docstring(node))
+        and text.split()[0].rstrip(",:") in RIDDLES
+    ]
+    assert found == []

@@ -37,6 +37,7 @@ class Patches(NamedTuple):
     axis: np.ndarray  # (n,) coordinate across the face: 0, 1 or 2
     face: np.ndarray  # (n,) parameter of the box that this coordinate measures
     reach_m: float | None  # how far behind the front the sides and the top were seen without a gap
+    ends: dict[int, float]  # by LEFT and RIGHT: where depth on the front ends, unless it goes on past the search region
 
 
 def patches_on(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Patches:
@@ -54,8 +55,9 @@ def patches_on(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Patch
     behind = (y > box[FRONT] + params.behind_m) & (y < box[BACK])
     near = np.abs(points[:, [0, 0, 2]] - box[[LEFT, RIGHT, TOP]]) < params.shell_m
     width, depth, height = high - low
+    on_front = (normals[:, 1] < -params.facing) & (np.abs(y - box[FRONT]) < params.front_shell_m) & level
     chosen = {
-        FRONT: ((normals[:, 1] < -params.facing) & (np.abs(y - box[FRONT]) < params.front_shell_m) & inner & level, 0.0),
+        FRONT: (on_front & inner, 0.0),
         LEFT: ((normals[:, 0] < -params.facing) & near[:, 0] & behind & level, depth * height),
         RIGHT: ((normals[:, 0] > params.facing) & near[:, 1] & behind & level, depth * height),
         TOP: ((normals[:, 2] > params.facing) & near[:, 2] & behind & inner, width * depth),
@@ -73,7 +75,20 @@ def patches_on(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Patch
         np.repeat([axes[face] for face in found], count).astype(int),
         np.repeat(list(found), count).astype(int),
         max(ends, default=None),
+        _front_ends(points[on_front], box),
     )
+
+
+def _front_ends(points: Points, box: np.ndarray) -> dict[int, float]:
+    """Left and right end of depth on the front: the median over rows of patches."""
+    params, ends = tuned(Params), {}
+    rows = np.floor(points[:, 2] / params.patch_m).astype(int)
+    for face, sign in ((LEFT, -1.0), (RIGHT, 1.0)):
+        reach = [float((sign * points[rows == row, 0]).max()) for row in np.unique(rows)]
+        limit = sign * float(box[face]) + params.shell_m - params.gap_m
+        if reach and np.median(reach) < limit:
+            ends[face] = sign * float(np.median(reach))
+    return ends
 
 
 def _surface_in(

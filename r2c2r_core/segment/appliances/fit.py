@@ -62,6 +62,10 @@ class Params:
     )
     bottom_m: float = param(0.010, "m", "the same of its lower edge, which no photograph is asked for: it lies in shadow")
     support_m: float = param(0.004, "m", "the same of the height of what it stands on")
+    end_m: float = param(0.005, "m", "the same of the left and right end of depth on the front")
+    end_inset_m: float = param(
+        0.009, "m", "from where depth on a face ends to the edge", source="1 to 15 mm on six kitchens of both generators"
+    )
     wall_m: float = param(0.010, "m", "the same of the wall behind")
     reach_m: float = param(0.04, "m", "the same of where its sides end in depth, which smears across the gap to the wall")
     distance_m: float = param(1.5, "m", "of the cameras, at which the depth noise of the fused surface is taken")
@@ -81,7 +85,7 @@ class Params:
     sure: float = param(0.5, "share", "of the spread of usual depths: a depth known that well was seen")
 
 
-_THOUGHT = 10  # residuals of what was thought before: the seven parameters, and three usual sizes
+_USUAL = slice(7, 10)  # residuals of usual sizes, after those of the rectangle
 _STILL = 2e-4  # a step (rad, m) below which the box stands
 _SCALE = np.array([0.02, 0.01, 0.01, 0.01, 0.02, 0.01, 0.01])  # of the parameters, for the solver's trust region
 
@@ -161,9 +165,16 @@ def solve(evidence: Evidence, photos: Sequence[Photo], world_from_front: Rigid3)
     coarse = sorted((annealed(start, params.spreads_m[:1]) for start in _starts(evidence)), key=_cost)
     # At the widest spread the shadow behind it and its own back are one edge: the likeliest of each depth goes on.
     fine = min((annealed(found.box, params.spreads_m[1:]) for found in _apart(coarse, params.apart_m)), key=_cost)
-    as_found = fine.box.copy()
-    as_found[[LEFT, RIGHT]] = evidence.start[[LEFT, RIGHT]]
-    return min(fine, annealed(as_found, params.spreads_m[2:]), key=_cost)
+    found = evidence.start[[LEFT, RIGHT]], _depth_sides(evidence.patches, fine.box)
+    restarts = [np.concatenate([fine.box[:LEFT], sides, fine.box[FRONT:]]) for sides in found]
+    return min(fine, *(annealed(start, params.spreads_m[2:]) for start in restarts), key=_cost)
+
+
+def _depth_sides(patches: Patches, box: np.ndarray) -> np.ndarray:
+    """Left and right side of the box, each at least as far out as depth on the front says."""
+    inset = tuned(Params).end_inset_m
+    left, right = patches.ends.get(LEFT, np.inf) - inset, patches.ends.get(RIGHT, -np.inf) + inset
+    return np.array([min(box[LEFT], left), max(box[RIGHT], right)])
 
 
 def _apart(solutions: Sequence[Solution], apart_m: float) -> list[Solution]:
@@ -224,7 +235,7 @@ def _annealed(
 def _loss(count: int) -> Callable[[np.ndarray], np.ndarray]:
     """Cauchy kernel of that many residuals; the first ones, priors, are squared."""
     scale = np.full(count, tuned(Params).kernel)
-    scale[:_THOUGHT] = np.inf
+    scale[_USUAL] = np.inf
     return cauchy_loss(scale)
 
 
@@ -242,7 +253,9 @@ def _residuals(box: np.ndarray, evidence: Evidence, edges: Sequence[_Edges]) -> 
     if evidence.wall_m is not None:
         limits.append(max(back - evidence.wall_m, 0.0) / params.wall_m)
     if evidence.support_m is not None:
-        limits.append(min(bottom - evidence.support_m, 0.0) / params.support_m)
+        limits.append((bottom - evidence.support_m) / params.support_m)
+    beyond = {face: (1.0 if face == RIGHT else -1.0) * (box[face] - at) for face, at in evidence.patches.ends.items()}
+    limits += [min(past - params.end_inset_m, 0.0) / params.end_m for past in beyond.values()]
     if evidence.patches.reach_m is not None:
         limits.append((back - evidence.patches.reach_m) / params.reach_m)
     turned = rotation_about_z(float(box[YAW]))
