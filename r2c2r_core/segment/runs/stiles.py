@@ -53,17 +53,19 @@ def whole_frames(
 
     Where the gaps at a front's other sides end, what follows is no part of it: a rail of the face frame that it is inset in.
     """
-    field, found = LineField(odds, cell_m), list(cells)
+    params, field, found = tuned(Params), LineField(odds, cell_m), list(cells)
     for front in filter(field.is_front, cells):
         grown = front
         for axis, end in ((0, 0), (0, 1), (1, 0), (1, 1)):
             strip = _strip_beside(field, found, grown, axis, end)
             if grown not in found or strip is None or is_rail(contrast, grown, strip, axis):
                 continue
-            if _is_parted(contrast, grown, axis, end, cell_m):
+            at_corners = _shares_at_corners(contrast, grown, axis, end, cell_m)
+            if min(at_corners) > params.none_share:  # it reaches the other sides, as a gap does
                 continue
             sunk = _is_sunk(contrast, relief, grown, axis, end, cell_m)
-            if _is_stile(field, grown, strip, lines, axis, end, sunk):
+            ends = sunk and max(at_corners) < params.none_share
+            if ends or _is_stile(field, grown, strip, lines, axis, end, sunk):
                 found.remove(grown)
                 found = [part for other in found for part in _without(other, strip)]
                 grown = joined([grown, strip])
@@ -135,16 +137,14 @@ def _strip_beside(field: LineField, cells: Sequence[Cell], front: Cell, axis: in
     return None
 
 
-def _is_parted(contrast: Contrast, front: Cell, axis: int, end: int, cell_m: float) -> bool:
-    """Whether the line at one end of a front reaches its other sides, as a gap does: around a panel it ends at the stiles."""
+def _shares_at_corners(contrast: Contrast, front: Cell, axis: int, end: int, cell_m: float) -> list[float]:
+    """Contrast of the line at one end of a front beside its other sides, relative to its middle: 0 where the line ends before."""
     params, at, (low, high) = tuned(Params), across(front, axis)[end], across(front, 1 - axis)
     corner = params.narrowest_m / cell_m
     inner = float(np.median(contrast.along(axis, at, low + corner, high - corner)))
-    corners = [
-        float(np.median(contrast.along(axis, at, *span)))
-        for span in ((low + CORNER, low + corner), (high - corner, high - CORNER))
-    ]
-    return min(corners) > params.none_share * inner
+    spans = (low + CORNER, low + corner), (high - corner, high - CORNER)
+    corners = [float(np.median(contrast.along(axis, at, *span))) for span in spans]
+    return [corner / max(inner, 1e-9) for corner in corners]
 
 
 def _is_sunk(contrast: Contrast, relief: Relief, front: Cell, axis: int, end: int, cell_m: float) -> bool:
