@@ -138,7 +138,7 @@ def _strip_beside(field: LineField, cells: Sequence[Cell], front: Cell, axis: in
 
 
 def _shares_at_corners(contrast: Contrast, front: Cell, axis: int, end: int, cell_m: float) -> list[float]:
-    """Contrast of the line at one end of a front beside its other sides, relative to its middle: 0 where the line ends before."""
+    """Contrast of the line at one end of a front beside its other sides, relative to its middle; 0: it ends before."""
     params, at, (low, high) = tuned(Params), across(front, axis)[end], across(front, 1 - axis)
     corner = params.narrowest_m / cell_m
     inner = float(np.median(contrast.along(axis, at, low + corner, high - corner)))
