@@ -1,1 +1,1 @@
-"""Free-standing things: `thing` cuts large ones from the surface, `visual_hull` carves small ones, `found` has both."""
+"""Free-standing objects: `thing` cuts large ones from the surface, `visual_hull` carves small ones, `found` wraps both."""

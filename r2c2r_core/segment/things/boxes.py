@@ -1,4 +1,4 @@
-"""Gravity-aligned bounding boxes of partly seen things."""
+"""Gravity-aligned bounding boxes of partly seen objects."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,15 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a thing stands square with the room."""
+    """Tuned parameters of object boxes."""
 
-    trim: float = param(0.01, "share", "of the points at either end", ge=0, lt=0.5)
-    snap_rad: float = param(float(np.radians(6.0)), "rad", "off the room's directions, within which it is square with them")
-    snap_area: float = param(1.06, "ratio", "to the smallest box, of a square one that is still preferred")
+    trim: float = param(0.01, "share", "Fraction of the points ignored at either end of each axis", ge=0, lt=0.5)
+    snap_rad: float = param(
+        float(np.radians(6.0)), "rad", "Maximum angle to the room's directions for a box to be aligned with them"
+    )
+    snap_area: float = param(
+        1.06, "ratio", "Maximum footprint of the room-aligned box, relative to the smallest box, for it to be preferred"
+    )
 
 
 def box_of(
@@ -28,9 +32,9 @@ def box_of(
     *,
     round_thing: bool = False,
 ) -> ThingBox:
-    """The thing's box: yaw of the room where that fits, else of least area; front towards `towards_world` (the cameras).
+    """Object box aligned with the room where that fits, else of least area; its front faces `towards_world` (the cameras).
 
-    A round thing is as deep as it is wide: only its width is measured across the view, its back is not seen.
+    A round object is as deep as it is wide: only its width is measured across the view, because its back is not seen.
     """
     params = tuned(Params)
     if round_thing:
@@ -57,7 +61,7 @@ def box_of(
 
 
 def _facing(rotation: np.ndarray, towards: Vector3) -> Vector3:
-    """The box side that looks most towards a direction."""
+    """Outward normal of the box side that points most towards a direction."""
     sides = [sign * rotation[:, axis] for axis in (0, 1) for sign in (1.0, -1.0)]
     return np.asarray(max(sides, key=lambda side: float(side @ towards)))
 

@@ -1,4 +1,4 @@
-"""Crops of photos at a size that an outline needs: a close-up takes no longer than a view from afar."""
+"""Photo crops at the resolution that outline extraction needs, so that a close-up costs no more than a distant view."""
 
 from dataclasses import dataclass, replace
 
@@ -8,19 +8,19 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How large a crop is."""
+    """Tuned parameters of crops."""
 
     longest_px: int = param(
         320,
         "px",
-        "of the crop an outline is looked for in: a larger one is shrunk, and only its border drawn at the photo's resolution",
-        source="a handle 1200 px wide takes the time of one of 320 px; VGA crops are not shrunk",
+        "Maximum side of a crop for outline extraction; larger crops are shrunk, and only the border uses the full resolution",
+        source="a handle 1200 px wide then takes as long as one of 320 px; VGA crops are not shrunk",
         ge=32,
     )
 
 
 def shrunk(camera: Intrinsics, area: tuple[slice, slice]) -> Intrinsics:
-    """The camera of an area of a photo, no larger than an outline needs."""
+    """Camera of a photo area, downscaled to the resolution that outline extraction needs."""
     rows, columns = area
     width, height = columns.stop - columns.start, rows.stop - rows.start
     part = replace(camera, cx=camera.cx - columns.start, cy=camera.cy - rows.start, width=width, height=height)

@@ -1,4 +1,4 @@
-"""A cylinder fitted to silhouettes: for small upright things where the poses disagree too much to carve a hull."""
+"""Cylinder fitted to silhouettes: for small upright objects whose frame poses disagree too much to carve a hull."""
 
 from dataclasses import dataclass, replace
 
@@ -14,32 +14,34 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Things whose poses disagree."""
+    """Tuned parameters of the cylinder fit."""
 
     wanders_m: float = param(
         0.05,
         "m",
-        "how far a small thing wanders between frames",
+        "Pose error of a small object between frames",
         source="seen between frames of recordings whose poses disagree",
     )
-    width: float = param(1.2, "ratio", "of a thing's width to its radius, where its name tells no width")
-    height: float = param(1.5, "ratio", "of a thing's height to its radius, at least")
+    width: float = param(1.2, "ratio", "Initial width relative to the object's radius, where its category gives no width")
+    height: float = param(1.5, "ratio", "Minimum initial height relative to the object's radius")
     clicked_at: float = param(
-        0.45, "ratio", "of how far its middle lies behind a click to its width: clicks meet the near side"
+        0.45, "ratio", "Distance of the object's centre behind a click, relative to its width: clicks hit the near side"
     )
-    growth: tuple[float, float] = param((0.6, 1.5), "ratio", "by which an outline may correct its size, in each round")
-    rounds: int = param(2, "count", "in which outlines correct it", ge=1)
+    growth: tuple[float, float] = param(
+        (0.6, 1.5), "ratio", "Minimum and maximum factor by which silhouettes may change its size in one round"
+    )
+    rounds: int = param(2, "count", "Number of rounds of size correction by silhouettes", ge=1)
     drawn_m: tuple[float, float] = param(
-        (0.012, 0.015), "m", "how far an outline may be off where colours are learned, and drawn"
+        (0.012, 0.015), "m", "Tolerance of the outline while colours are learned, and while silhouettes are extracted"
     )
-    border_m: float = param(0.010, "m", "how far the last outline may be off")
-    shown: float = param(0.9, "share", "of it that nothing hides, for an outline to tell its size")
+    border_m: float = param(0.010, "m", "Tolerance of the final outline")
+    shown: float = param(0.9, "share", "Minimum unoccluded fraction of the object for a silhouette to measure its size")
 
 
 def upright_shape(
     scene: Scene, positives: Points, views: list[Frame], config: ThingConfig, support: float | None
 ) -> Thing | None:
-    """A cylinder of the usual size at the click, then of the size its outlines have: masks are found frame by frame."""
+    """Cylinder of the usual size at the click, refined to the size of its silhouettes; masks are found frame by frame."""
     params = tuned(Params)
     base = support if support is not None else float(positives[:, 2].min()) - 0.5 * config.radius_m
     width = config.width_m or params.width * config.radius_m
@@ -56,7 +58,7 @@ def upright_shape(
         low, high = params.growth
         width = float(np.clip(across, low * width, high * width))
         height = float(np.clip(tall, low * height, high * height))
-        centre = centre + np.array([east, north, 0.0])  # the click was beside its middle
+        centre = centre + np.array([east, north, 0.0])  # the click was off its centre
         thing = _cylinder(centre, base, width, height, support)
         thing = replace(thing, colours=colours_of(thing, scene, views, params.drawn_m[0]))
     return thing
@@ -81,7 +83,7 @@ def _cylinder(centre: Vector3, base: float, width: float, height: float, support
 
 
 def _outline(thing: Thing, scene: Scene, frame: Frame) -> tuple[float, float, float, float] | None:
-    """Width, height and plan offset (world x, y) in metres that a frame's outline suggests for the drawn hull."""
+    """Width, height and plan offset (world x, y) in metres that a frame's silhouette suggests for the drawn hull."""
     crop, mask, share = crop_outline(thing, scene, frame, tuned(Params).drawn_m[1])
     if crop is None or share < tuned(Params).shown or not mask.any():
         return None

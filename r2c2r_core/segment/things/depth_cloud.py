@@ -1,4 +1,4 @@
-"""Surface voxels straight from depth images: what the fused surface loses, as thin legs and sheets seen from both sides."""
+"""Surface voxels from depth images, for parts that fusion loses: thin legs, and sheets seen from both sides."""
 
 from dataclasses import dataclass
 
@@ -16,26 +16,42 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which depth points are surface."""
+    """Tuned parameters of the depth cloud."""
 
-    frames: int = param(40, "count", "whose depth is used", ge=2)
-    nearest_m: float = param(0.2, "m", "before a camera: nearer, none sees", source="ARKit LiDAR and Kinect: 0.2 to 0.4 m")
-    places: int = param(4, "count", "of a level surface, the most central ones, where a frame may see it", ge=1)
-    most_rows: int = param(240, "px", "of a depth image that are used: finer ones show no more at a voxel's size", ge=16)
-    least_hits: int = param(2, "count", "of frames that must see surface in a voxel", ge=1)
+    frames: int = param(40, "count", "Maximum number of frames whose depth is used", ge=2)
+    nearest_m: float = param(0.2, "m", "Minimum depth that a sensor measures", source="ARKit LiDAR and Kinect: 0.2 to 0.4 m")
+    places: int = param(
+        4,
+        "count",
+        "Number of places on a level surface, those nearest the optical axis, where a frame's height offset is tried",
+        ge=1,
+    )
+    most_rows: int = param(240, "px", "Maximum number of depth-image rows used: more show no detail at the voxel size", ge=16)
+    least_hits: int = param(2, "count", "Minimum number of frames that must see surface in a voxel", ge=1)
     agreed: float = param(
-        0.2, "share", "of the frames that look there, which must: sensors smear thin things over what is behind them"
+        0.2,
+        "share",
+        "Minimum fraction of frames looking at a voxel that must see surface there: sensors smear thin parts backwards",
     )
     edge_step: float = param(
-        0.06, "ratio", "of a step within 3x3 pixels to the depth, where depth mixes", source="backends.md 2.7"
+        0.06,
+        "ratio",
+        "Depth step within 3x3 pixels, relative to the depth, above which a pixel may mix near and far surface",
+        source="backends.md 2.7",
     )
-    near_side: float = param(0.25, "share", "of a step, by which a pixel may lie behind its near side: thin legs are all edge")
-    through_m: float = param(0.03, "m", "behind a voxel beyond the noise, from where the sensor looked through it")
+    near_side: float = param(
+        0.25,
+        "share",
+        "Maximum distance of a pixel behind the near side of a step, as a fraction of the step: thin legs are all edge",
+    )
+    through_m: float = param(
+        0.03, "m", "Minimum distance of measured depth behind a voxel, beyond the noise, for the voxel to be seen through"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthCloud:
-    """Voxels (n) in which depth images agree on surface: mean position, mean Lab colour, and the frames that hit them."""
+    """Voxels (n) in which depth images agree on surface: mean position, mean Lab colour, and number of frames that hit them."""
 
     origin: Vector3
     size_m: float
@@ -47,18 +63,18 @@ class DepthCloud:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Region:
-    """An upright box of the world, and the height of a level surface in it, by which frames are set right."""
+    """An axis-aligned box in the world, and the height of a level surface in it that corrects the height of each frame."""
 
     low: Vector3
     high: Vector3
     level_z_m: float | None
 
     def holds(self, points: Points) -> np.ndarray:
-        """Which points lie in it."""
+        """Mask of the points that lie inside the box."""
         return np.asarray(((points > self.low) & (points < self.high)).all(axis=-1))
 
     def lift(self, scene: Scene, frame: Frame) -> float:
-        """How much too high the frame shows it: by the level surface where that lies most in the middle of the picture."""
+        """Height error of a frame, metres (positive: too high), from the level surface where it is nearest the image centre."""
         if self.level_z_m is None:
             return 0.0
         x, y = (
@@ -75,7 +91,7 @@ class Region:
 
 
 def gather_cloud(scene: Scene, region: Region, size_m: float) -> DepthCloud:
-    """The surface voxels of a region."""
+    """Surface voxels of a region that enough frames agree on."""
     params = tuned(Params)
     views = _views_of(scene, region, params.frames)
     keys, sums = [], []
@@ -102,7 +118,7 @@ def gather_cloud(scene: Scene, region: Region, size_m: float) -> DepthCloud:
 
 
 def clean_depth(depth: DepthMetres) -> DepthMetres:
-    """Depth without the far side of its steps, where it mixes what is near with what is behind; 0 there."""
+    """Depth without the far side of its steps, where near and far surface mix; 0 there."""
     params = tuned(Params)
     near = cv2.erode(np.where(depth > 0, depth, 99.0).astype(np.float32), np.ones((3, 3), np.uint8))
     far = cv2.dilate(depth, np.ones((3, 3), np.uint8))
@@ -125,7 +141,7 @@ def _points_in(scene: Scene, frame: Frame, region: Region) -> tuple[Points, np.n
 
 
 def _seen_through(scene: Scene, views: list[Frame], region: Region, points: Points) -> np.ndarray:
-    """How many frames measured something clearly behind each point."""
+    """Number of frames whose depth lies clearly behind each point."""
     count = np.zeros(len(points))
     for frame in views:
         lifted, depth = raised(points, region.lift(scene, frame)), clean_depth(scene.depth(frame.index))
@@ -135,7 +151,7 @@ def _seen_through(scene: Scene, views: list[Frame], region: Region, points: Poin
 
 
 def _views_of(scene: Scene, region: Region, most: int) -> list[Frame]:
-    """Frames that look into the region's inner half: of as many stretches of the recording, the sharpest of each."""
+    """Sharpest frame of each of up to `most` stretches of the recording, among those looking into the region's inner half."""
     middle, half = (region.low + region.high) / 2, (region.high - region.low) / 4
     corners = middle + half * np.array([[0, 0, 0], *np.stack(np.meshgrid(*[[-1, 1]] * 3), axis=-1).reshape(-1, 3)])
     shown = np.zeros(len(scene.frames), bool)

@@ -1,4 +1,4 @@
-"""A free-standing thing that clicks found: its box, and its mask in any frame."""
+"""A clicked free-standing object: its box, and its mask in any frame."""
 
 from dataclasses import dataclass
 
@@ -21,14 +21,16 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How well a thing's borders are known."""
+    """Tuned parameters of the masks' confidence."""
 
-    border_m: float = param(0.01, "m", "how far borders are off", source="measured on samples and the real kitchen")
+    border_m: float = param(
+        0.01, "m", "Usual position error of a mask's border", source="measured on samples and the real kitchen"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundThing:
-    """A free-standing thing."""
+    """A segmented free-standing object."""
 
     thing: Thing
     scene: Scene
@@ -38,22 +40,22 @@ class FoundThing:
     warnings: tuple[str, ...] = ()
 
     def see(self, frame: Frame) -> View:
-        """Its pixels."""
+        """Visible pixels of the object in a frame, with their confidence."""
         mask, share = (small_mask if self.small else thing_mask)(self.thing, self.scene, frame)
         border_m = 0.5 * self.thing.border_m if self.small else tuned(Params).border_m
         sample = self.thing.vertices[:: max(1, len(self.thing.vertices) // 50)]
         return View(mask, expected_iou(mask, share, frame, sample, border_m))
 
     def panel(self) -> FrontPanel | None:
-        """None: things have no front panel."""
+        """None: free-standing objects have no front panel."""
         return None
 
     def motions(self) -> tuple[JointMotion, ...]:
-        """None: things are moved whole."""
+        """No motions: free-standing objects move as a whole."""
         return ()
 
     def box(self) -> ThingBox | None:
-        """Its box on its support."""
+        """Box of the object on its support."""
         centres = np.stack([frame.world_from_camera.translation for frame in self.scene.frames])
         room = self.scene.capture.room
         return box_of(
@@ -63,7 +65,7 @@ class FoundThing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundStanding:
-    """What stands on the floor, whole."""
+    """A segmented floor-standing object, such as a chair or a table."""
 
     standing: Standing
     scene: Scene
@@ -71,19 +73,19 @@ class FoundStanding:
     warnings: tuple[str, ...] = ()
 
     def see(self, frame: Frame) -> View:
-        """Its pixels."""
+        """Visible pixels of the object in a frame, with their confidence."""
         mask, share = standing_mask(self.standing, self.scene, frame)
         sample = self.standing.thing.vertices[:: max(1, len(self.standing.thing.vertices) // 50)]
         return View(mask, expected_iou(mask, share, frame, sample, tuned(Params).border_m))
 
     def panel(self) -> FrontPanel | None:
-        """None: things have no front panel."""
+        """None: free-standing objects have no front panel."""
         return None
 
     def motions(self) -> tuple[JointMotion, ...]:
-        """None: things are moved whole."""
+        """No motions: free-standing objects move as a whole."""
         return ()
 
     def box(self) -> ThingBox | None:
-        """Its box on the floor."""
+        """Box of the object on the floor."""
         return FoundThing(self.standing.thing, self.scene).box()

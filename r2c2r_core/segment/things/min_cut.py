@@ -1,4 +1,4 @@
-"""Min-cut over surface voxels: the part of a surface that belongs to clicks, cut along creases and colour edges."""
+"""Min-cut over surface voxels: the part of a surface that the clicks select, cut along creases and colour edges."""
 
 from dataclasses import dataclass
 
@@ -14,16 +14,24 @@ _LARGE = 1e5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What cutting a surface costs."""
+    """Tuned parameters of the surface cut."""
 
-    convex_cost: float = param(2.0, "score", "of a convex crease, where things seldom part")
-    concave_cost: float = param(9.0, "score", "of a concave crease, where things meet")
-    colour_cost: float = param(0.6, "score", "of a colour edge")
+    convex_cost: float = param(
+        2.0,
+        "score",
+        "Decay rate of link capacity with bend and colour difference across a convex crease, where objects seldom separate",
+    )
+    concave_cost: float = param(
+        9.0, "score", "Decay rate of link capacity with bend and colour difference across a concave crease, where objects meet"
+    )
+    colour_cost: float = param(
+        0.6, "score", "Weight of the colour difference between neighbours relative to the angle between their normals"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VoxelGraph:
-    """Voxels that hold surface, with their mean position, normal, colour and area, and which touch (26 neighbours)."""
+    """Voxels containing surface, with mean position, normal, colour and area, and the pairs that touch (26 neighbours)."""
 
     positions: Points
     normals: Points
@@ -34,13 +42,13 @@ class VoxelGraph:
     size_m: float
 
     def nearest(self, point_world: Vector3) -> int:
-        """The voxel whose surface is closest to a point."""
+        """Index of the voxel whose surface is closest to a point."""
         return int(np.argmin(((self.positions - point_world) ** 2).sum(axis=1)))
 
 
 def build_graph(vertices: Points, faces: Faces, colours: Colours, size_m: float) -> VoxelGraph:
-    """The voxel graph of a triangle surface."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))  # sums over axes of three are many times slower
+    """Voxel graph of a triangle surface."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))  # sums over axes of length three are many times slower
     cross = np.cross(b - a, c - a)
     area = 0.5 * np.sqrt(cross[:, 0] ** 2 + cross[:, 1] ** 2 + cross[:, 2] ** 2)
     centres = (a + b + c) / 3
@@ -70,11 +78,11 @@ def cut(
     gap_m: float = 0.0,
     upright: bool = False,
 ) -> tuple[np.ndarray, float]:
-    """Voxels joined to the positive ones, and the cut's cost per square root of area (lower is a cleaner cut).
+    """Min-cut of the voxels joined to the positive ones, and its cost per square root of area (lower is a cleaner cut).
 
-    `background` marks voxels of structure (floor, worktop, walls); farther than about `radius_m` a voxel is unlikely.
-    Things that are `upright` (chairs) reach as far down as they do: only plan distance counts. Parts up to `gap_m` apart
-    count as joined: scans lose dark and thin pieces.
+    `background` marks voxels of structure (floor, worktop, walls). The prior of a voxel falls with distance, on the scale of
+    `radius_m`; for `upright` objects (chairs), which extend down to the floor, only plan distance counts. Parts up to `gap_m`
+    from each other count as joined: scans lose dark and thin pieces.
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import breadth_first_order, maximum_flow
@@ -109,7 +117,7 @@ def cut(
 
 
 def connected_to(graph: VoxelGraph, inside: np.ndarray, seeds: list[int], gap_m: float = 0.0) -> np.ndarray:
-    """The voxels of `inside` that touch a seed through others of it, or lie within `gap_m` of such."""
+    """Mask of the voxels of `inside` that are connected to a seed within it, across gaps of up to `gap_m`."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
@@ -136,7 +144,7 @@ def _capacities(graph: VoxelGraph) -> np.ndarray:
     colour = _dot(graph.lab[a] - graph.lab[b], graph.lab[a] - graph.lab[b]) / 40**2
     weight = np.arccos(cosine) + params.colour_cost * colour
     cost = np.where(bend > 0.02, params.convex_cost, params.concave_cost)
-    share = np.minimum(graph.area_m2[a], graph.area_m2[b]) / graph.size_m**2  # slivers hold little together
+    share = np.minimum(graph.area_m2[a], graph.area_m2[b]) / graph.size_m**2  # slivers are weak links
     return np.asarray(graph.size_m * 100 * (np.exp(-cost * weight) + 0.02) * np.clip(share, 0.05, 1.0) / 2)
 
 
@@ -145,7 +153,7 @@ def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def touching(unique: np.ndarray, span: np.ndarray) -> np.ndarray:
-    """Pairs of the cells, given by sorted flat numbers in a grid of `span`, that touch (26 neighbours)."""
+    """Pairs of touching cells (26 neighbours), given by sorted flat indices in a grid of shape `span`."""
     offsets = [(dx * span[1] + dy) * span[2] + dz for dx in (-1, 0, 1) for dy in (-1, 0, 1) for dz in (-1, 0, 1)]
     pairs = []
     for offset in sorted(int(o) for o in offsets if o > 0):

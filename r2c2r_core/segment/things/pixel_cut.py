@@ -14,27 +14,32 @@ _CAPACITY_SCALE = 100.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What cutting a picture costs."""
+    """Tuned parameters of the image cut."""
 
-    largest_px: int = param(110, "px", "a longer side is cut at a lower resolution, its border drawn at the full one", ge=16)
-    smooth: float = param(2.5, "score", "cost of a border between equal colours, in log-odds a pixel")
-    most_odds: float = param(2.5, "log", "of a colour: alone it decides no pixel")
-    unseen: float = param(2e-4, "share", "of a colour that neither side showed", gt=0, le=1)
+    largest_px: int = param(
+        110,
+        "px",
+        "Maximum side of the image that is cut; larger ones are cut at a lower resolution and their border upsampled",
+        ge=16,
+    )
+    smooth: float = param(2.5, "score", "Cost of a border between equal colours, as log-odds per pixel")
+    most_odds: float = param(2.5, "log", "Maximum absolute log-odds of a colour: colour alone decides no pixel")
+    unseen: float = param(2e-4, "share", "Probability of a colour that neither side showed", gt=0, le=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourModel:
-    """How much likelier each colour is on the thing than around it: log-odds over Lab bins."""
+    """Log-odds of colours on the object against its surroundings, over Lab bins."""
 
     table: np.ndarray
 
     def odds(self, lab: np.ndarray) -> np.ndarray:
-        """Log-odds (h, w) of an 8-bit Lab image."""
+        """Log-odds (h, w) of the pixels of an 8-bit Lab image."""
         return np.asarray(self.table[_bins_of(lab)])
 
 
 def learn_colours(samples: list[tuple[np.ndarray, Mask, Mask]]) -> ColourModel:
-    """The model of (8-bit Lab image, pixels surely on the thing, pixels surely off it)."""
+    """Colour model learned from samples (8-bit Lab image, pixels surely on the object, pixels surely off it)."""
     params = tuned(Params)
     on = sum((_histogram(lab[sure]) for lab, sure, _ in samples), np.zeros(_BINS))
     off = sum((_histogram(lab[sure]) for lab, _, sure in samples), np.zeros(_BINS))
@@ -44,13 +49,13 @@ def learn_colours(samples: list[tuple[np.ndarray, Mask, Mask]]) -> ColourModel:
 
 
 def unmixed(odds: np.ndarray) -> np.ndarray:
-    """Log-odds (h, w) by colour that all neighbours share, else nought: a pixel on a border mixes the colours of its sides."""
+    """Log-odds (h, w) by colour where 3x3 neighbours agree in sign, else zero: border pixels mix the colours of both sides."""
     around = np.ones((3, 3), np.uint8)
     return np.asarray(np.maximum(cv2.erode(odds, around), 0) + np.minimum(cv2.dilate(odds, around), 0))
 
 
 def cut_pixels(rgb: Image, odds: np.ndarray, largest_px: int | None = None) -> Mask:
-    """The mask of least cost: log-odds of being the thing (h, w) for each pixel, and borders that prefer colour edges."""
+    """Min-cut mask of per-pixel log-odds of the object (h, w), with borders that prefer colour edges."""
     height, width = odds.shape
     shrink = max(1.0, max(height, width) / (largest_px or tuned(Params).largest_px))
     size = (max(4, round(width / shrink)), max(4, round(height / shrink)))

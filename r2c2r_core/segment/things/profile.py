@@ -1,4 +1,4 @@
-"""The most probable outline of a body of revolution from strips of all views: colours, depth and edges in one shortest path."""
+"""Most probable outline of a body of revolution from strips of all views: colour, depth and edges in one shortest path."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,53 +12,60 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a border costs."""
+    """Tuned parameters of the profile search."""
 
     colour: float = param(
         0.6,
         "ratio",
-        "of what colours say of a body to what they say of a pixel: a cap's were not seen on it, a shadow's were",
-        source="by 1.0, of 24 bottles of two generators, one takes in a wall in shadow; another lost its cap by dearer borders",
+        "Weight of colour log-odds for a body relative to a single pixel: a cap's colours were never learned, a shadow's were",
+        source="24 bottles of two generators: at 1.0 one takes in a wall in shadow; with costlier borders one loses its cap",
     )
     one_colour: float = param(
         6.0,
         "grey",
-        "CIELAB units a channel by which one place of a surface differs between views: noise, blur and shading",
+        "Standard deviation of one surface point's colour between views, in CIELAB units a channel: noise, blur and shading",
         gt=0,
     )
-    most_odds: float = param(3.0, "log", "of a view's colour by the others', at most", gt=0)
-    beside: float = param(2 / 3, "share", "of the radii looked at, beyond which only what is behind shows", gt=0, lt=1)
-    sure_odds: float = param(3.0, "log", "against it where all depth about a place is such: colours there are another's")
+    most_odds: float = param(3.0, "log", "Maximum absolute log-odds of a view's colour given the other views", gt=0)
+    beside: float = param(2 / 3, "share", "Fraction of the searched radii beyond which only the background shows", gt=0, lt=1)
+    sure_odds: float = param(
+        3.0, "log", "Log-odds against the body where all nearby depth belongs to another surface: so do the colours there"
+    )
     border: float = param(
         12.0,
         "score",
-        "cost of a border without a colour edge, in log-odds a cell",
-        source="12 bottles of a second generator: by 2.5 one takes in a wall in shadow",
+        "Cost of a border without a colour edge, as log-odds per cell",
+        source="12 bottles of a second generator: at 2.5 one takes in a wall in shadow",
     )
-    edge: float = param(3.0, "ratio", "of a colour edge to the median step between cells: what blurred backgrounds leave", gt=0)
+    edge: float = param(
+        3.0,
+        "ratio",
+        "Colour step that halves the border cost, relative to the median step between cells, which blurred backgrounds leave",
+        gt=0,
+    )
 
 
 class Colours(NamedTuple):
-    """Colours on the body against those of what lies behind it."""
+    """Colour models of the body against what lies behind it: the support, other surfaces, both."""
 
     support: ColourModel
     others: ColourModel
     all: ColourModel
 
     def odds(self, strips: Strips) -> np.ndarray:
-        """Log-odds of each place, by what lies behind it there."""
+        """Log-odds of each place, by the model of what lies behind it there."""
         return np.where(strips.on_support, self.support.odds(strips.lab), self.others.odds(strips.lab))
 
 
 class Profile(NamedTuple):
-    """A radius in cells at each level, and its log-odds over no body at all."""
+    """Radius in cells at each level, and its log-odds relative to no body at all."""
 
     cells: np.ndarray
     score: float
 
 
 def profile_evidence(strips: Strips, colours: Colours) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean over views and sides (levels, cells): log-odds of being the thing, colour steps to the cell within and below."""
+    """Mean over views and sides (levels, cells): log-odds of the body, colour steps inwards and to the level below."""
     params = tuned(Params)
     coloured = np.stack([unmixed(view) for view in colours.odds(strips)])
     lab = strips.lab.astype(np.float32)
@@ -72,10 +79,10 @@ def profile_evidence(strips: Strips, colours: Colours) -> tuple[np.ndarray, np.n
 
 
 def _by_other_views(lab: np.ndarray, shown: np.ndarray) -> np.ndarray:
-    """Log-odds (views, levels, columns) that a colour is that of one surface seen from all sides, over any that is behind.
+    """Photo-consistency log-odds (views, levels, columns): one surface colour in all views against the background.
 
-    Photo-consistency (Kutulakos and Seitz 2000): what stands at the axis has one colour there in all views and on both sides,
-    whatever colour; what is behind lies at another place in each.
+    Photo-consistency (Kutulakos and Seitz 2000): a surface at the axis has the same colour in all views and on both sides,
+    whichever colour that is; the background lies at another place in each view.
     """
     params, half = tuned(Params), lab.shape[2] // 2
     mean = _folded(lab, shown)
@@ -93,7 +100,7 @@ def _by_other_views(lab: np.ndarray, shown: np.ndarray) -> np.ndarray:
 
 
 def _folded(values: np.ndarray, shown: np.ndarray) -> np.ndarray:
-    """Mean over views and both sides of the axis; of vectors too."""
+    """Mean over views and both sides of the axis, for scalars or vectors."""
     half, shown = values.shape[2] // 2, shown.reshape(shown.shape + (1,) * (values.ndim - 3))
     total, count = np.where(shown, values, 0.0).sum(axis=0), shown.sum(axis=0)
     total, count = (sides[:, half:] + sides[:, :half][:, ::-1] for sides in (total, count))
@@ -101,7 +108,7 @@ def _folded(values: np.ndarray, shown: np.ndarray) -> np.ndarray:
 
 
 def best_profile(odds: np.ndarray, across: np.ndarray, along: np.ndarray) -> Profile:
-    """The most probable radii: at each level a count of cells, less than all; above a level without any, none."""
+    """Viterbi path of the most probable radii, in cells per level, less than all; above an empty level all are empty."""
     params = tuned(Params)
     usual = [params.edge * float(np.median(steps)) + 1e-6 for steps in (across, along)]
     side, lid = (params.border / (1 + (step / u) ** 2) for step, u in zip((across, along), usual, strict=True))
@@ -123,7 +130,7 @@ def best_profile(odds: np.ndarray, across: np.ndarray, along: np.ndarray) -> Pro
 
 
 def learn_behind(strips: Strips, on: np.ndarray, off: np.ndarray) -> Colours:
-    """Colours of the places `on` the body against those `off` it (views, levels, columns), by what lies behind."""
+    """Colour models of the places `on` the body against those `off` it (views, levels, columns), by what lies behind."""
     on, off = on & strips.shown, off & strips.shown
     each = [off & strips.on_support, off & ~strips.on_support, off]
     return Colours(*(learn_colours([(strips.lab, on, behind)]) for behind in each))

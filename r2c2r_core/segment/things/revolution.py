@@ -1,10 +1,10 @@
-"""A body of revolution from all views at once: its axis, and the radius at each height, by dynamic programming.
+"""Body of revolution from all views at once: its axis, and its radius at each height, by dynamic programming.
 
-Seen from any side, an upright body of revolution is the same picture about its axis. Every photograph is drawn on the upright
-plane through the axis that faces its camera: there a radius and a height are one place, in all views and on both sides of the
-axis. What stands elsewhere (a neighbour, a pattern of the wall, a shadow on it) lies at another place in each view. So the mean
-over views of the log-odds of being the thing, by depth and by colours, and of the colour edges is the evidence for a profile,
-and the most probable profile is a shortest path through heights (Viterbi), the borders costing less on colour edges.
+An upright body of revolution looks the same about its axis from every side. Each photograph is warped onto the vertical plane
+through the axis that faces its camera: there a radius and a height are one place, in all views and on both sides of the
+axis. Everything off the axis (a neighbour, a pattern or a shadow on the wall) lies at another place in each view. The evidence
+for a profile is therefore the mean over views of the log-odds of the object, by depth and by colour, and of the colour edges;
+the most probable profile is a shortest path through heights (Viterbi) in which borders cost less on colour edges.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,41 +28,51 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a body of revolution is found."""
+    """Tuned parameters of the search for a body of revolution."""
 
-    frames: int = param(18, "count", "that are asked", ge=2)
-    search_frames: int = param(8, "count", "of them, among which the axis is looked for", ge=2)
+    frames: int = param(18, "count", "Maximum number of frames used", ge=2)
+    search_frames: int = param(8, "count", "Maximum number of those frames used in the search for the axis", ge=2)
     pose_share: float = param(
-        0.08, "share", "of a thing's width, that frames may err by about where it is: edges of more do not meet"
+        0.08,
+        "share",
+        "Maximum pose error between frames, as a fraction of the object's width, for edges of different views to meet",
     )
-    cells: int = param(60, "count", "of radii, from the axis to the widest that is looked for", ge=8)
-    levels: int = param(90, "count", "of heights, from the support to the tallest that is looked for", ge=8)
-    coarse: float = param(3.0, "ratio", "of the cells in which the axis is looked for, to those", ge=1)
-    widest: float = param(0.85, "ratio", "of the widest radius that is looked for to the usual width", gt=0)
-    tallest: float = param(1.15, "ratio", "of the tallest that is looked for to the tallest of the kind", gt=0)
-    off_wall_m: float = param(0.03, "m", "before what a click fell on: nearer points are its own")
-    start_m: float = param(0.024, "m", "first step of the axis")
-    last_m: float = param(0.0015, "m", "last step of the axis", gt=0)
-    margin_m: float = param(0.006, "m", "about the border, from where no colours are learned")
-    rounds: int = param(3, "count", "of a profile by colours, colours by that profile", ge=1)
-    meets_m: float = param(0.008, "m", "beside the body, that a click may fall: blur and pose error")
-    spacing_m: float = param(0.003, "m", "between the points of its surface", gt=0)
-    pose_error_m: float = param(0.008, "m", "how far a frame may show it from where it stands: those of all views agreed")
+    cells: int = param(60, "count", "Number of radius cells, from the axis to the largest radius searched", ge=8)
+    levels: int = param(90, "count", "Number of height cells, from the support to the largest height searched", ge=8)
+    coarse: float = param(3.0, "ratio", "Size of the cells of the axis search relative to the final cells", ge=1)
+    widest: float = param(0.85, "ratio", "Largest radius searched relative to the usual width", gt=0)
+    tallest: float = param(1.15, "ratio", "Largest height searched relative to the maximum height of the category", gt=0)
+    off_wall_m: float = param(
+        0.03,
+        "m",
+        "Minimum distance in front of the surface that a click hit for another surface on the ray: nearer points belong to it",
+    )
+    start_m: float = param(0.024, "m", "First step of the axis search")
+    last_m: float = param(0.0015, "m", "Last step of the axis search", gt=0)
+    margin_m: float = param(0.006, "m", "Margin on either side of the border in which no colours are learned")
+    rounds: int = param(3, "count", "Number of alternations between fitting the profile and learning its colours", ge=1)
+    meets_m: float = param(0.008, "m", "Maximum distance of a click's ray from the body: blur and pose error")
+    spacing_m: float = param(0.003, "m", "Minimum distance between points of the sampled surface", gt=0)
+    pose_error_m: float = param(0.008, "m", "Remaining pose error of the body in a frame, once all views agreed")
     border_m: float = param(
         0.002,
         "m",
-        "how far its outline may be off",
-        source="masks of four bottles of a second generator: IoU 0.966, by 3 mm 0.952",
+        "Tolerance of the outline",
+        source="masks of four bottles of a second generator: IoU 0.966, against 0.952 at 3 mm",
     )
-    handle_m: float = param(0.035, "m", "about a vessel's body, where its handle may be")
-    upright_cos: float = param(0.7, "cosine", "with up, of a normal on what stands, at most")
-    places: int = param(2, "count", "before what a click fell on, that are tried", ge=0)
-    least_share: float = param(0.2, "share", "of the width's square that the surface standing at such a place has, at least")
-    before_m: float = param(0.6, "m", "before what a click fell on, where it may have been meant")
+    handle_m: float = param(0.035, "m", "Distance around a vessel's body within which its handle may lie")
+    upright_cos: float = param(
+        0.7, "cosine", "Maximum absolute cosine between a face normal and up for the face to belong to an upright surface"
+    )
+    places: int = param(
+        2, "count", "Maximum number of places in front of the surface that a click hit where the body is tried", ge=0
+    )
+    least_share: float = param(0.2, "share", "Minimum upright surface area at such a place, as a fraction of the squared width")
+    before_m: float = param(0.6, "m", "Maximum distance of such a place in front of the surface that the click hit")
 
 
 class Sight(NamedTuple):
-    """The line of sight of a click, world."""
+    """Line of sight of a click, in the world."""
 
     origin: Vector3
     ray: Vector3  # unit
@@ -79,7 +89,7 @@ class Body(NamedTuple):
 
     @property
     def radii_m(self) -> np.ndarray:
-        """Of the levels up to its top."""
+        """Radii of the levels up to the top of the body."""
         return np.trim_zeros(self.profile.cells, "b") * self.grid.cell_m
 
 
@@ -91,10 +101,10 @@ def find_round(
     config: ThingConfig,
     structure: tuple[PlaneRegion, ...],
 ) -> Thing | None:
-    """The body of revolution that all sights `on` it meet and none of those `off` it; `click` is where the first one ended.
+    """Body of revolution met by all sights `on` it and by none `off` it; `click` is where the first sight hit the surface.
 
-    Depth loses necks, and a click on one ends behind the body: then it is looked for before that place. None where views show
-    no such body, or frames disagree about where it stands.
+    Depth loses thin necks, so a click on one hits the surface behind the body: then places in front of it are tried. None where
+    the views show no such body, or where frames disagree about its position.
     """
     slack = tuned(Params).meets_m
     for point in chain([click], _standing_before(scene, on[0], click, config)):
@@ -112,7 +122,7 @@ def find_round(
 def find_body(
     scene: Scene, point: Vector3, support_z_m: float, config: ThingConfig, structure: tuple[PlaneRegion, ...]
 ) -> Body | None:
-    """The body of revolution about a point of its surface (world); None where no view shows one, or their poses disagree."""
+    """Body of revolution about a surface point (world); None where no view shows one, or where the frame poses disagree."""
     params = tuned(Params)
     width = _width(config)
     foot = np.array([point[0], point[1], support_z_m])
@@ -145,12 +155,12 @@ def find_body(
 
 
 def _at(views: Sequence[View], site: Site, foot: Vector3, grid: Grid, colours: Colours) -> Body:
-    """The best body on a given axis."""
+    """Best body on a given axis."""
     return _on_strips(draw_strips(views, site, foot, grid), foot, grid, colours)
 
 
 def _coloured(body: Body, colours: Colours) -> Body:
-    """The best body on the same axis by other colours."""
+    """Best body on the same axis with other colour models."""
     return _on_strips(body.strips, body.foot, body.grid, colours)
 
 
@@ -159,7 +169,7 @@ def _on_strips(strips: Strips, foot: Vector3, grid: Grid, colours: Colours) -> B
 
 
 def _best_axis(views: Sequence[View], site: Site, start: Body, colours: Colours, step_m: float) -> Body:
-    """Compass search: the best body about another, in ever smaller steps, its surface where the click is."""
+    """Compass search for the axis in ever smaller steps, within reach of the click."""
     best = _coloured(start, colours)
     around = [np.array([np.cos(angle), np.sin(angle), 0.0]) for angle in np.arange(8) * np.pi / 4]
     while step_m >= tuned(Params).last_m:
@@ -178,35 +188,35 @@ def _score(body: Body) -> float:
 
 
 def _colours_by_depth(strips: Strips, grid: Grid, reach_m: float) -> Colours:
-    """Colours of what depth shows near an axis against those of what it shows behind."""
+    """Colour models from depth alone: surface near an axis against surface behind it."""
     near = np.abs(grid.across) < reach_m
     return learn_behind(strips, (strips.depth_odds > 0) & near, strips.depth_odds < 0)
 
 
 def _colours(body: Body) -> Colours:
-    """Colours on the body against those around it where depth does not show something standing, as a cap it lacks."""
+    """Colour models of the body against its surroundings, without upright surface near it, such as a cap the profile lacks."""
     strips, margin = body.strips, tuned(Params).margin_m
     on, about = (body.grid.within(body.profile.cells, by) for by in (-margin, margin))
     return learn_behind(strips, on & (strips.depth_odds >= 0), ~about & (strips.depth_odds < 0))
 
 
 def _bounded(body: Body) -> bool:
-    """Whether it ends within what was looked at."""
+    """Whether the profile ends within the searched radii and heights."""
     return bool(body.profile.cells.max() < body.grid.cells - 1 and body.profile.cells[-1] == 0)
 
 
 def _width(config: ThingConfig) -> float:
-    """About how wide it is."""
+    """Usual width of the object, metres."""
     return config.width_m or config.radius_m
 
 
 def _borne(config: ThingConfig) -> float:
-    """How far frames may err about where it is, metres."""
+    """Maximum pose error between frames, metres."""
     return tuned(Params).pose_share * _width(config)
 
 
 def meets(body: Body, sight: Sight, slack_m: float) -> bool:
-    """Whether a sight meets the body, or passes this near."""
+    """Whether a line of sight passes within `slack_m` of the body."""
     origin, ray = sight
     radii = body.radii_m
     nearest = float((body.foot - origin)[:2] @ ray[:2]) / max(float(ray[:2] @ ray[:2]), 1e-9)
@@ -219,7 +229,7 @@ def meets(body: Body, sight: Sight, slack_m: float) -> bool:
 
 
 def _standing_before(scene: Scene, sight: Sight, hit: Vector3, config: ThingConfig) -> Iterator[Vector3]:
-    """Places of the fused surface under a click's ray, before what it fell on: depth loses necks, the ray goes past them."""
+    """Places on the fused surface under a click's ray, in front of where it hit: depth loses necks, so the ray passes them."""
     params = tuned(Params)
     (origin, ray), width = sight, _width(config)
     plan = ray[:2] / max(float(np.hypot(*ray[:2])), 1e-6)
@@ -244,7 +254,7 @@ def _standing_before(scene: Scene, sight: Sight, hit: Vector3, config: ThingConf
 
 
 def _thing_of(body: Body, config: ThingConfig) -> Thing:
-    """Its surface as points."""
+    """Surface of the body as points."""
     params = tuned(Params)
     spacing = max(body.grid.cell_m, params.spacing_m)
     radii, level_m = body.radii_m, body.grid.level_m

@@ -1,4 +1,4 @@
-"""Silhouettes of small things: a hull rendered into a frame, shifted by that frame's pose error, snapped to colour edges."""
+"""Silhouettes of small objects: a hull rendered into a frame, shifted by the frame's pose error, snapped to colour edges."""
 
 from dataclasses import dataclass
 
@@ -20,47 +20,53 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a small thing's outline is drawn."""
+    """Tuned parameters of small objects' silhouettes."""
 
-    around_m: float = param(0.04, "m", "about the hull, beyond the pose error, that a crop shows: what is not the thing")
-    border_cells: float = param(0.6, "ratio", "to a cell of the shrunk crop: how far the photo may move a border", gt=0)
-    sure_odds: float = param(9.0, "log", "of a pixel that is known")
-    on_support_m: float = param(0.008, "m", "above the support: lower points are the support's")
+    around_m: float = param(0.04, "m", "Margin of a crop around the hull, beyond the pose error, to show the background")
+    border_cells: float = param(
+        0.6, "ratio", "Maximum move of the border in the photo relative to a cell of the shrunk crop", gt=0
+    )
+    sure_odds: float = param(9.0, "log", "Log-odds of a pixel whose label is known")
+    on_support_m: float = param(0.008, "m", "Maximum height above the support of points that belong to the support")
     fine: int = param(
         4,
         "count",
-        "of parts a side that pixels are cut into where the hull's outline is drawn",
+        "Number of subpixels per side when the hull's outline is rasterized",
         ge=1,
-        source="four bottles of a second generator: masks of 1.04-1.08 times their area by 1, of 1.03-1.06 by 4",
+        source="four bottles of a second generator: mask areas of 1.04-1.08 of the true ones at 1, of 1.03-1.06 at 4",
     )
-    before_m: float = param(0.03, "m", "nearer than all of the thing beyond the noise, from where a pixel lies on an occluder")
-    attached_odds: float = param(3.2, "log", "of a place where a handle may be: depth and colour together may add it")
+    before_m: float = param(
+        0.03, "m", "Minimum distance in front of the whole object, beyond the noise, for a pixel to be an occluder"
+    )
+    attached_odds: float = param(
+        3.2, "log", "Log-odds against the object where a handle may be: depth and colour together may override it"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Crop:
-    """The part of a photo around a hull at the resolution its outline is looked for in; masks (h, w) of that size."""
+    """Photo crop around a hull at the resolution of outline extraction; masks (h, w) of that size."""
 
     area: tuple[slice, slice]  # rows and columns of the photo
-    camera: Intrinsics  # of the crop
+    camera: Intrinsics  # pixels per metre, at the object
     scale: float  # pixels a metre, at the thing
     hull: Mask  # its projection
-    hidden: Mask  # where something stands before it
+    hidden: Mask  # where an occluder lies in front of it
 
     @property
     def shrink(self) -> float:
-        """Pixels of the photo along one of the crop."""
+        """Photo pixels per crop pixel."""
         return (self.area[1].stop - self.area[1].start) / self.camera.width
 
     def rgb(self, photo: Image) -> Image:
-        """The crop of the whole photo."""
+        """Crop of the whole photo, at the crop's resolution."""
         part = photo[self.area]
         size = (self.camera.width, self.camera.height)
         return part if part.shape[1::-1] == size else np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = None) -> tuple[Mask, float]:
-    """The visible pixels of a small thing: where its hull, this frame's depth and its colours say, cut along colour edges."""
+    """Visible pixels of a small object, by its hull and the frame's depth and colours, cut along colour edges."""
     mask = np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool)
     crop, outline, share = crop_outline(thing, scene, frame, band_m)
     if crop is not None:
@@ -71,7 +77,7 @@ def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = 
 def crop_outline(
     thing: Thing, scene: Scene, frame: Frame, band_m: float | None = None
 ) -> tuple[Crop, Mask, float] | tuple[None, Mask, float]:
-    """The crop around a small thing, its visible pixels there, and the share of it that shows; no crop where nothing does."""
+    """Crop around a small object, its visible pixels there, and its visible fraction; no crop where it is not visible."""
     params = tuned(Params)
     nothing: Mask = np.zeros((1, 1), bool)
     crop = hull_crop(thing, scene, frame)
@@ -95,7 +101,7 @@ def crop_outline(
 
 
 def _at_full(outline: Mask, crop: Crop, photo: Image) -> Mask:
-    """A crop's mask at the photo's resolution, its border on the photo's own edges."""
+    """A crop's mask at the photo's resolution, its border snapped to the photo's edges."""
     height, width = photo.shape[:2]
     if outline.shape == (height, width):
         return outline
@@ -105,7 +111,7 @@ def _at_full(outline: Mask, crop: Crop, photo: Image) -> Mask:
 
 
 def _mark(odds: np.ndarray, x_px: float, y_px: float, radius_px: float, label: int) -> None:
-    """Settle the pixels under a click."""
+    """Fix the label of the pixels under a click, in place."""
     params = tuned(Params)
     row, column = np.ogrid[: odds.shape[0], : odds.shape[1]]
     near = np.hypot(column + 0.5 - x_px, row + 0.5 - y_px) < max(radius_px, 2.0)
@@ -113,7 +119,7 @@ def _mark(odds: np.ndarray, x_px: float, y_px: float, radius_px: float, label: i
 
 
 def seen_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndarray:
-    """Log-odds of each pixel of a crop by what the frame itself shows there: depth above the support, and colour."""
+    """Log-odds of a crop's pixels by the frame's own depth (above the support) and colour."""
     odds = _depth_odds(thing, scene, frame, crop)
     if thing.colours is not None:
         odds = odds + unmixed(thing.colours.odds(cv2.cvtColor(crop.rgb(scene.rgb(frame.index)), cv2.COLOR_RGB2LAB)))
@@ -121,7 +127,7 @@ def seen_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndarra
 
 
 def colours_of(thing: Thing, scene: Scene, views: list[Frame], band_m: float) -> ColourModel | None:
-    """Colours on the thing against those around it, from where views are sure."""
+    """Colour model of the object against its surroundings, from confident pixels of the views."""
     samples = []
     for frame in views:
         crop, mask, share = crop_outline(thing, scene, frame, band_m)
@@ -136,7 +142,7 @@ def colours_of(thing: Thing, scene: Scene, views: list[Frame], band_m: float) ->
 
 
 def usual_shift(thing: Thing, scene: Scene, views: list[Frame]) -> float:
-    """How far the hull's outline lies from the colour edges it belongs to, metres, in the middle of the frames."""
+    """Median distance over frames between the hull's outline and its colour edges, metres."""
     shifts = []
     for frame in views:
         crop = hull_crop(thing, scene, frame)
@@ -148,7 +154,7 @@ def usual_shift(thing: Thing, scene: Scene, views: list[Frame]) -> float:
 
 
 def hull_crop(thing: Thing, scene: Scene, frame: Frame) -> Crop | None:
-    """The crop around the hull, with what is about it; None where the frame does not show it, or from too near."""
+    """Crop around the hull with a margin; None where the frame does not show it, or from too near."""
     camera = frame.rgb_camera
     offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
     local = frame.world_from_camera.inverse.apply(raised(thing.vertices, offset))
@@ -171,7 +177,7 @@ def hull_crop(thing: Thing, scene: Scene, frame: Frame) -> Crop | None:
 
 
 def _occluders(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slice], camera: Intrinsics) -> Mask:
-    """Pixels of a crop where something stands clearly nearer than the thing."""
+    """Pixels of a crop where something lies clearly in front of the object."""
     nearest = float(frame.world_from_camera.inverse.apply(thing.vertices)[:, 2].min())
     flags = scene.noise.occluded(scene.filled_depth(frame.index), nearest, tuned(Params).before_m)
     row = _depth_index(area[0], camera.height, frame.rgb_camera.height, flags.shape[0])
@@ -180,7 +186,7 @@ def _occluders(thing: Thing, scene: Scene, frame: Frame, area: tuple[slice, slic
 
 
 def _depth_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndarray:
-    """Log-odds by depth: above the support and about where the thing stands, or else on the support, behind, or unknown (0)."""
+    """Log-odds by depth: above the support near the object, or on the support or behind, or unknown (0)."""
     camera, depth = frame.depth_camera, scene.depth(frame.index)
     rows = _depth_index(crop.area[0], crop.camera.height, frame.rgb_camera.height, camera.height)
     columns = _depth_index(crop.area[1], crop.camera.width, frame.rgb_camera.width, camera.width)
@@ -197,7 +203,7 @@ def _depth_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndar
         offset = support_offset(scene, frame, thing.support_z_m, thing.vertices.mean(axis=0))
         standing = _within(points[..., :2], low, high)
         on_support = points[..., 2] < thing.support_z_m + offset + tuned(Params).on_support_m
-        verdict = np.where(on_support, np.where(standing & near, 0.0, -1.0), verdict)  # the foot of it is as low
+        verdict = np.where(on_support, np.where(standing & near, 0.0, -1.0), verdict)  # its base is as low as the support
     coarse = max(frame.rgb_camera.width / camera.width / crop.shrink, 1.0)
     odds = np.where(patch > 0, verdict, 0.0) * (2.0 / np.sqrt(coarse))
     at = np.ix_(rows - first_row, columns - first_column)
@@ -205,19 +211,19 @@ def _depth_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndar
 
 
 def _within(points: np.ndarray, low: Vector3, high: Vector3) -> np.ndarray:
-    """Which points (..., axes) lie between two corners along each of their axes."""
-    axes = range(points.shape[-1])  # one after another: numpy is slow along an axis of three
+    """Mask of the points (..., axes) that lie between two corners along every axis."""
+    axes = range(points.shape[-1])  # one axis at a time: numpy is slow along an axis of length three
     return np.asarray(np.logical_and.reduce([(points[..., k] > low[k]) & (points[..., k] < high[k]) for k in axes]))
 
 
 def _depth_index(span: slice, cells: int, colour_size: int, depth_size: int) -> np.ndarray:
-    """The depth row or column under the middle of each of the cells that a span of colour pixels is cut into."""
+    """Depth row or column under the centre of each of the cells that a span of colour pixels is divided into."""
     at = span.start + (np.arange(cells) + 0.5) * (span.stop - span.start) / cells
     return (at * depth_size / colour_size).astype(int)
 
 
 def _outline_odds(hull: Mask, band_px: float, attached_px: float) -> np.ndarray:
-    """Log-odds by the hull: little near its outline, and not everything where a handle may be (`attached_px` around it)."""
+    """Log-odds by distance to the hull's outline: weak near it, and bounded where a handle may be (`attached_px` around it)."""
     params = tuned(Params)
     outside = cv2.distanceTransform((~hull).astype(np.uint8), cv2.DIST_L2, 5)
     inside = cv2.distanceTransform(np.pad(hull, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
@@ -229,7 +235,7 @@ def _outline_odds(hull: Mask, band_px: float, attached_px: float) -> np.ndarray:
 
 
 def _held_by(mask: Mask, hull: Mask) -> Mask:
-    """The parts of a mask that lie mostly on the hull."""
+    """Connected parts of a mask that lie to a substantial part (more than 30 %) on the hull."""
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
     total = np.bincount(labels.ravel(), minlength=count)
     within = np.bincount(labels[hull], minlength=count)
@@ -244,7 +250,7 @@ def _round(radius_px: float) -> np.ndarray:
 
 
 def splat(uv_px: Pixels, shape: tuple[int, int], spacing_px: float) -> np.ndarray:
-    """The filled outline of points that are about `spacing_px` apart: the pixels that it covers by half or more."""
+    """Filled outline of points about `spacing_px` apart: the pixels covered by half or more."""
     fine = tuned(Params).fine
     height, width = shape[0] * fine, shape[1] * fine
     pad = fine * (int(spacing_px) + 2)
@@ -258,7 +264,7 @@ def splat(uv_px: Pixels, shape: tuple[int, int], spacing_px: float) -> np.ndarra
 
 
 def _best_shift(hull: Mask, odds: np.ndarray, gradient: np.ndarray, reach_px: int) -> tuple[int, int]:
-    """The small move of the hull onto likely pixels and strong edges: pose error, nought where poses are right."""
+    """Shift (x, y) of the hull onto likely pixels and strong edges: the frame's pose error, zero where poses are right."""
     contours, _ = cv2.findContours(hull.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = np.concatenate(contours)[:, 0]
     outline = outline[:: max(1, len(outline) // 160)]
@@ -277,7 +283,7 @@ def _best_shift(hull: Mask, odds: np.ndarray, gradient: np.ndarray, reach_px: in
 
 
 def _overlap(hull: Mask, odds: np.ndarray, reach_px: int) -> np.ndarray:
-    """Mean odds inside the hull less those around it, for every move (dy, dx) up to `reach_px`, from index `reach_px`."""
+    """Mean odds inside the hull minus those around it, per shift (dy, dx) up to `reach_px` (no shift at index `reach_px`)."""
     ring = (cv2.dilate(hull.astype(np.uint8), _round(0.15 * np.sqrt(hull.sum()))) > 0) & ~hull
     template = hull / max(hull.sum(), 1) - ring / max(ring.sum(), 1)
     padded = np.pad(odds.astype(np.float32), reach_px)

@@ -1,8 +1,8 @@
-"""What stands on the floor, whole: chairs and tables cut from depth voxels, seat with back and top with legs.
+"""Floor-standing objects cut whole from depth voxels: chairs with seat and back, tables with top and legs.
 
-Cutting along inward creases parts a box from the table under it, and also a back from its seat. Of a thing that its category
-puts on the floor, only what is another's is cut off: the floor, walls, other large level surfaces, what a person refused, and,
-where its slab is its highest part, whatever stands on that.
+A cut along concave creases separates a box from the table under it, but also a back from its seat. From an object whose
+category stands on the floor, only foreign surface is therefore cut off: the floor, walls, other large level surfaces, negative
+clicks and, where its slab is its highest part, objects on that slab.
 """
 
 from dataclasses import dataclass
@@ -23,27 +23,31 @@ UNKNOWN, ON, OFF = 0, 1, 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What belongs to a thing that stands on the floor."""
+    """Tuned parameters of floor-standing objects."""
 
-    voxels_along: float = param(70, "count", "of voxels along its longest side", gt=0)
-    voxel_range_m: tuple[float, float] = param((0.012, 0.025), "m", "least and most side of a voxel")
-    off_floor_m: float = param(0.02, "m", "above the floor: lower points are the floor's")
-    floor_slack_m: float = param(0.08, "m", "that a floor may be off the room's: terraces slope")
-    near_click_m: float = param(0.12, "m", "from a click, within which its surface is")
-    gap_m: float = param(0.06, "m", "that a thing may be parted by: sensors lose dark and thin pieces")
-    level_cos: float = param(0.92, "cosine", "with up, of a level surface")
-    large_m2: float = param(0.45, "m²", "of a level surface that is another thing's where no click is on it")
-    off_wall_m: float = param(0.03, "m", "before a wall: nearer points are the wall's")
-    off_slab_m: float = param(0.015, "m", "above a slab: higher points are of what stands on it")
-    slab_m: float = param(0.08, "m", "thickness of a slab with its apron, at most")
-    rim_m: float = param(0.03, "m", "beyond a slab's seen edge, where its legs may be")
-    hidden_m: float = param(0.12, "m", "across what stands on a slab, which hides it")
-    leg_m: float = param(0.15, "m", "width of a leg, at most")
+    voxels_along: float = param(70, "count", "Number of voxels along the object's longest side", gt=0)
+    voxel_range_m: tuple[float, float] = param((0.012, 0.025), "m", "Minimum and maximum voxel size")
+    off_floor_m: float = param(0.02, "m", "Maximum height above the floor of points that belong to the floor")
+    floor_slack_m: float = param(
+        0.08, "m", "Maximum height difference between the floor and the room's floor plane: terraces slope"
+    )
+    near_click_m: float = param(0.12, "m", "Maximum distance from a click to the surface it selects")
+    gap_m: float = param(0.06, "m", "Maximum gap between parts of one object: sensors lose dark and thin pieces")
+    level_cos: float = param(0.92, "cosine", "Minimum cosine between a face normal and up for a level surface")
+    large_m2: float = param(0.45, "m²", "Minimum area of a level surface without a click for it to belong to another object")
+    off_wall_m: float = param(0.03, "m", "Maximum distance from a wall of points that belong to the wall")
+    off_slab_m: float = param(
+        0.015, "m", "Maximum height above a slab of points that belong to it; higher ones belong to objects on it"
+    )
+    slab_m: float = param(0.08, "m", "Maximum thickness of a slab with its apron")
+    rim_m: float = param(0.03, "m", "Maximum distance of legs beyond the observed edge of a slab")
+    hidden_m: float = param(0.12, "m", "Radius of the morphological closing that bridges objects hiding part of a slab")
+    leg_m: float = param(0.15, "m", "Maximum width of a leg")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Standing:
-    """The thing's voxels as a thing, and what each voxel about it is: ON it, OFF it, or UNKNOWN."""
+    """A segmented floor-standing object, and the label of each voxel around it: ON, OFF or UNKNOWN."""
 
     thing: Thing
     region: Region
@@ -53,7 +57,7 @@ class Standing:
     top_z_m: float | None  # of a slab that is its highest part
 
     def label_of(self, points: Points) -> np.ndarray:
-        """What world points (..., 3) lie on; outside the region OFF."""
+        """Labels of world points (..., 3): ON, OFF or UNKNOWN; OFF outside the region."""
         params = tuned(Params)
         at = np.floor((points - self.region.low) / self.size_m).astype(int)
         inside = ((at >= 0) & (at < self.labels.shape)).all(axis=-1)
@@ -67,7 +71,7 @@ class Standing:
 def find_standing(
     scene: Scene, positives: Points, negatives: Points, config: ThingConfig, structure: tuple[PlaneRegion, ...]
 ) -> Standing | None:
-    """The thing on the floor that clicks (world points) belong to; None without a floor, or where depth shows too little."""
+    """Floor-standing object at the clicks (world points); None without a floor, or where depth shows too little."""
     params = tuned(Params)
     if not scene.capture.room.floor_found:
         return None
@@ -106,7 +110,7 @@ def _cut_off(
     config: ThingConfig,
     structure: tuple[PlaneRegion, ...],
 ) -> np.ndarray | None:
-    """Of the voxels above the floor, those of the clicks by min-cut; None where none is near a click."""
+    """Min-cut of the voxels above the floor that the clicks select; None where none is near a click."""
     params = tuned(Params)
     members = np.flatnonzero(above)
     at, size = cloud.positions[members], cloud.size_m
@@ -139,7 +143,7 @@ def _cut_off(
 
 
 def _of_slab(cloud: DepthCloud, above: np.ndarray, footprint: np.ndarray, level_m: float) -> np.ndarray:
-    """Of the voxels above the floor, those of a slab and of the slender legs under it."""
+    """Mask of the voxels above the floor on a slab or on the slender legs under it."""
     from scipy import ndimage
 
     params = tuned(Params)
@@ -154,7 +158,7 @@ def _of_slab(cloud: DepthCloud, above: np.ndarray, footprint: np.ndarray, level_
 
 
 def _legs(cloud: DepthCloud, below: np.ndarray, level_m: float) -> np.ndarray:
-    """Of the voxels below a slab, those that are slender at each height and together reach up to it."""
+    """Mask of the voxels below a slab that are slender at each height and reach up to the slab together."""
     from scipy import ndimage
 
     params = tuned(Params)
@@ -176,7 +180,7 @@ def _legs(cloud: DepthCloud, below: np.ndarray, level_m: float) -> np.ndarray:
 
 
 def _level_cells(scene: Scene, low: np.ndarray, high: np.ndarray, size: float) -> np.ndarray:
-    """Numbers (x, y, z) of the connected level parts of the fused surface in voxels; 0 where there is none."""
+    """Labels (x, y, z) of the connected level parts of the fused surface in voxels; 0 elsewhere."""
     from scipy import ndimage
 
     parts = scene.parts
@@ -191,7 +195,7 @@ def _level_cells(scene: Scene, low: np.ndarray, high: np.ndarray, size: float) -
 
 
 def _slab_at(levels: np.ndarray, positives: Points, low: np.ndarray, size: float) -> tuple[np.ndarray, float] | None:
-    """Plan (x, y) of the level part under the clicks, closed over what stands on it, and its height; None without one."""
+    """Plan (x, y) of the level part under the clicks, closed under objects on it, and its height; None without one."""
     from scipy import ndimage
 
     params = tuned(Params)
@@ -216,7 +220,7 @@ def _slab_at(levels: np.ndarray, positives: Points, low: np.ndarray, size: float
 
 
 def _large_levels(levels: np.ndarray, positives: Points, cloud: DepthCloud) -> np.ndarray:
-    """Which voxels lie on large level surfaces that no click is on: other tables, worktops."""
+    """Mask of the voxels on large level surfaces without a click: other tables, worktops."""
     from scipy import ndimage
 
     params = tuned(Params)
@@ -232,7 +236,7 @@ def _large_levels(levels: np.ndarray, positives: Points, cloud: DepthCloud) -> n
 
 
 def _labels(cloud: DepthCloud, on: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """What each voxel of the region is; next to what is the thing's, what nobody saw is too, for poses err."""
+    """Label of each voxel of the region; unseen voxels next to the object count as ON, because of pose error."""
     from scipy import ndimage
 
     labels = np.full(shape, UNKNOWN, np.uint8)
@@ -244,7 +248,7 @@ def _labels(cloud: DepthCloud, on: np.ndarray, shape: np.ndarray) -> np.ndarray:
 
 
 def _fit_floor(cloud: DepthCloud) -> np.ndarray:
-    """The floor's plane (a, b, c) from the voxels near it, by reweighted least squares; the room's where few are."""
+    """Floor plane (a, b, c) of nearby voxels by reweighted least squares; the room's floor where voxels are few."""
     params = tuned(Params)
     at = cloud.positions[np.abs(cloud.positions[:, 2]) < params.floor_slack_m]
     if len(at) < 100:
@@ -254,5 +258,5 @@ def _fit_floor(cloud: DepthCloud) -> np.ndarray:
 
 
 def _height_of(floor: np.ndarray, points: Points) -> np.ndarray:
-    """The floor's height under points (..., 3)."""
+    """Height of the floor under points (..., 3)."""
     return np.asarray(points[..., :2] @ floor[:2] + floor[2])

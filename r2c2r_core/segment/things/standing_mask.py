@@ -1,4 +1,4 @@
-"""The pixels of what stands on the floor: each depth pixel by what its point lies on, colours where depth fails, one cut."""
+"""Masks of floor-standing objects: a pixel cut over depth labels, and over colours where depth fails."""
 
 from dataclasses import dataclass
 
@@ -21,21 +21,27 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How the outline of a standing thing is drawn."""
+    """Tuned parameters of floor-standing objects' masks."""
 
-    around_m: float = param(0.08, "m", "about the thing, that a crop shows")
-    cut_px: int = param(220, "px", "of the longer side of what is cut: legs are thin", ge=32)
-    depth_odds: float = param(2.5, "log", "of a depth pixel on the thing")
-    behind_odds: float = param(1.5, "log", "against one off it: sensors lose thin parts to what is behind them")
-    voxel_odds: float = param(2.0, "log", "of a pixel that the thing's voxels cover, or do not")
-    fades_m: float = param(0.05, "m", "off its voxels, over which a pixel becomes unlikely: depth loses thin parts")
-    colour_gain: float = param(
-        1.6, "ratio", "of what colours say here to what they say of small things: parts have few colours"
+    around_m: float = param(0.08, "m", "Margin of a crop around the object")
+    cut_px: int = param(220, "px", "Maximum longer side of the image that is cut: legs are thin", ge=32)
+    depth_odds: float = param(2.5, "log", "Log-odds of a depth pixel on the object")
+    behind_odds: float = param(
+        1.5, "log", "Log-odds against a depth pixel off the object: sensors lose thin parts to the background"
     )
-    reach_m: float = param(0.04, "m", "about its voxels and the floor under them, where more of it may be")
-    far_odds: float = param(6.0, "log", "of a pixel farther off")
-    before_m: float = param(0.05, "m", "nearer than all of the thing beyond the noise, from where a pixel lies on an occluder")
-    model_frames: int = param(12, "count", "that colours are learned from", ge=1)
+    voxel_odds: float = param(
+        2.0, "log", "Log-odds of a pixel that the object's voxels cover, and against one that they do not"
+    )
+    fades_m: float = param(
+        0.05, "m", "Distance outside the voxels over which the log-odds fall to that bound: depth loses thin parts"
+    )
+    colour_gain: float = param(1.6, "ratio", "Weight of colour log-odds relative to small objects: parts have few colours")
+    reach_m: float = param(0.04, "m", "Maximum distance of object pixels from its voxels and from the floor under them")
+    far_odds: float = param(6.0, "log", "Log-odds against a pixel farther away")
+    before_m: float = param(
+        0.05, "m", "Minimum distance in front of the whole object, beyond the noise, for a pixel to be an occluder"
+    )
+    model_frames: int = param(12, "count", "Maximum number of frames that colours are learned from", ge=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,29 +49,29 @@ class _Crop:
     area: tuple[slice, slice]
     camera: Intrinsics
     scale: float
-    voxels: Mask  # that the thing's voxels cover
-    on: Mask  # depth on the thing
+    voxels: Mask  # covered by the object's voxels
+    on: Mask  # depth on the object
     off: Mask  # depth on something else
     reach: Mask  # between its voxels and the floor under them, where legs may be that no depth shows
-    hidden: Mask  # depth on something before it
+    hidden: Mask  # depth on an occluder
     rgb: np.ndarray
 
 
 def standing_colours(found: Standing, scene: Scene, frames: tuple[Frame, ...]) -> ColourModel | None:
-    """Colours on the thing against those around it, where voxels and depth agree."""
+    """Colour model of the object against its surroundings, from pixels where voxels and depth agree."""
     params = tuned(Params)
-    some = frames[:: max(1, len(frames) // (3 * params.model_frames))]  # not each of them sees it
+    some = frames[:: max(1, len(frames) // (3 * params.model_frames))]  # not all of them see it
     crops = [crop for frame in some if (crop := _crop_of(found, scene, frame)) is not None]
     samples = []
     for crop in crops[:: max(1, len(crops) // params.model_frames)]:
         near = cv2.dilate(crop.voxels.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
-        off = ~near if found.top_z_m is None else ~near | crop.off  # what stands on a slab is before it
+        off = ~near if found.top_z_m is None else ~near | crop.off  # objects on a slab lie in front of it
         samples.append((cv2.cvtColor(crop.rgb, cv2.COLOR_RGB2LAB), crop.on & crop.voxels, off & ~crop.hidden))
     return learn_colours(samples) if samples else None
 
 
 def standing_mask(found: Standing, scene: Scene, frame: Frame) -> tuple[Mask, float]:
-    """The thing's visible pixels in a frame, and the share of its voxels that nothing hides."""
+    """Visible pixels of the object in a frame, and the fraction of its voxels that nothing hides."""
     params = tuned(Params)
     mask = np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool)
     crop = _crop_of(found, scene, frame)
@@ -122,7 +128,7 @@ def _crop_of(found: Standing, scene: Scene, frame: Frame) -> _Crop | None:
 
 
 def _with_feet(found: Standing, frame: Frame, lift_m: float) -> Points:
-    """The thing's voxels and the places on the floor under them, those before the camera, in its frame."""
+    """Camera-frame points of the object's voxels and of the floor under them, in front of the camera."""
     voxels = found.thing.vertices[::3]
     feet = np.column_stack([voxels[:, :2], np.full(len(voxels), found.thing.support_z_m or 0.0)])
     local = frame.world_from_camera.inverse.apply(raised(np.concatenate([voxels, feet]), lift_m))
@@ -130,7 +136,7 @@ def _with_feet(found: Standing, frame: Frame, lift_m: float) -> Points:
 
 
 def _hull_of(uv_px: Pixels, camera: Intrinsics, margin_px: float) -> Mask:
-    """The convex hull of pixels, this much larger."""
+    """Convex hull of pixels, dilated by a margin."""
     canvas = np.zeros((camera.height, camera.width), np.uint8)
     outline = cv2.convexHull(np.clip(uv_px, -(2**14), 2**14).astype(np.float32).round().astype(np.int32))
     cv2.fillConvexPoly(canvas, outline, 1)
@@ -139,7 +145,7 @@ def _hull_of(uv_px: Pixels, camera: Intrinsics, margin_px: float) -> Mask:
 
 
 def _depth_labels(found: Standing, scene: Scene, frame: Frame, camera: Intrinsics, lift: float) -> tuple[np.ndarray, Mask]:
-    """What each pixel of a crop's depth lies on, and where that is something before the thing."""
+    """Labels of a crop's pixels by depth, and the mask of pixels in front of the object."""
     depth = clean_depth(scene.depth(frame.index))
     world = raised(frame.world_from_camera.apply(depth_points(depth, frame.depth_camera).reshape(-1, 3)), -lift)
     label = np.where(depth.ravel() > 0, found.label_of(world), UNKNOWN).reshape(depth.shape).astype(np.uint8)

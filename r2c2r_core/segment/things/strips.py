@@ -1,4 +1,4 @@
-"""Photographs drawn on the upright plane through a vertical axis that faces each camera, and what depth says there."""
+"""Photographs warped onto the vertical plane through an axis that faces each camera, with the depth evidence there."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,24 +19,24 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What depth says of a place on a strip."""
+    """Tuned parameters of depth evidence on a strip."""
 
-    on_odds: float = param(1.5, "log", "of depth where such a body would show it")
-    off_odds: float = param(2.0, "log", "against it, of depth behind it, on the support or on a wall")
-    hides_m: float = param(0.03, "m", "before the body, beyond the noise, from where depth hides it")
+    on_odds: float = param(1.5, "log", "Maximum log-odds of depth where such a body would show it")
+    off_odds: float = param(2.0, "log", "Maximum log-odds against the body, of depth behind it, on the support or on a wall")
+    hides_m: float = param(0.03, "m", "Minimum distance in front of the body, beyond the noise, for depth to be an occluder")
 
 
 class View(NamedTuple):
-    """What a frame shows about the thing."""
+    """A frame's view of the object."""
 
     frame: Frame
     lab: Image  # of the crop
     camera: Intrinsics  # of the crop
-    lift_m: float  # how much too high the frame shows it
+    lift_m: float  # height error of the frame: how much too high it shows the object
 
 
 class Grid(NamedTuple):
-    """Cells of radii and heights."""
+    """Grid of radii and heights."""
 
     cell_m: float
     level_m: float
@@ -45,17 +45,17 @@ class Grid(NamedTuple):
 
     @property
     def across(self) -> np.ndarray:
-        """Places across the axis, metres, of the columns of a strip."""
+        """Signed distances of a strip's columns from the axis, metres."""
         half = (np.arange(self.cells) + 0.5) * self.cell_m
         return np.concatenate([-half[::-1], half])
 
     @property
     def heights(self) -> np.ndarray:
-        """Heights of the rows' middles above the support, metres."""
+        """Heights of the row centres above the support, metres."""
         return (np.arange(self.levels) + 0.5) * self.level_m
 
     def within(self, cells: np.ndarray, margin_m: float) -> np.ndarray:
-        """Which places (levels, columns) of a strip lie within a profile made this much larger on all sides."""
+        """Mask of the places (levels, columns) of a strip within a profile dilated by `margin_m` (eroded where negative)."""
         inside = np.abs(self.across)[None] < cells[:, None] * self.cell_m
         size = (2 * round(abs(margin_m) / self.cell_m) + 1, 2 * round(abs(margin_m) / self.level_m) + 1)
         change = cv2.dilate if margin_m > 0 else cv2.erode
@@ -63,32 +63,32 @@ class Grid(NamedTuple):
 
 
 class Site(NamedTuple):
-    """Where a body is looked for."""
+    """Search area of a body."""
 
     scene: Scene
     structure: tuple[PlaneRegion, ...]  # walls, whose depth is not the thing's
-    near: Vector3  # a place on it, on the support
-    reach_m: float  # of the axis from there
-    radius_m: float  # about
+    near: Vector3  # a place on the object, at the height of its support
+    reach_m: float  # of the axis, from that place
+    radius_m: float  # approximate
 
 
 class Strips(NamedTuple):
-    """Every view drawn on the plane through the axis that faces it (views, levels, 2 x cells): rows from the support up."""
+    """All views warped onto the plane through the axis that faces each (views, levels, 2 x cells): rows from the support up."""
 
     lab: np.ndarray  # (..., 3) uint8
     depth_odds: np.ndarray
-    another: np.ndarray  # bool: all depth about the place is another's
+    another: np.ndarray  # bool: all depth around the place belongs to another surface
     hidden: np.ndarray  # bool
     on_support: np.ndarray  # bool: what lies behind the place is the support
 
     @property
     def shown(self) -> np.ndarray:
-        """Where nothing stands before the body."""
+        """Mask of the places without an occluder in front of the body."""
         return ~self.hidden
 
 
 def views_of(scene: Scene, frames: Sequence[Frame], foot: Vector3, reach_m: float, tall_m: float) -> Iterator[View]:
-    """The parts of frames about a place on the support; those that are too near are left out."""
+    """Parts of the frames around a place on the support; frames that are too near are left out."""
     sides = (-2 * reach_m, 2 * reach_m)
     corners = foot + np.array([[x, y, z] for x in sides for y in sides for z in (0.0, tall_m)])
     for frame in frames:
@@ -109,7 +109,7 @@ def views_of(scene: Scene, frames: Sequence[Frame], foot: Vector3, reach_m: floa
 
 
 def draw_strips(views: Sequence[View], site: Site, foot: Vector3, grid: Grid) -> Strips:
-    """The views on the planes through an upright axis."""
+    """Strips of the views on the vertical planes through an axis."""
     drawn = [_strip(view, site, foot, grid) for view in views]
     return Strips(*(np.stack(part) for part in zip(*drawn, strict=True)))
 
@@ -133,7 +133,8 @@ def _strip(view: View, site: Site, foot: Vector3, grid: Grid) -> Strips:
     rays = (raised(places, view.lift_m) - eye) / z[:, None]
     on_support, to_wall = _room_behind(rays, z, raised(eye, -view.lift_m), foot, site)
     room = np.minimum(np.minimum(on_support, to_wall), 2 * site.radius_m)
-    # Normal noise about the place itself, or about what is behind it; nearer than the place is the body all the more.
+    # Gaussian noise around the place itself against noise around the background; depth in front of the place supports the body
+    # all the more.
     odds = np.clip(room * (room / 2 - beyond) / noise**2, -params.off_odds, params.on_odds) * known
     before = -(2 * grid.cells * grid.cell_m + params.hides_m + 3 * noise)
     hidden = outside | (known & (beyond < before))
@@ -145,7 +146,7 @@ def _strip(view: View, site: Site, foot: Vector3, grid: Grid) -> Strips:
 
 
 def _room_behind(rays: Points, z_m: np.ndarray, eye: Vector3, foot: Vector3, site: Site) -> tuple[np.ndarray, np.ndarray]:
-    """How far behind places at depths `z_m` rays (of depth 1) meet the support, and a wall; along the optical axis."""
+    """Distances along the optical axis from places at depths `z_m` to where rays (of depth 1) meet the support, and a wall."""
     with np.errstate(divide="ignore", invalid="ignore"):
         support = np.where(rays[:, 2] < 0, (foot[2] - eye[2]) / rays[:, 2] - z_m, np.inf)
         wall = np.full(len(rays), np.inf)

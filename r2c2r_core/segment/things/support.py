@@ -1,4 +1,4 @@
-"""The height at which a frame's depth shows what things stand on: a frame's pose error along the vertical."""
+"""Height offset of a frame: the height at which its depth shows the support, minus the true one (vertical pose error)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How far frames are off."""
+    """Tuned parameters of the height offset."""
 
-    pose_error_m: float = param(0.04, "m", "of the height of a support between frames, at most")
+    pose_error_m: float = param(0.04, "m", "Maximum height offset of a support between frames")
 
 
 def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre: Vector3) -> float:
-    """How much higher than it stands one frame's depth shows the support around the thing: that frame's pose error."""
+    """Height offset of one frame, metres: how much too high its depth shows the support around the object."""
     params = tuned(Params)
     if support_z_m is None:
         return 0.0
@@ -50,11 +50,11 @@ def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre
 
 
 def raised(points: Points, lift_m: float) -> Points:
-    """World points lifted by a height."""
+    """World points raised by a height."""
     return points + np.array([0.0, 0.0, lift_m])
 
 
 def pose_spread(offsets_m: Sequence[float]) -> float:
-    """How much frames disagree about the height of a support: the median absolute deviation of their offsets."""
+    """Median absolute deviation of the frames' height offsets of a support."""
     offsets = np.array(offsets_m)
     return float(np.median(np.abs(offsets - np.median(offsets)))) if len(offsets) else 0.0

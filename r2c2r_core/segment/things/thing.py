@@ -1,4 +1,4 @@
-"""Free-standing things: the part of the fused surface above its support that the clicks belong to, by min-cut; its masks."""
+"""Free-standing objects: min-cut of the fused surface above its support at the clicks, and masks of the result."""
 
 from dataclasses import dataclass
 
@@ -20,44 +20,62 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What belongs to a thing."""
+    """Tuned parameters of the object segmentation."""
 
-    support_reach_m: float = param(0.35, "m", "from the clicks, where a support is looked for")
-    bin_m: float = param(0.005, "m", "of heights that are counted together", gt=0)
-    sectors: int = param(16, "count", "directions about the clicks", ge=4)
+    support_reach_m: float = param(0.35, "m", "Maximum distance of the support from the clicks, beyond the object's radius")
+    bin_m: float = param(0.005, "m", "Height of a histogram bin of level surface", gt=0)
+    sectors: int = param(16, "count", "Number of directions around the clicks in which a support is checked", ge=4)
     around: float = param(
-        0.4, "share", "of the directions in which a support goes on: walls and edges bound it, neighbours stand on it"
+        0.4,
+        "share",
+        "Minimum fraction of directions in which a support continues: walls and edges bound it, neighbours stand on it",
     )
-    clearance_m: float = param(0.012, "m", "above its support, from where surface is a thing's")
+    clearance_m: float = param(0.012, "m", "Minimum height above the support for surface to belong to the object")
     seen_through_m: float = param(
-        0.10, "m", "behind the surface: the sensor looked through it, between slats, which the surface closes"
+        0.10, "m", "Minimum distance of measured depth behind the surface for a gap between slats, which the surface closes"
     )
-    furniture_gap_m: float = param(0.08, "m", "that a thing on the floor may be parted by: legs and seats are lost in part")
-    level_cos: float = param(0.92, "cosine", "with up, of a support")
-    level_area_m2: float = param(0.0005, "m²", "of level surface in a direction, for a support to go on there")
-    support_m2: float = param(0.005, "m²", "of level surface at one height, for a support")
-    support_share: float = param(0.15, "ratio", "of that surface to what a thing of the usual size covers, likewise")
-    surface_reach: float = param(2.2, "ratio", "of the surface about the clicks that is looked at to the thing's radius")
-    surface_margin_m: float = param(0.15, "m", "of that surface beyond it")
-    seed_m: float = param(0.12, "m", "from a click to the surface it means, at most")
-    cell: float = param(0.125, "ratio", "of a cell of the cut to the thing's radius", gt=0)
-    cells_m: tuple[float, float] = param((0.006, 0.025), "m", "least and most of a cell of the cut")
-    flat_cos: float = param(0.93, "cosine", "with up, of large level parts")
-    upright_cos: float = param(0.25, "cosine", "with up, of large upright parts")
-    parallel_cos: float = param(0.94, "cosine", "between neighbours on one flat part")
-    step_cells: float = param(0.35, "ratio", "of a step between neighbours on one flat part to a cell")
-    structure_m2: float = param(0.45, "m²", "of a flat part without a click, from where it is a wall, a worktop or a table top")
-    before_m: float = param(0.05, "m", "before its surface beyond the noise, from where something hides it")
-    depth_range_m: tuple[float, float] = param((0.25, 4.0), "m", "of views that its surface is fused from anew")
-    farthest_m: float = param(1.0, "m", "from a click: of what is larger, as a worktop, that much is found")
+    furniture_gap_m: float = param(
+        0.08, "m", "Maximum gap between parts of an object on the floor: scans lose parts of legs and seats"
+    )
+    level_cos: float = param(0.92, "cosine", "Minimum cosine between a face normal and up for a support")
+    level_area_m2: float = param(0.0005, "m²", "Minimum level area in one direction for a support to continue there")
+    support_m2: float = param(0.005, "m²", "Minimum level area at one height for a support")
+    support_share: float = param(
+        0.15,
+        "ratio",
+        "Minimum level area at one height relative to the footprint of an object of the usual size, for a support",
+    )
+    surface_reach: float = param(
+        2.2, "ratio", "Radius of the surface searched around the clicks relative to the object's radius"
+    )
+    surface_margin_m: float = param(0.15, "m", "Margin added to that search radius")
+    seed_m: float = param(0.12, "m", "Maximum distance from a click to the surface it selects")
+    cell: float = param(0.125, "ratio", "Voxel size of the cut relative to the object's radius", gt=0)
+    cells_m: tuple[float, float] = param((0.006, 0.025), "m", "Minimum and maximum voxel size of the cut")
+    flat_cos: float = param(0.93, "cosine", "Minimum cosine between a normal and up for large level parts")
+    upright_cos: float = param(0.25, "cosine", "Maximum cosine between a normal and up for large upright parts")
+    parallel_cos: float = param(0.94, "cosine", "Minimum cosine between the normals of neighbours on one flat part")
+    step_cells: float = param(0.35, "ratio", "Maximum step between neighbours on one flat part relative to the voxel size")
+    structure_m2: float = param(
+        0.45, "m²", "Minimum area of a flat part without a click for it to be a wall, a worktop or a table top"
+    )
+    before_m: float = param(
+        0.05, "m", "Minimum distance of measured depth in front of the surface, beyond the noise, for an occluder"
+    )
+    depth_range_m: tuple[float, float] = param(
+        (0.25, 4.0), "m", "Minimum and maximum distance of the views from which the surface is fused again"
+    )
+    farthest_m: float = param(
+        1.0, "m", "Maximum radius of an object; of larger ones, such as a worktop, this much around a click is segmented"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThingConfig:
-    """How large a thing may be, and what it stands on; from its name where the name says it."""
+    """Size limits and support of an object, from its category where that gives them."""
 
-    radius_m: float  # half its largest side, about
-    width_m: float | None = None  # across, about, where the name says it
+    radius_m: float  # about half its longest side
+    width_m: float | None = None  # usual width, where the category gives it
     round: bool = False  # as deep as wide
     handled: bool = False  # may have a handle
     on_floor: bool = False
@@ -66,7 +84,7 @@ class ThingConfig:
 
 
 def sized_as(category: Category) -> ThingConfig:
-    """How large things of a category may be."""
+    """Size limits of objects of a category."""
     return ThingConfig(
         radius_m=min(category.longest_m / 2, tuned(Params).farthest_m),
         width_m=category.width.usual if category.round else None,
@@ -80,28 +98,28 @@ def sized_as(category: Category) -> ThingConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Thing:
-    """The surface found, in the world, and the height of what it stands on."""
+    """Segmented surface in the world, and the height of its support."""
 
     vertices: Points
     faces: Faces
     support_z_m: float | None
     spacing_m: float = 0.01  # between neighbouring vertices
-    pose_error_m: float = 0.02  # how far a frame may show it from where it stands
-    border_m: float = 0.006  # how far its outline may be off
-    attached_m: float = 0.035  # about its outline, where handles and caps may be that it lacks
-    colours: ColourModel | None = None  # learned from where frames are sure
-    clicks: tuple[PromptPoint, ...] = ()  # what a person said of single pixels holds in their frames
+    pose_error_m: float = 0.02  # error of its position in a frame
+    border_m: float = 0.006  # tolerance of its outline
+    attached_m: float = 0.035  # distance around its outline within which missing handles and caps may lie
+    colours: ColourModel | None = None  # learned from confident pixels
+    clicks: tuple[PromptPoint, ...] = ()  # corrections of single pixels, valid in their own frames
 
     @property
     def points(self) -> Points:
-        """Its vertices."""
+        """Vertices of the surface."""
         return self.vertices
 
 
 def find_thing(
     scene: Scene, positives: Points, negatives: Points, config: ThingConfig, *, voxel_m: float | None = None
 ) -> Thing | None:
-    """The surface that the clicks (world points) belong to; None when there is none within reach."""
+    """Min-cut of the surface at the clicks (world points); None when there is none within reach."""
     params = tuned(Params)
     reach = params.surface_reach * config.radius_m + params.surface_margin_m
     vertices, faces, colours = _local_surface(scene, positives, reach, voxel_m)
@@ -129,7 +147,7 @@ def find_thing(
 
 
 def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True) -> tuple[Mask, float]:
-    """The thing's visible pixels in a frame, and the share of its projection that is visible."""
+    """Visible pixels of the object in a frame, and the visible fraction of its projection."""
     camera = frame.rgb_camera
     size = (camera.width, camera.height)
     scale = max(1, round(camera.width / 480))
@@ -172,9 +190,10 @@ def _refined(mask: Mask, scene: Scene, frame: Frame) -> Mask:
 
 
 def support_height(scene: Scene, positives: Points, config: ThingConfig) -> float | None:
-    """World height of what the thing stands on: the floor, or the highest level surface below that lies around it.
+    """World height of the object's support: the floor, or the highest level surface below that surrounds it.
 
-    Around: in enough directions, farther off than the thing reaches. Where there is none, the highest large level one below.
+    Surrounds: it continues in enough directions, farther out than the object reaches. Where no surface does, the highest large
+    level one below.
     """
     params = tuned(Params)
     if config.on_floor:
@@ -221,7 +240,7 @@ def _over_bins(profile: np.ndarray) -> np.ndarray:
 
 
 def _structure(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
-    """Voxels of large flat parts (walls, worktops, table tops) that hold no click."""
+    """Mask of the voxels on large flat parts (walls, worktops, table tops) without a click."""
     params, background = tuned(Params), np.zeros(len(graph.positions), bool)
     for axis in ("level", "upright"):
         upward = np.abs(graph.normals[:, 2])
@@ -245,7 +264,7 @@ def _structure(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
 
 
 def _local_surface(scene: Scene, positives: Points, reach_m: float, voxel_m: float | None) -> tuple[Points, Faces, Colours]:
-    """The fused scan around the clicks; fused anew with finer voxels when asked."""
+    """Fused scan around the clicks; fused again with finer voxels on request."""
     centre = positives.mean(axis=0)
     reach = reach_m + float(np.linalg.norm(positives - centre, axis=1).max())
     if voxel_m is None or voxel_m >= scene.capture.surface.voxel_m:
@@ -264,14 +283,14 @@ def _local_surface(scene: Scene, positives: Points, reach_m: float, voxel_m: flo
 
 
 def _renumbered(faces: Faces, count: int) -> tuple[np.ndarray, Faces]:
-    """The vertices (of `count`) that faces use, and the faces with numbers among them."""
+    """Indices of the vertices (of `count`) that faces use, and the faces renumbered to them."""
     used = np.zeros(count, bool)
     used[faces] = True
     return np.flatnonzero(used), (np.cumsum(used) - 1)[faces]
 
 
 def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> list[DepthView]:
-    """The sharpest, nearest depth images that see a ball, everything outside it removed."""
+    """Sharpest and nearest depth images that see a ball, with everything outside it removed."""
     rated, (nearest, farthest) = [], tuned(Params).depth_range_m
     for frame in scene.frames:
         local = frame.world_from_camera.inverse.apply(centre)

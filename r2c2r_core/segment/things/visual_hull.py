@@ -1,4 +1,4 @@
-"""Visual hull of small things: space carved by depth (free space), then by colour silhouettes, which forgives coarse depth."""
+"""Visual hull of small objects, carved by depth (free space), then by colour silhouettes, which tolerate coarse depth."""
 
 from dataclasses import dataclass, replace
 
@@ -22,38 +22,40 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How small things are carved."""
+    """Tuned parameters of the visual hull."""
 
-    frames: int = param(18, "count", "that carve", ge=1)
-    glimpse_frames: int = param(6, "count", "that carve for a first look", ge=1)
-    voxels: int = param(100_000, "count", "of a grid", ge=1000)
-    glimpse_voxels: int = param(25_000, "count", "of a grid for a first look", ge=1000)
+    frames: int = param(18, "count", "Maximum number of frames that carve", ge=1)
+    glimpse_frames: int = param(6, "count", "Maximum number of frames that carve the preview", ge=1)
+    voxels: int = param(100_000, "count", "Number of voxels of the grid", ge=1000)
+    glimpse_voxels: int = param(25_000, "count", "Number of voxels of the preview grid", ge=1000)
     pose_share: float = param(
         0.08,
         "share",
-        "of a thing's width, that frames may err by about where it is: carving loses as much of it on either side",
+        "Maximum pose error between frames as a fraction of the object's width: carving removes as much on either side",
     )
-    near_support_m: float = param(0.05, "m", "about the grid", source="more than a frame's height may be off")
-    off_support_m: float = param(0.012, "m", "above the support: nearer points are the support's")
-    off_wall_m: float = param(0.03, "m", "before a wall: nearer points are the wall's")
-    depth_slack_m: float = param(0.022, "m", "what coarse depth of a curved thing is off by")
+    near_support_m: float = param(
+        0.05, "m", "Margin around the grid for depth points", source="more than a frame's height offset"
+    )
+    off_support_m: float = param(0.012, "m", "Maximum height above the support of points that belong to the support")
+    off_wall_m: float = param(0.03, "m", "Maximum distance from a wall of points that belong to the wall")
+    depth_slack_m: float = param(0.022, "m", "Error of coarse depth on a curved object, along the line of sight")
     carved_m: float = param(
         0.010,
         "m",
-        "beyond the noise, that depth must lie behind a voxel to see through it: depth cells mix a thing and what is behind",
-        source="ten bottles of the sample kitchens and of a second generator: mean IoU 0.92, 0.91 by a fixed 22 mm",
+        "Minimum distance of depth behind a voxel, beyond the noise, to see through it: depth cells mix object and background",
+        source="ten bottles of the sample kitchens and of a second generator: mean IoU 0.92, against 0.91 with a fixed 22 mm",
     )
-    hidden_m: float = param(0.13, "m", "beyond the noise, that depth must lie before a voxel to hide it")
-    seen_through: float = param(0.12, "share", "of the views that may err before a voxel counts as empty")
-    seen_share: float = param(0.05, "share", "of the views that must hit a cell where poses agree")
-    agreed_share: float = param(0.35, "share", "of the views that must hit a cell where each smears it")
-    inside: float = param(0.85, "share", "of silhouettes that must hold a voxel", gt=0, lt=1)
+    hidden_m: float = param(0.13, "m", "Minimum distance of depth in front of a voxel, beyond the noise, to hide it")
+    seen_through: float = param(0.12, "share", "Maximum fraction of views that may see through a solid voxel by error")
+    seen_share: float = param(0.05, "share", "Minimum fraction of views that must hit a cell where poses agree")
+    agreed_share: float = param(0.35, "share", "Minimum fraction of views that must hit a cell where each view smears it")
+    inside: float = param(0.85, "share", "Minimum fraction of silhouettes that must contain a voxel", gt=0, lt=1)
 
 
 def find_small(
     scene: Scene, positives: Points, negatives: Points, config: ThingConfig, structure: tuple[PlaneRegion, ...]
 ) -> Thing | None:
-    """A small thing's visual hull; None when depth shows nothing that stands apart at the clicks."""
+    """Visual hull of a small object; None where depth shows no separate object at the clicks."""
     params = tuned(Params)
     support = support_height(scene, positives, config)
     voxels = _voxels_around(scene, positives, config, support, params.voxels)
@@ -72,7 +74,7 @@ def find_small(
     thing = mesh_of(solid.astype(np.float32), 0.5, fine, support)
     if thing is None:
         return None
-    for band_m in (0.012, 0.007):  # the first silhouettes start from coarse depth, the next from the first
+    for band_m in (0.012, 0.007):  # the first silhouettes start from coarse depth, the second from the first
         thing = replace(thing, colours=colours_of(thing, scene, views, band_m))
         share = np.where(room, _silhouette_share(thing, fine, scene, views, band_m), 0)
         inside = part_at(share > params.inside, fine, positives, negatives, reach_m=0.03)
@@ -88,7 +90,7 @@ def find_small(
 def glimpse_small(
     scene: Scene, positives: Points, negatives: Points, config: ThingConfig, structure: tuple[PlaneRegion, ...]
 ) -> Thing | None:
-    """The same from the depth of a few frames alone: a first look within the time of a click."""
+    """Preview hull from the depth of a few frames alone, fast enough for a click."""
     params = tuned(Params)
     support = support_height(scene, positives, config)
     views = best_views(scene, positives.mean(axis=0), params.glimpse_frames)[: params.glimpse_frames]
@@ -108,7 +110,7 @@ def _depth_hull(
     support: float | None,
     structure: tuple[PlaneRegion, ...],
 ) -> np.ndarray | None:
-    """The solid that depth leaves at the clicks; None where it shows nothing that stands apart."""
+    """Solid that depth leaves at the clicks; None where it shows no separate object."""
     front = _seen_points(scene, views, voxels, positives, support, structure, tuned(Params).seen_share)
     if len(front) < 12:
         return None
@@ -125,7 +127,7 @@ def _loose(
     support: float | None,
     structure: tuple[PlaneRegion, ...],
 ) -> Thing | None:
-    """A rough shape where frames disagree about poses: a cylinder for round things, else what depth saw, filled below."""
+    """Rough shape where frame poses disagree: a cylinder for round objects, else the depth points, filled downwards."""
     front = _seen_points(scene, views, voxels, positives, support, structure, tuned(Params).agreed_share)
     if config.round or len(front) < 12:
         return upright_shape(scene, positives, views, config, support)
@@ -143,7 +145,7 @@ def _loose(
 
 
 def _closed(solid: np.ndarray) -> np.ndarray:
-    """Voxels with gaps of a depth cell filled, level by level."""
+    """Voxels with gaps of a depth cell closed, level by level."""
     from scipy import ndimage
 
     padded = np.pad(solid, ((4, 4), (4, 4), (0, 0)))
@@ -151,20 +153,20 @@ def _closed(solid: np.ndarray) -> np.ndarray:
 
 
 def _too_wide(thing: Thing, config: ThingConfig) -> bool:
-    """Whether the hull is far wider than such a thing can be: it took in a neighbour."""
+    """Whether the hull is far wider than its category allows, having absorbed a neighbour."""
     width = np.ptp(np.quantile(thing.vertices[:, :2], [0.02, 0.98], axis=0), axis=0).min()
     return config.width_m is not None and bool(width > 1.7 * config.width_m)
 
 
 def _lost(thing: Thing, scene: Scene, views: list[Frame], positives: Points) -> bool:
-    """Whether the hull left a click, or shows in too few of the frames that see the clicks."""
+    """Whether the hull misses a click, or shows in too few of the frames that see the clicks."""
     away = [_from_hull(thing, point, views) for point in positives]
     shown = [bool(crop_outline(thing, scene, frame)[1].any()) for frame in views[::2]]
     return max(away) > 0.02 or float(np.mean(shown)) < 0.7
 
 
 def _from_hull(thing: Thing, click: Vector3, views: list[Frame]) -> float:
-    """How far a click's point lies from the hull, metres; along the line of sight, depth of a curved thing may be off."""
+    """Distance of a clicked point from the hull, metres, with slack along the line of sight for coarse depth."""
     sight = click - np.mean([frame.world_from_camera.translation for frame in views], axis=0)
     sight /= max(float(np.linalg.norm(sight)), 1e-6)
     offset = thing.vertices - click
@@ -174,7 +176,7 @@ def _from_hull(thing: Thing, click: Vector3, views: list[Frame]) -> float:
 
 
 def _pose_spread(scene: Scene, views: list[Frame], support: float | None, centre: Vector3) -> float:
-    """How much the frames disagree about the height of the support: the median absolute deviation."""
+    """Median absolute deviation of the frames' height offsets at the support."""
     return pose_spread([support_offset(scene, frame, support, centre) for frame in views])
 
 
@@ -198,7 +200,7 @@ def _voxels_around(scene: Scene, positives: Points, config: ThingConfig, support
 
 
 def _carve(voxels: Voxels, scene: Scene, views: list[Frame], support: float | None) -> np.ndarray:
-    """Voxels that depth does not show to be empty, and that some frame's depth touches or hides."""
+    """Voxels that depth does not show to be empty, and that at least one frame's depth reaches without being occluded."""
     params = tuned(Params)
     centres = voxels.centres
     empty, known = np.zeros(len(centres), np.int32), np.zeros(len(centres), np.int32)
@@ -220,7 +222,7 @@ def _seen_points(
     structure: tuple[PlaneRegion, ...],
     share: float,
 ) -> Points:
-    """Depth points of the thing, each in a `share` of the views: connected to the clicks, off its support and off walls."""
+    """Depth points of the object seen in a `share` of the views: connected to the clicks, off its support and off walls."""
     params = tuned(Params)
     from scipy import ndimage
 
@@ -250,7 +252,7 @@ def _seen_points(
 
 
 def _depth_points_near(scene: Scene, frame: Frame, low: Vector3, high: Vector3) -> Points:
-    """Camera-frame points of the depth pixels under a world box, and of some around it."""
+    """Camera-frame points of the depth pixels in the image rectangle of a world box."""
     depth, camera = scene.depth(frame.index), frame.depth_camera
     corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(-1, 3)
     local = frame.world_from_camera.inverse.apply(corners)
@@ -265,7 +267,7 @@ def _depth_points_near(scene: Scene, frame: Frame, low: Vector3, high: Vector3) 
 
 
 def _as_deep_as_wide(voxels: Voxels, front: Points, views: list[Frame]) -> np.ndarray:
-    """Voxels behind what was seen, no deeper than it is wide: depth does not carve the shadow of a thing."""
+    """Mask of the voxels behind the seen surface, no deeper than it is wide: depth does not carve an object's shadow."""
     centres = np.stack([frame.world_from_camera.translation for frame in views])
     away = front.mean(axis=0) - centres.mean(axis=0)
     away = away * [1, 1, 0] / max(float(np.linalg.norm(away[:2])), 1e-6)
@@ -282,7 +284,7 @@ def _as_deep_as_wide(voxels: Voxels, front: Points, views: list[Frame]) -> np.nd
 
 
 def _silhouette_share(thing: Thing, voxels: Voxels, scene: Scene, views: list[Frame], band_m: float) -> np.ndarray:
-    """For each voxel, the share of colour silhouettes that hold it, among those that could."""
+    """Fraction of the colour silhouettes that contain each voxel, among the views that could show it."""
     centres = voxels.centres
     inside, seen = np.zeros(len(centres)), np.zeros(len(centres))
     for frame in views:

@@ -1,4 +1,4 @@
-"""A regular voxel grid around a small thing: connected parts, refinement, and its surface by marching cubes."""
+"""Regular voxel grid around a small object: connected parts, refinement, and its surface by marching cubes."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Room about a thing."""
+    """Tuned parameters of the voxel grid."""
 
-    headroom_m: float = param(0.025, "m", "above what was seen")
+    headroom_m: float = param(0.025, "m", "Extra height above the observed solid")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Voxels:
-    """A regular grid over the clicks: `centres` (nx, ny, nz, 3) in the world."""
+    """Regular grid around the clicks, in the world."""
 
     origin: Vector3
     size_m: float
@@ -32,7 +32,7 @@ class Voxels:
 
 
 def with_headroom(solid: np.ndarray, voxels: Voxels) -> np.ndarray:
-    """The solid, and the space just above its parts: depth loses thin tops such as caps."""
+    """The solid with the space just above its parts: depth loses thin tops such as caps."""
     from scipy import ndimage
 
     tall = round(tuned(Params).headroom_m / voxels.size_m)
@@ -45,7 +45,7 @@ def with_headroom(solid: np.ndarray, voxels: Voxels) -> np.ndarray:
 
 
 def cropped(voxels: Voxels, solid: np.ndarray) -> tuple[Voxels, np.ndarray]:
-    """Finer voxels around the solid part alone."""
+    """Finer voxels around the solid part alone, and the solid resampled on them."""
     filled = np.argwhere(solid)
     low, high = np.maximum(filled.min(axis=0) - 2, 0), np.minimum(filled.max(axis=0) + 3, solid.shape)
     high[2] = min(high[2] + round(tuned(Params).headroom_m / voxels.size_m), solid.shape[2])
@@ -58,7 +58,7 @@ def cropped(voxels: Voxels, solid: np.ndarray) -> tuple[Voxels, np.ndarray]:
 
 
 def part_at(solid: np.ndarray, voxels: Voxels, positives: Points, negatives: Points, reach_m: float) -> np.ndarray | None:
-    """The connected part nearest to the positive clicks, without parts only joined to it by a neck one voxel wide."""
+    """Connected part nearest to the positive clicks, without parts joined to it only by a neck one voxel wide."""
     from scipy import ndimage
 
     opened = ndimage.binary_opening(solid, iterations=1)
@@ -71,7 +71,7 @@ def part_at(solid: np.ndarray, voxels: Voxels, positives: Points, negatives: Poi
         if label:
             chosen.add(label)
     refused = {label_near(labels, voxels, point, reach_m / 2) for point in negatives}
-    chosen = chosen - refused or chosen  # a click off it, beside its border, refuses no part that a click on it chose
+    chosen = chosen - refused or chosen  # a negative click beside its border rejects no part that a positive click chose
     if not chosen:
         return None
     part = np.isin(labels, sorted(chosen))
@@ -79,7 +79,7 @@ def part_at(solid: np.ndarray, voxels: Voxels, positives: Points, negatives: Poi
 
 
 def label_near(labels: np.ndarray, voxels: Voxels, point: Vector3, reach_m: float) -> int:
-    """The label of the filled voxel nearest to a point, 0 when there is none within reach."""
+    """Label of the filled voxel nearest to a point, 0 when there is none within reach."""
     at = (point - voxels.origin) / voxels.size_m - 0.5
     reach = int(np.ceil(reach_m / voxels.size_m))
     low = np.clip(np.floor(at).astype(int) - reach, 0, labels.shape)
@@ -93,14 +93,14 @@ def label_near(labels: np.ndarray, voxels: Voxels, point: Vector3, reach_m: floa
 
 
 def grown(inside: np.ndarray) -> np.ndarray:
-    """The part and two voxels around it."""
+    """The part dilated by two voxels."""
     from scipy import ndimage
 
     return np.asarray(ndimage.binary_dilation(inside, iterations=2))
 
 
 def mesh_of(field: np.ndarray, level: float, voxels: Voxels, support: float | None) -> Thing | None:
-    """The level surface of a field over the voxels; None where it stays below."""
+    """Level surface of a field over the voxels, by marching cubes; None where the field stays below."""
     from skimage.measure import marching_cubes
 
     padded = np.pad(field, 1)
