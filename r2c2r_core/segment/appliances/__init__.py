@@ -1,1 +1,1 @@
-"""Appliances: `find` takes clicks to the front, `fit` is the method (least squares) on `edges` and `faces` as evidence."""
+"""Appliances: `find` finds the front at clicks, `fit` fits its box by least squares to the evidence of `edges` and `faces`."""

@@ -1,4 +1,4 @@
-"""An appliance's front on the orthomosaic: the rectangle with the clearest edges of a possible size; its box and its masks."""
+"""Appliance front on the orthomosaic: the rectangle of plausible size with the clearest edges; its box and its masks."""
 
 from dataclasses import dataclass
 
@@ -22,51 +22,53 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How an appliance's front is chosen among lines."""
+    """Tuned parameters of the rectangle search."""
 
-    candidates: int = param(36, "count", "lines tried a direction", ge=2)
+    candidates: int = param(36, "count", "Number of candidate lines per direction", ge=2)
     shadow_m: float = param(
         0.02,
         "m",
-        "above a support: lines this near are its shadow's",
+        "Minimum distance of a line above the support: nearer lines are the edge of its shadow",
         source="without it a microwave of the sample kitchens (seed 0) loses 8 mm of its height",
     )
     covered: float = param(
         0.35,
         "score",
-        "worth of what depth saw of the plane, beside 1 for all four edges: it belongs to the appliance",
-        source="0.2 to 0.5 hold on kitchens of both generators; 0 loses a microwave, 0.6 makes refrigerators 20 mm high",
+        "Weight of the observed plane area that a rectangle covers, relative to 1 for four clear edges",
+        source="0.2 to 0.5 work on kitchens of both generators; 0 loses a microwave, 0.6 makes refrigerators 20 mm high",
     )
-    reach: float = param(0.4, "ratio", "to a kind's least side, beyond the clicks, where lines are looked for")
+    reach: float = param(
+        0.4, "ratio", "Search distance for lines beyond the clicks, relative to the smallest side of the category"
+    )
     usual: float = param(
         0.3,
         "score",
-        "worth of a usual size, beside 1 for all four edges",
+        "Weight of a usual size, relative to 1 for four clear edges",
         source="without it the same microwave loses 42 mm of its height",
     )
     past: float = param(
         2.0,
         "score",
-        "cost of a rectangle that depth looks past everywhere, beside 1 for all four edges",
-        source="by 0 a microwave of a third party's kitchen takes in the wall's edge beside it; by 2 it is right to 1 %",
+        "Cost of a rectangle that depth looks past everywhere, relative to 1 for four clear edges",
+        source="at 0 a microwave of a third party's kitchen takes in the wall's edge beside it; at 2 it is right to 1 %",
     )
-    refused: float = param(10.0, "score", "cost of a click that says no")
-    sure_z: float = param(4.0, "σ", "of a line that is clear", gt=0)
-    clearest_z: float = param(6.0, "σ", "at which lines are cut where candidates are looked for", gt=0)
-    least_line: float = param(0.2, "σ", "mean of a candidate line")
-    blur_m: float = param(0.003, "m", "over which candidate lines are one", gt=0)
-    apart_m: float = param(0.0075, "m", "between candidate lines, at least")
-    front_m: float = param(0.08, "m", "before the box, from where something hides it")
-    behind_m: float = param(0.06, "m", "behind the box, from where the sensor looked past it")
-    least_visible: float = param(0.05, "share", "of the box's projection that must be visible")
+    refused: float = param(10.0, "score", "Cost of a negative click inside the rectangle")
+    sure_z: float = param(4.0, "σ", "z-score at which a line counts as fully clear", gt=0)
+    clearest_z: float = param(6.0, "σ", "Maximum z-score counted while candidate lines are searched", gt=0)
+    least_line: float = param(0.2, "σ", "Minimum mean z-score of a candidate line")
+    blur_m: float = param(0.003, "m", "Standard deviation of the smoothing of the line profile, within which lines merge", gt=0)
+    apart_m: float = param(0.0075, "m", "Minimum distance between candidate lines")
+    front_m: float = param(0.08, "m", "Minimum distance of depth in front of the box for an occluder")
+    behind_m: float = param(0.06, "m", "Minimum distance of depth behind the box for the box to be seen through")
+    least_visible: float = param(0.05, "share", "Minimum visible fraction of the box's projection for a mask")
 
 
 def find_rectangle(
     run: Run, clicks: np.ndarray, kind: Category, refused: np.ndarray, past: Mask, support_row: float | None = None
 ) -> Cell | None:
-    """The rectangle (grid cells) around the clicks with the clearest four edges, of a plausible size, above its support.
+    """Rectangle (grid cells) around the clicks with the clearest four edges, of plausible size, above its support.
 
-    `past` are the cells that depth looks past: none of an appliance's are.
+    `past` marks the cells that depth looks past: an appliance has none.
     """
     params = tuned(Params)
     cell_m = run.grid.cell_m
@@ -93,7 +95,7 @@ def find_rectangle(
             top, bottom, tall = top[fits], bottom[fits], tall[fits]
             foot = _along_rows(horizontal, bottom, left, right, run.horizontal.block)
             if support_row is not None:
-                foot = np.where(bottom == support_row, 1.0, foot)  # depth saw what it stands on: as sure as a line can be
+                foot = np.where(bottom == support_row, 1.0, foot)  # depth shows the support: as certain as a line can be
             edges = (
                 _along(vertical, left, top, bottom, run.vertical.block)
                 + _along(vertical, right, top, bottom, run.vertical.block)
@@ -114,7 +116,7 @@ def find_rectangle(
 
 
 def appliance_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, float]:
-    """The box's visible pixels in a frame, and the share of its projection that is visible."""
+    """Visible pixels of the box in a frame, and the visible fraction of its projection."""
     params, grid = tuned(Params), front.run.grid
     slide = front.run.slide_of(frame.index, scene)
     facets = []
@@ -130,7 +132,7 @@ def appliance_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, floa
 
 
 def appliance_box(front: Front) -> ThingBox:
-    """The box in the world: the front rectangle extruded."""
+    """Box in the world: the front rectangle extruded by its depth."""
     grid, cell = front.run.grid, front.cell
     width, height = cell.width * grid.cell_m, cell.height * grid.cell_m
     centre = grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]), front.depth_m / 2)[0]
@@ -142,13 +144,13 @@ def appliance_box(front: Front) -> ThingBox:
 
 
 def _possible(size: Size, values_m: float | np.ndarray) -> np.ndarray:
-    """Which values may be such a size, cut a little beside its border."""
+    """Mask of the values within a size range, extended by a slack for inexact cuts."""
     slack = np.exp(tuned(SizeParams).slack)
     return np.asarray((values_m >= size.low / slack) & (values_m <= size.high * slack))
 
 
 def _component(run: Run, clicks: np.ndarray) -> np.ndarray:
-    """The seen part of the plane that lies at, or nearest to, the clicks."""
+    """Observed part of the plane under the clicks, else the one nearest to the first click."""
     count, labels = cv2.connectedComponents(run.seen.astype(np.uint8), connectivity=4)
     if count <= 1:
         return np.zeros_like(run.seen)
@@ -167,18 +169,18 @@ def _distance(part: np.ndarray, click: np.ndarray) -> float:
 
 
 def _covered(support: np.ndarray, left: float, right: float, top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
-    """Share of the support inside each rectangle."""
+    """Fraction of the observed part inside each rectangle."""
     return np.asarray(_held(support, left, right, top, bottom) / max(float(support[-1, -1]), 1.0))
 
 
 def _held(sums: np.ndarray, left: float, right: float, top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
-    """How many cells, of running sums over both axes, lie inside each rectangle."""
+    """Number of cells inside each rectangle, from running sums over both axes."""
     a, b, c, d = round(left), round(right), np.round(top).astype(int), np.round(bottom).astype(int)
     return np.asarray(sums[d, b] - sums[c, b] - sums[d, a] + sums[c, a])
 
 
 def _sums(evidence: Evidence) -> np.ndarray:
-    """Running sums over blocks of how clearly each position shows a line (0..1), the best of three neighbours."""
+    """Running sums over blocks of the line clarity at each position (0..1), the best of three neighbours."""
     sure = tuned(Params).sure_z
     clear = cv2.dilate(np.clip(evidence.score, 0, sure).astype(np.float32), np.ones((1, 3), np.uint8)) / sure
     return np.pad(np.where(evidence.known, clear, 0).cumsum(axis=0), ((1, 0), (0, 0)))
@@ -198,11 +200,11 @@ def _along_rows(sums: np.ndarray, rows: np.ndarray, left: float, right: float, b
 
 
 def _candidates(evidence: Evidence, low: float, high: float, reach: float, cell_m: float) -> np.ndarray:
-    """Positions (cell centres) of the lines that are clearest on either side of the clicks: a click may be at its border."""
+    """Positions (cell centres) of the clearest lines on either side of the clicks; clicks may lie near the border."""
     params = tuned(Params)
     around = 2 * round(params.apart_m / cell_m) + 1
     if max(low - reach, 0) // evidence.block >= len(evidence.score):
-        return np.zeros(0)  # the clicks lie beside what was seen
+        return np.zeros(0)  # the clicks lie outside the observed part
     before, after = (_shown(evidence, *span) for span in ((low - reach, high), (low, high + reach)))
     profile = cv2.GaussianBlur(np.maximum(before, after)[None].astype(np.float32), (0, 0), params.blur_m / cell_m)[0]
     peak = (profile >= cv2.dilate(profile[None], np.ones((1, around), np.uint8))[0] - 1e-6) & (profile > params.least_line)
@@ -212,7 +214,7 @@ def _candidates(evidence: Evidence, low: float, high: float, reach: float, cell_
 
 
 def _shown(evidence: Evidence, low: float, high: float) -> np.ndarray:
-    """How clearly each position shows a line between two places along it."""
+    """Line clarity of each position between two places along the line."""
     count = len(evidence.score)
     first = int(np.clip(low // evidence.block, 0, count - 1))
     last = int(np.clip(np.ceil(high / evidence.block), first + 1, count))

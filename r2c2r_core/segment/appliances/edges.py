@@ -1,7 +1,7 @@
-"""Image edges of a box: colour changes across its projected edges, each a candidate (edge-based tracking, RAPiD; Harris 1990).
+"""Image edges of a box: colour changes across its projected edges, as candidates (edge-based tracking, RAPiD; Harris 1990).
 
-A box is (7,): yaw in radians, then left, right, front, back, bottom, top in metres, in the frame of its front as first thought:
-+X right, +Y back, +Z up, turned about the origin by the yaw.
+A box is (7,): yaw in radians, then left, right, front, back, bottom, top in metres, in the frame of its initial front:
++X right, +Y back, +Z up, rotated about the origin by the yaw.
 """
 
 from collections.abc import Sequence
@@ -22,38 +22,38 @@ from r2c2r_core.tuning import param, tuned
 YAW, LEFT, RIGHT, FRONT, BACK, BOTTOM, TOP = range(7)
 """Places of a box's parameters."""
 
-_PARTS, _SAMPLES = 3, 10  # of an edge, and of a part: a turned edge shows in its parts
+_PARTS, _SAMPLES = 3, 10  # per edge, and per part: a rotated edge shows in its parts
 _STEP_PX = 0.5  # along the profile across an edge
 _SMOOTH = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0  # over those steps: a pixel to either side
-_MOST_PEAKS = 6  # of a profile
+_MOST_PEAKS = 6  # per profile
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which edges of a box a photograph is asked for, and what counts as a change of colour."""
+    """Tuned parameters of the box edges in photographs."""
 
-    beside_m: float = param(0.02, "m", "a camera this far beyond a face's plane sees the face")
-    shortest_px: float = param(10.0, "px", "a third of an edge that is shorter has no direction")
-    in_view: float = param(0.6, "share", "of the samples of a part that nothing hides")
-    hidden_m: float = param(0.05, "m", "depth nearer by more, beyond its noise, belongs to something in front")
+    beside_m: float = param(0.02, "m", "Minimum distance of a camera beyond a face's plane to see the face")
+    shortest_px: float = param(10.0, "px", "Minimum length of a third of an edge: shorter ones have no direction")
+    in_view: float = param(0.6, "share", "Minimum unoccluded fraction of the samples of an edge part")
+    hidden_m: float = param(0.05, "m", "Minimum distance of depth in front of an edge, beyond its noise, for an occluder")
     least_contrast: float = param(
         3.0,
         "grey",
-        "change of CIELAB over two pixels, mean along a part",
-        source="twice what image noise of 3 levels leaves of it",
+        "Minimum CIELAB change over two pixels, averaged along a part, for an edge candidate",
+        source="twice the change that image noise of 3 levels leaves",
     )
-    usual_contrast: float = param(5.0, "grey", "the same of an edge that is as likely the box's as not")
+    usual_contrast: float = param(5.0, "grey", "Contrast at which an edge candidate is as likely the box's as not")
     outlier: float = param(
         0.15,
         "ratio",
-        "likelihood that no peak is the box's edge, to that of one at its very place",
+        "Likelihood that no peak is the box's edge, relative to a peak exactly on it",
         source="0.05 to 0.15 give the same boxes of three sample kitchens",
     )
-    pixel_px: float = param(1.0, "px", "standard deviation of an edge in a photograph: blur and pose error")
+    pixel_px: float = param(1.0, "px", "Standard deviation of an edge's position in a photograph: blur and pose error")
 
 
 class Photo(NamedTuple):
-    """A frame in which the box stands."""
+    """A frame in which the box is visible."""
 
     lab: Image
     camera: Intrinsics
@@ -63,47 +63,47 @@ class Photo(NamedTuple):
 
 
 class EdgeView(NamedTuple):
-    """What one photograph shows across the parts of a box's edges (m parts)."""
+    """Edge candidates in one photograph across the parts of a box's edges (m parts)."""
 
     camera: Intrinsics
     camera_from_front: Rigid3
-    parts: np.ndarray  # (m,) which of all parts of edges
-    uv_px: np.ndarray  # (m, 2, 2) their ends as first thought
+    parts: np.ndarray  # (m,) indices among all edge parts
+    uv_px: np.ndarray  # (m, 2, 2) their initial end points
     normals: np.ndarray  # (m, 2) across them
     metres_per_px: np.ndarray  # (m,)
-    peaks_px: np.ndarray  # (m, k) where colour changes, along the normals
+    peaks_px: np.ndarray  # (m, k) positions of colour changes, along the normals
     contrasts: np.ndarray  # (m, k), 0 where there is no such peak
 
 
 class Association(NamedTuple):
-    """Where the parts of one view's edges should be, expected over their candidates."""
+    """Expected positions of one view's edge parts over their candidates (the expectation step)."""
 
     target_px: np.ndarray  # (m,)
-    weight: np.ndarray  # (m,) 1/px: square root of the chance that a candidate is the edge, over its spread
+    weight: np.ndarray  # (m,) 1/px: square root of the probability that a candidate is the edge, over its spread
     gain: np.ndarray  # (m,) log-likelihood ratio over no candidate being the edge
 
 
 def photo_of(scene: Scene, frame: Frame) -> Photo:
-    """What a frame shows."""
+    """Photo of a frame, in CIELAB, with its depth."""
     lab = cv2.cvtColor(scene.rgb(frame.index), cv2.COLOR_RGB2LAB)
     return Photo(lab, frame.rgb_camera, scene.filled_depth(frame.index), frame.world_from_camera, scene.noise)
 
 
 def look_across(box: np.ndarray, photos: Sequence[Photo], world_from_front: Rigid3, reach_m: float) -> list[EdgeView]:
-    """What each photograph shows within `reach_m` of the box's visible edges; those that show none are left out."""
+    """Edge candidates per photograph within `reach_m` of the box's visible edges; photographs without any are left out."""
     views = (_look(box, photo, photo.world_from_camera.inverse @ world_from_front, reach_m) for photo in photos)
     return [view for view in views if view is not None]
 
 
 def displacements(parts: Points, view: EdgeView) -> np.ndarray:
-    """How far (m,) the middles of a box's `edge_parts` lie from where they were first thought, along the normals, px."""
+    """Displacements (m,) of the middles of a box's `edge_parts` from their initial positions, along the normals, px."""
     ends = parts[view.parts].reshape(-1, 3)
     uv_px = project(view.camera_from_front.apply(ends), view.camera).reshape(-1, 2, 2)
     return np.asarray((((uv_px - view.uv_px).mean(axis=1)) * view.normals).sum(axis=1))
 
 
 def associate(offset_px: np.ndarray, view: EdgeView, spread_m: float) -> Association:
-    """The expectation step for parts at these displacements: candidates by contrast and distance, or none of them."""
+    """Expectation step for parts at these displacements: candidates by contrast and distance, or none of them (outlier)."""
     params = tuned(Params)
     scale = view.metres_per_px
     sigma_px = np.hypot(spread_m / scale, params.pixel_px)
@@ -116,16 +116,16 @@ def associate(offset_px: np.ndarray, view: EdgeView, spread_m: float) -> Associa
 
 
 def shares(views: Sequence[EdgeView], independent: float) -> list[np.ndarray]:
-    """How much each view's parts count (m,): a part that more than `independent` photographs show counts as that many.
+    """Weights (m,) of each view's parts: a part seen in more than `independent` photographs counts as that many.
 
-    A line beside the edge misleads all photographs alike.
+    A line beside the edge misleads all photographs alike, so their errors are correlated.
     """
     count = np.bincount(np.concatenate([np.zeros(0, int), *(view.parts for view in views)]), minlength=1)
     return [np.minimum(independent / count[view.parts], 1.0) for view in views]
 
 
 def hidden(photo: Photo, uv_px: np.ndarray, z_m: np.ndarray) -> np.ndarray:
-    """Whether the photo's depth shows something in front of each point."""
+    """Mask of the points in front of which the photo's depth shows an occluder."""
     params = tuned(Params)
     rows, columns = photo.depth_m.shape
     row = np.clip(uv_px[..., 1] * rows / photo.camera.height, 0, rows - 1).astype(int)
@@ -162,7 +162,7 @@ def _look(box: np.ndarray, photo: Photo, camera_from_front: Rigid3, reach_m: flo
 
 
 def _contrasts(lab: Image, samples: np.ndarray, normals: np.ndarray, shown: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Change of colour over two pixels (m, offsets) along the normals, of the mean over each part's samples in view."""
+    """Colour change over two pixels (m, offsets) along the normals, averaged over each part's visible samples."""
     at = samples[:, :, None] + offsets[:, None] * normals[:, None, None] - 0.5
     u, v = (np.ascontiguousarray(at[..., k].reshape(len(at), -1), dtype=np.float32) for k in (0, 1))
     colours = cv2.remap(lab, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(*at.shape[:3], 3)
@@ -175,10 +175,10 @@ def _contrasts(lab: Image, samples: np.ndarray, normals: np.ndarray, shown: np.n
 
 
 def _peaks(contrast: np.ndarray, offsets: np.ndarray, reach_px: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places and heights (m, k) of the highest peaks of each profile, to parts of a step; height 0 where there are fewer."""
+    """Subsample positions and heights (m, k) of the highest peaks of each profile; height 0 where there are fewer."""
     before, at, after = contrast[:, :-2], contrast[:, 1:-1], contrast[:, 2:]
     is_peak = (at > before) & (at >= after) & (at > least) & (np.abs(offsets[1:-1]) <= reach_px[:, None])
-    is_peak[:, :3] = is_peak[:, -3:] = False  # rolled over from the other end
+    is_peak[:, :3] = is_peak[:, -3:] = False  # wrapped around from the other end
     height = np.where(is_peak, at, 0.0)
     order = np.argsort(-height, axis=1, kind="stable")[:, :_MOST_PEAKS]
     bend = before - 2 * at + after
@@ -188,7 +188,7 @@ def _peaks(contrast: np.ndarray, offsets: np.ndarray, reach_px: np.ndarray, leas
 
 
 def _faced(box: np.ndarray, camera_from_front: Rigid3) -> np.ndarray:
-    """Which parts of edges bound a face that the camera looks at; none of a box seen from behind."""
+    """Mask of the edge parts that bound a face towards the camera; none of a box seen from behind."""
     params = tuned(Params)
     x, y, z = camera_from_front.inverse.translation @ rotation_about_z(float(box[YAW]))
     front, above = y < box[FRONT] - params.beside_m, z > box[TOP] + params.beside_m
@@ -198,9 +198,9 @@ def _faced(box: np.ndarray, camera_from_front: Rigid3) -> np.ndarray:
 
 
 def edge_parts(box: np.ndarray) -> Points:
-    """Ends (8 edges x parts, 2, 3) in the front's frame of the edges whose parts are asked for.
+    """End points (8 edges x parts, 2, 3) in the front's frame of the edge parts compared with photographs.
 
-    Upright: front left and right, back left and right. Level: top front, back, left and right. The foot lies in shadow.
+    Upright: front left and right, back left and right. Level: top front, back, left and right. The bottom edges lie in shadow.
     """
     yaw, left, right, front, back, bottom, top = box
     low = bottom + 0.05 * (top - bottom)

@@ -1,4 +1,4 @@
-"""Depth on the faces of a box: patches of the fused surface, each with its face."""
+"""Depth on the faces of a box: patches of the fused surface, each assigned to a face."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,34 +14,41 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which parts of the fused surface belong to which face."""
+    """Tuned parameters of the assignment of surface to faces."""
 
-    shell_m: float = param(0.05, "m", "how far a side or the top may lie from where it is thought")
-    front_shell_m: float = param(0.02, "m", "the same of the front, whose plane is known better")
+    shell_m: float = param(0.05, "m", "Maximum distance of surface from the initial plane of a side or the top")
+    front_shell_m: float = param(0.02, "m", "Maximum distance of surface from the initial front plane, which is known better")
     behind_m: float = param(
-        0.03, "m", "sides and the top are read from here on behind the front: the fused surface is round at its edges"
+        0.03, "m", "Minimum distance behind the front of surface on sides and top: the fused surface is round at its edges"
     )
-    facing: float = param(0.85, "cosine", "between a face and a normal on it: normals of fused depth scatter by 30 degrees")
+    facing: float = param(
+        0.85, "cosine", "Minimum cosine between a face's normal and surface normals on it: fused normals scatter by 30 degrees"
+    )
     patch_m: float = param(
-        0.05, "m", "side of a patch whose depth counts once", source="errors of fused depth go together over about 3 cm"
+        0.05,
+        "m",
+        "Side of a patch whose depth counts as one measurement",
+        source="errors of fused depth are correlated over about 3 cm",
     )
-    least_share: float = param(0.07, "share", "of a face that depth must have seen to measure anything by it")
-    gap_m: float = param(0.01, "m", "by which a hole in a side is longer than a patch where the side ends", gt=0)
-    least_reach_m: float = param(0.15, "m", "sides that end before this are dark, and depth has holes in them")
+    least_share: float = param(0.07, "share", "Minimum observed fraction of a face for it to be measured")
+    gap_m: float = param(0.01, "m", "Excess of a hole in a side over the patch size, above which the side ends there", gt=0)
+    least_reach_m: float = param(
+        0.15, "m", "Minimum depth at which a side may end: sides that end earlier are dark and have holes in their depth"
+    )
 
 
 class Patches(NamedTuple):
-    """Depth on faces, in the frame of the front as first thought (n patches)."""
+    """Depth patches on faces, in the frame of the initial front (n patches)."""
 
     points: Points
     axis: np.ndarray  # (n,) coordinate across the face: 0, 1 or 2
     face: np.ndarray  # (n,) parameter of the box that this coordinate measures
-    reach_m: float | None  # how far behind the front the sides and the top were seen without a gap
-    ends: dict[int, float]  # by LEFT and RIGHT: where depth on the front ends, unless it goes on past the search region
+    reach_m: float | None  # distance behind the front to which the sides and the top were observed without a gap
+    ends: dict[int, float]  # by LEFT and RIGHT: end of depth on the front, if within the search region
 
 
 def patches_on(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Patches:
-    """The patches of the fused surface that lie on a box's front, sides and top."""
+    """Patches of the fused surface on a box's front, sides and top."""
     params = tuned(Params)
     low, high = box[[LEFT, FRONT, BOTTOM]], box[[RIGHT, BACK, TOP]]
     before, beyond = (
@@ -94,7 +101,7 @@ def _front_ends(points: Points, box: np.ndarray) -> dict[int, float]:
 def _surface_in(
     scene: Scene, world_from_front: Rigid3, low: np.ndarray, high: np.ndarray
 ) -> tuple[Points, np.ndarray, np.ndarray]:
-    """Middles, normals and areas of the surface's triangles in a box of the front's frame."""
+    """Centroids, normals and areas of the surface triangles in a box of the front's frame."""
     parts = scene.parts
     near = parts.faces_near(world_from_front.apply((low + high)[None] / 2)[0], float(np.linalg.norm(high - low)) / 2)
     points = world_from_front.inverse.apply(parts.middles[near])
@@ -104,7 +111,7 @@ def _surface_in(
 
 
 def _patches(points: Points, areas: np.ndarray, patch_m: float) -> Points:
-    """The mean point of each cube of that side."""
+    """Area-weighted mean point of each cube of side `patch_m`."""
     cubes = np.floor(points / patch_m).astype(int)
     cubes -= cubes.min(axis=0)
     patch = np.ravel_multi_index(tuple(cubes.T), tuple(cubes.max(axis=0) + 1))
@@ -114,7 +121,7 @@ def _patches(points: Points, areas: np.ndarray, patch_m: float) -> Points:
 
 
 def _end(depths: np.ndarray) -> float:
-    """Where depths along a face first end."""
+    """Position of the first gap in the depths along a face, or their end."""
     params = tuned(Params)
     ordered = np.sort(depths)
     gaps = np.flatnonzero(np.diff(ordered) > params.patch_m + params.gap_m)

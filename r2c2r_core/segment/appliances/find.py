@@ -1,4 +1,4 @@
-"""Clicks to an appliance: its front's plane where the click lies on the front, on glass without depth, on a side or the top."""
+"""Appliance at clicks: its front's plane from a click on the front, on glass without depth, on a side or on the top."""
 
 from dataclasses import dataclass, replace
 
@@ -25,19 +25,23 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which plane clicks on an appliance mean."""
+    """Tuned parameters of the choice of the front's plane."""
 
-    low_m: float = param(0.6, "m", "greatest height of a kind, below which it stands on worktops")
-    off_front_m: float = param(0.04, "m", "behind its plane: a side or the top")
-    own_width: float = param(1.3, "ratio", "to the greatest width of a plane that is the appliance's front")
-    in_a_run: float = param(2.5, "ratio", "to the greatest width of a plane that its front is part of")
+    low_m: float = param(0.6, "m", "Maximum height of a category that stands on worktops")
+    off_front_m: float = param(0.04, "m", "Minimum distance of a click behind the front's plane to lie on a side or the top")
+    own_width: float = param(
+        1.3, "ratio", "Maximum width of a plane, relative to the category's maximum, that is the appliance's own front"
+    )
+    in_a_run: float = param(
+        2.5, "ratio", "Maximum width of a plane, relative to the category's maximum, that contains its front"
+    )
     unlikelier: float = param(
-        1.0, "log", "by which a plane's size may be less likely than the clicked one's, for it to be the front of that side"
+        1.0, "log", "Maximum loss in size log-likelihood, against the clicked plane, for a plane to be the front of that side"
     )
     prepared_margin_m: float = param(
         0.45,
         "m",
-        "that a plane misses of an appliance and is prepared with",
+        "Maximum margin missing from an appliance for which its plane is prepared in advance",
         source="planes that miss more are many and small: cut when clicked",
     )
 
@@ -51,11 +55,11 @@ def appliance_front(
     *,
     glimpse: bool = False,
 ) -> tuple[Front, bool] | None:
-    """The front of an appliance with its depth, and whether that was seen rather than usual; None where no front is found.
+    """Appliance front with its depth, and whether the depth was observed (not the usual one); None where no front is found.
 
-    `others` are clicks on other objects: those on its own plane are beside it.
+    `others` are clicks on other objects: those on its own plane lie beside it.
 
-    Its glass may have no depth, so clicks are rays that meet a plane it shows elsewhere. A glimpse does without the edges in
+    Its glass may have no depth, so clicks are rays that meet a plane observed elsewhere on it. A glimpse skips the edges in
     the photographs and the handle, which take most of the time.
     """
     clicks = [click for click in prompt.points if click.label == 1]
@@ -85,7 +89,7 @@ def appliance_front(
 def _rectangle(
     run: Run, on: np.ndarray, off: np.ndarray, beside: np.ndarray, kind: Category, past: Mask, support_row: float | None
 ) -> Cell | None:
-    """The rectangle around the first click and beside other objects'; more clicks change it where not just at its border."""
+    """Rectangle around the first click, clear of other objects' clicks; more clicks change it unless just beside its border."""
     cell = find_rectangle(run, on[:1], kind, beside, past, support_row)
     if cell is None:  # the first click may be on a dark side, whose ray meets the plane beside the front
         on = np.array([run.grid.cells_of(_support_near(run.region, run.grid.points_at(on[:1])[0])[None])[0], *on[1:]])
@@ -101,7 +105,7 @@ def _rectangle(
 
 
 def _support_row(prepared: PreparedCapture, run: Run, point: Vector3, kind: Category) -> float | None:
-    """The row of the run's grid at which what a small appliance stands on lies; None for tall ones and where none was seen."""
+    """Grid row of the support of a small appliance; None for tall ones, and where no support was observed."""
     if kind.height.high > tuned(Params).low_m:
         return None
     support = support_height(prepared.scene, point[None], ThingConfig(radius_m=kind.width.usual / 2))
@@ -112,7 +116,7 @@ def _support_row(prepared: PreparedCapture, run: Run, point: Vector3, kind: Cate
 
 
 def _nudged(cell: Cell, on: np.ndarray, off: np.ndarray, cell_m: float) -> Cell:
-    """The rectangle with its borders moved to the clicks beside them."""
+    """Rectangle with its borders moved to the clicks just beside them."""
     for label, clicks in ((1, on), (0, off)):
         for column, row in clicks:
             cell = nudged(cell, column, row, label, cell_m) or cell
@@ -120,7 +124,7 @@ def _nudged(cell: Cell, on: np.ndarray, off: np.ndarray, cell_m: float) -> Cell:
 
 
 def _on_plane(prepared: PreparedCapture, region: PlaneRegion, clicks: list[PromptPoint]) -> list[Vector3]:
-    """Where clicks meet the front's plane; those whose depth shows a side or the top say nothing about the front."""
+    """Intersections of clicks with the front's plane; clicks whose depth shows a side or the top are left out."""
     params = tuned(Params)
     points = []
     for click in clicks:
@@ -135,7 +139,7 @@ def _on_plane(prepared: PreparedCapture, region: PlaneRegion, clicks: list[Promp
 
 
 def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> tuple[PlaneRegion, Vector3] | None:
-    """The plane of an appliance's front and a point of it: under the click, else beside the face that was clicked."""
+    """Plane of an appliance's front and a point on it: under the click, else beside the clicked face."""
     params = tuned(Params)
     scene = prepared.scene
     origin, ray = scene.ray(click.frame, click.x, click.y)
@@ -148,7 +152,7 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
         if region is not None:
             return region, point
     farthest = float(np.linalg.norm(point - origin)) + 0.1 if point is not None else 6.0
-    # A plane no wider than such an appliance is rather its front than a run of cupboards that the ray passes over
+    # A plane no wider than such an appliance is more likely its front than a run of cupboards that the ray passes over
     for widest in (params.own_width, params.in_a_run):
         planes = tuple(plane for plane in prepared.planes if plane.width_m < widest * kind.width.high)
         met = region_along(planes, origin, ray, farthest, kind.width.high)
@@ -158,7 +162,7 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
 
 
 def _is_front_of(scene: Scene, front: PlaneRegion, clicked: PlaneRegion, point: Vector3, kind: Category) -> bool:
-    """Whether a plane before a clicked one is rather the front: looked at more squarely, and about as likely of that size."""
+    """Whether a plane in front of the clicked one is more likely the front: faced more squarely, with a plausible size."""
     likelier = _size_likelihood(clicked, kind) - _size_likelihood(front, kind)
     return likelier < tuned(Params).unlikelier and _faced(scene, front, point) > _faced(scene, clicked, point) + 0.2
 
@@ -168,7 +172,7 @@ def _size_likelihood(plane: PlaneRegion, kind: Category) -> float:
 
 
 def _region_at(prepared: PreparedCapture, point: Vector3, kind: Category) -> PlaneRegion | None:
-    """The plane under a point; beside one that misses much of the kind, as a rounded edge does, the one most looked at."""
+    """Plane under a point; beside one much smaller than the category, as on a rounded edge, the one faced most squarely."""
     near = regions_at(prepared.planes, point)
     if not near or not _misses_much(near[0], kind):
         return near[0] if near else None
@@ -177,7 +181,7 @@ def _region_at(prepared: PreparedCapture, point: Vector3, kind: Category) -> Pla
 
 
 def _front_before(prepared: PreparedCapture, point: Vector3, kind: Category) -> PlaneRegion | None:
-    """The plane that a point on a side or the top of a box of this kind lies close behind; the one most looked at."""
+    """Plane close in front of a point on a side or the top of a box of this category; the one faced most squarely."""
     params = tuned(Params)
     planes = [
         plane
@@ -195,20 +199,20 @@ def _behind(plane: PlaneRegion, point: Vector3) -> float:
 
 
 def _faced(scene: Scene, plane: PlaneRegion, point: Vector3) -> float:
-    """How squarely the recording looks at a plane: the mean cosine over the cameras."""
+    """Mean cosine between a plane's normal and the directions to the cameras."""
     towards = np.stack([frame.world_from_camera.translation for frame in scene.frames]) - point
     return float((towards @ plane.outward / np.linalg.norm(towards, axis=1)).mean())
 
 
 def _support_near(plane: PlaneRegion, point: Vector3) -> Vector3:
-    """A point of what was seen of a plane, near to another point."""
+    """Observed point of a plane near another point."""
     seen = plane.points
     order = np.argsort(np.linalg.norm(seen - point, axis=1))
     return np.asarray(seen[order[: max(1, round(0.06**2 / plane.cell_m**2))]].mean(axis=0))
 
 
 def _margin(region: PlaneRegion, kind: Category) -> float:
-    """How far the front may reach beyond what depth saw of it."""
+    """Margin by which the front may extend beyond its observed part, metres."""
     missing = max(kind.width.usual - region.width_m, kind.height.usual - region.height_m, 0.0)
     return round(missing + 0.05, 2) if missing > 0.08 else 0.0
 
@@ -218,7 +222,7 @@ def _misses_much(region: PlaneRegion, kind: Category) -> bool:
 
 
 def appliance_margins(region: PlaneRegion) -> tuple[float, ...]:
-    """The margins with which a click may ask for the run around a plane: it may be a part of an appliance of known size."""
+    """Run margins that clicks may request around a plane, which may be part of an appliance of known size."""
     params = tuned(Params)
     kinds = [kind for kind in every_category() if kind.kind == "appliance"]
     larger = [kind for kind in kinds if region.width_m < kind.width.high and region.height_m < kind.height.high]

@@ -1,8 +1,8 @@
-"""An appliance's upright box by one robust least-squares fit: depth on its faces, image edges, support, wall and usual sizes.
+"""Robust least-squares fit of an appliance's upright box: depth on faces, image edges, support, wall and usual sizes.
 
-Everything measured is a residual over its standard deviation, under one robust kernel (Cauchy), for scipy's least_squares.
-Which change of colour is which edge is not known: a Gaussian mixture weighs the candidates (expectation-maximisation), and its
-spread shrinks from centimetres to the noise (graduated non-convexity), from several depths to start from.
+Every measurement is a residual over its standard deviation, under one robust kernel (Cauchy), for scipy's least_squares.
+Edge candidates are associated by a Gaussian mixture (expectation-maximisation) whose spread shrinks from centimetres to the
+noise (graduated non-convexity), from several initial depths.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,64 +42,82 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Standard deviations of what the fit hears, and how it proceeds."""
+    """Tuned parameters of the box fit."""
 
     yaw_rad: float = param(
-        float(np.radians(1.5)), "rad", "standard deviation of the plane found, where glass leaves little of it"
+        float(np.radians(1.5)), "rad", "Standard deviation of the initial plane's yaw, where glass leaves little depth"
     )
-    front_m: float = param(0.008, "m", "the same of its place")
+    front_m: float = param(0.008, "m", "Standard deviation of the initial plane's position")
     side_m: float = param(
         0.008,
         "m",
-        "the same of the rectangle's left and right edge: of the clearest lines on the orthomosaic",
-        source="4 to 5 mm on the sample kitchens, 20 mm once of eight",
+        "Standard deviation of the rectangle's left and right edges, the clearest lines on the orthomosaic",
+        source="4 to 5 mm on the sample kitchens, 20 mm in one of eight",
     )
     top_m: float = param(
         0.025,
         "m",
-        "the same of its upper edge: a line of the door may be clearer",
-        source="39 mm once of eight on the sample kitchens",
+        "Standard deviation of the rectangle's upper edge: a line of the door may be clearer",
+        source="39 mm in one of eight on the sample kitchens",
     )
-    bottom_m: float = param(0.010, "m", "the same of its lower edge, which no photograph is asked for: it lies in shadow")
-    support_m: float = param(0.004, "m", "the same of the height of what it stands on")
-    end_m: float = param(0.005, "m", "the same of the left and right end of depth on the front")
+    bottom_m: float = param(
+        0.010, "m", "Standard deviation of the rectangle's lower edge, which photographs do not refine: it lies in shadow"
+    )
+    support_m: float = param(0.004, "m", "Standard deviation of the support's height")
+    end_m: float = param(0.005, "m", "Standard deviation of the left and right end of depth on the front")
     end_inset_m: float = param(
-        0.009, "m", "from where depth on a face ends to the edge", source="1 to 15 mm on six kitchens of both generators"
+        0.009,
+        "m",
+        "Distance from the end of depth on a face to its edge",
+        source="1 to 15 mm on six kitchens of both generators",
     )
-    wall_m: float = param(0.010, "m", "the same of the wall behind")
-    reach_m: float = param(0.04, "m", "the same of where its sides end in depth, which smears across the gap to the wall")
-    distance_m: float = param(1.5, "m", "of the cameras, at which the depth noise of the fused surface is taken")
-    kernel: float = param(2.0, "σ", "scale of the Cauchy kernel")
+    wall_m: float = param(0.010, "m", "Standard deviation of the wall behind")
+    reach_m: float = param(
+        0.04, "m", "Standard deviation of where its sides end in depth, which smears across the gap to the wall"
+    )
+    distance_m: float = param(1.5, "m", "Camera distance at which the depth noise of the fused surface is evaluated")
+    kernel: float = param(2.0, "σ", "Scale of the Cauchy kernel")
     spreads_m: tuple[float, ...] = param(
         (0.020, 0.010, 0.005, 0.003),
         "m",
-        "of an edge's candidates about it: from how far off the box may be thought to what poses err",
+        "Standard deviations of edge candidates per round of annealing: from the initial error of the box to the pose error",
     )
-    reach_spreads: float = param(2.5, "σ", "how far from an edge its candidates are looked for, in spreads")
-    apart_m: float = param(0.01, "m", "between depths that are looked at apart", source="half the widest spread")
-    rounds: int = param(3, "count", "of expectation and maximisation at each spread", ge=1)
+    reach_spreads: float = param(2.5, "σ", "Search distance of edge candidates, relative to that standard deviation")
+    apart_m: float = param(
+        0.01,
+        "m",
+        "Minimum difference between the depths of solutions that are refined separately",
+        source="half the widest spread",
+    )
+    rounds: int = param(3, "count", "Number of expectation-maximisation rounds at each spread", ge=1)
     independent: float = param(
-        4.0, "count", "photographs that err on their own about an edge: a line beside it misleads the others alike"
+        4.0,
+        "count",
+        "Maximum number of photographs that count as independent about an edge: a line beside it misleads all alike",
     )
-    photos: int = param(16, "count", "photographs asked", ge=1)
-    sure: float = param(0.5, "share", "of the spread of usual depths: a depth known that well was seen")
+    photos: int = param(16, "count", "Maximum number of photographs used", ge=1)
+    sure: float = param(
+        0.5,
+        "share",
+        "Maximum standard deviation of a depth, relative to the spread of usual depths, for it to count as observed",
+    )
 
 
 _USUAL = slice(7, 10)  # residuals of usual sizes, after those of the rectangle
-_STILL = 2e-4  # a step (rad, m) below which the box stands
+_STILL = 2e-4  # step (rad, m) below which the fit has converged
 _SCALE = np.array([0.02, 0.01, 0.01, 0.01, 0.02, 0.01, 0.01])  # of the parameters, for the solver's trust region
 
 
 class FittedBox(NamedTuple):
-    """An appliance's front with its depth, and how well its box is known."""
+    """An appliance's front with its depth, and the covariance of its box."""
 
     front: Front
     covariance: np.ndarray  # (7, 7) of x, y, z of the centre (world, m), yaw (rad), width, depth and height (m)
-    depth_seen: bool  # rather than usual for its kind
+    depth_seen: bool  # depth was observed, not the usual one of its category
 
 
 class Evidence(NamedTuple):
-    """What does not change during the fit; the front's frame."""
+    """Evidence that stays constant during the fit, in the front's frame."""
 
     start: np.ndarray
     kind: Category
@@ -110,7 +128,7 @@ class Evidence(NamedTuple):
 
 
 class _Edges(NamedTuple):
-    """Where the parts of edges should be in one photograph, and their weights (1/px)."""
+    """Target positions of edge parts in one photograph, and their weights (1/px)."""
 
     view: EdgeView
     target_px: np.ndarray
@@ -124,9 +142,9 @@ class Solution(NamedTuple):
 
 
 def fit_box(front: Front, scene: Scene, kind: Category, wall_m: float | None, *, photographs: bool = True) -> FittedBox:
-    """The box behind a front's rectangle, whose depth is a first guess; `wall_m` is how far behind it a wall stands.
+    """Box behind a front's rectangle, whose depth is an initial guess; `wall_m` is the distance of the wall behind it.
 
-    Without photographs, by depth alone: a first look.
+    Without photographs it uses depth alone, for a preview.
     """
     cell, cell_m, middle = front.cell, front.run.grid.cell_m, front_middle(front)
     world_from_front = Rigid3(front.run.grid.world_from_plane.rotation, middle)
@@ -154,7 +172,7 @@ def fit_box(front: Front, scene: Scene, kind: Category, wall_m: float | None, *,
 
 
 def solve(evidence: Evidence, photos: Sequence[Photo], world_from_front: Rigid3) -> Solution:
-    """The best box from several depths; of its sides where the wide spread led and where the rectangle had them."""
+    """Best box from several initial depths; its sides start from the wide spread's result and from the rectangle."""
     params = tuned(Params)
 
     def annealed(box: np.ndarray, spreads_m: Sequence[float]) -> Solution:
@@ -163,7 +181,7 @@ def solve(evidence: Evidence, photos: Sequence[Photo], world_from_front: Rigid3)
     if not photos:  # no edge whose spread could shrink
         return min((annealed(start, params.spreads_m[:1]) for start in _starts(evidence)), key=_cost)
     coarse = sorted((annealed(start, params.spreads_m[:1]) for start in _starts(evidence)), key=_cost)
-    # At the widest spread the shadow behind it and its own back are one edge: the likeliest of each depth goes on.
+    # At the widest spread its own back and the shadow behind it are one edge: the likeliest solution per depth is refined.
     fine = min((annealed(found.box, params.spreads_m[1:]) for found in _apart(coarse, params.apart_m)), key=_cost)
     found = evidence.start[[LEFT, RIGHT]], _depth_sides(evidence.patches, fine.box)
     restarts = [np.concatenate([fine.box[:LEFT], sides, fine.box[FRONT:]]) for sides in found]
@@ -178,7 +196,7 @@ def _depth_sides(patches: Patches, box: np.ndarray) -> np.ndarray:
 
 
 def _apart(solutions: Sequence[Solution], apart_m: float) -> list[Solution]:
-    """The first of the solutions whose backs are this near to each other."""
+    """First of the solutions whose backs lie within `apart_m` of each other."""
     kept: list[Solution] = []
     for solution in solutions:
         if all(abs(solution.box[BACK] - other.box[BACK]) > apart_m for other in kept):
@@ -191,7 +209,7 @@ def _cost(solution: Solution) -> float:
 
 
 def _starts(evidence: Evidence) -> list[np.ndarray]:
-    """The box with each of several depths that its kind may have before the wall."""
+    """Initial boxes with several depths possible for the category in front of the wall."""
     size, first = evidence.kind.depth, float(evidence.start[BACK])
     farthest = size.high if evidence.wall_m is None else evidence.wall_m
     others = [(size.low + size.usual) / 2, (size.usual + size.high) / 2, evidence.patches.reach_m]
@@ -206,7 +224,7 @@ def _annealed(
     box: np.ndarray,
     spreads_m: Sequence[float],
 ) -> Solution:
-    """The box after expectation-maximisation at each spread in turn."""
+    """Box after expectation-maximisation at each spread in turn."""
     params = tuned(Params)
     from scipy.optimize import least_squares
 
@@ -233,14 +251,14 @@ def _annealed(
 
 
 def _loss(count: int) -> Callable[[np.ndarray], np.ndarray]:
-    """Cauchy kernel of that many residuals; the first ones, priors, are squared."""
+    """Cauchy loss of `count` residuals; those of usual sizes are purely quadratic."""
     scale = np.full(count, tuned(Params).kernel)
     scale[_USUAL] = np.inf
     return cauchy_loss(scale)
 
 
 def _residuals(box: np.ndarray, evidence: Evidence, edges: Sequence[_Edges]) -> np.ndarray:
-    """All evidence over its standard deviations."""
+    """All residuals divided by their standard deviations."""
     params = tuned(Params)
     _, left, right, front, back, bottom, top = box
     thought = [params.yaw_rad, params.side_m, params.side_m, params.front_m, np.inf, params.bottom_m, params.top_m]
@@ -275,13 +293,13 @@ def _residuals(box: np.ndarray, evidence: Evidence, edges: Sequence[_Edges]) -> 
 
 
 def _possible(box: np.ndarray, start: np.ndarray) -> bool:
-    """Whether the fit kept at least half the rectangle and a depth."""
+    """Whether the fit kept at least half the rectangle and a positive depth."""
     width, height = box[RIGHT] - box[LEFT], box[TOP] - box[BOTTOM]
     return bool(width > start[RIGHT] and height > start[TOP] and box[BACK] - box[FRONT] > 0.05 and np.isfinite(box).all())
 
 
 def _fitted_front(front: Front, box: np.ndarray) -> Front:
-    """The front turned about the upright axis through its middle, moved and with its edges where the box has them."""
+    """Front rotated about the vertical axis through its centre, moved, and with its edges at the box's."""
     middle, run, cell, cell_m = front_middle(front), front.run, front.cell, front.run.grid.cell_m
     column, row = (cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2
     moved = Cell(column + box[LEFT] / cell_m, row - box[TOP] / cell_m, column + box[RIGHT] / cell_m, row - box[BOTTOM] / cell_m)
@@ -296,7 +314,7 @@ def _fitted_front(front: Front, box: np.ndarray) -> Front:
 
 
 def covariance_of(solution: Solution, world_from_front: Rigid3) -> np.ndarray:
-    """(7, 7) of the box's centre in the world, its yaw, width, depth and height."""
+    """Covariance (7, 7) of the box's centre in the world, its yaw, width, depth and height."""
     box = solution.box
     middle = np.array([box[LEFT] + box[RIGHT], box[FRONT] + box[BACK], box[BOTTOM] + box[TOP]]) / 2
     turned = world_from_front.rotation @ rotation_about_z(float(box[YAW]))

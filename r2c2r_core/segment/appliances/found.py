@@ -1,4 +1,4 @@
-"""An appliance that clicks found: its box, and the mask of that box in any frame."""
+"""A clicked appliance: its box, and the mask of that box in any frame."""
 
 from dataclasses import dataclass, field
 
@@ -19,14 +19,16 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How well an appliance's borders are known."""
+    """Tuned parameters of the masks' confidence."""
 
-    border_m: float = param(0.009, "m", "how far borders are off", source="measured on samples and the real kitchen")
+    border_m: float = param(
+        0.009, "m", "Usual position error of a mask's border", source="measured on samples and the real kitchen"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundAppliance:
-    """A box with a front: refrigerator, microwave."""
+    """A segmented box with a front: refrigerator, microwave."""
 
     front: Front
     scene: Scene
@@ -42,7 +44,7 @@ class FoundAppliance:
         )
 
     def see(self, frame: Frame) -> View:
-        """Its pixels: its box, and its doors where they stand open."""
+        """Visible pixels of the box and of its doors where they stand open, with their confidence."""
         mask, share = appliance_mask(self.front, self.scene, frame)
         for opened in self._leaves.open_in(frame.index):
             mask = mask | open_mask(opened, self.scene, frame)[0]
@@ -50,13 +52,13 @@ class FoundAppliance:
         return View(mask, expected_iou(mask, share, frame, corners, tuned(Params).border_m))
 
     def panel(self) -> FrontPanel | None:
-        """The rectangle of its front and its handle."""
+        """Front rectangle with its handle."""
         return front_panel(self.front)
 
     def motions(self) -> tuple[JointMotion, ...]:
-        """How its doors were filmed to move."""
+        """Joint motions of its doors in the recording."""
         return self._leaves.motions
 
     def box(self) -> ThingBox | None:
-        """The front extruded backwards."""
+        """Box of the front extruded backwards."""
         return appliance_box(self.front)

@@ -1,4 +1,4 @@
-"""Where depth looks past the plane of a front: no part of an appliance is there, whatever lines a shadow or a tile draws."""
+"""See-through depth at a front's plane: no appliance lies there, in spite of lines from shadows or tiles."""
 
 from dataclasses import dataclass
 
@@ -16,19 +16,23 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which depth has passed a plane."""
+    """Tuned parameters of see-through depth."""
 
-    frames: int = param(8, "count", "that are asked: a click waits for them", ge=1)
-    spacing_m: float = param(0.02, "m", "between the places that are asked", gt=0)
-    behind_m: float = param(0.06, "m", "behind the plane, beyond the noise, from where the sensor looked past it")
-    below_m: float = param(0.01, "m", "under the floor, from where nothing stands: beyond what the floor's height errs by")
-    share: float = param(0.5, "share", "of the frames that know a place, which must have looked past it", gt=0, lt=1)
+    frames: int = param(8, "count", "Maximum number of frames checked: a click waits for them", ge=1)
+    spacing_m: float = param(0.02, "m", "Distance between the places checked", gt=0)
+    behind_m: float = param(
+        0.06, "m", "Minimum distance of depth behind the plane, beyond the noise, for the sensor to have looked past it"
+    )
+    below_m: float = param(
+        0.01, "m", "Minimum distance under the floor at which nothing can stand: beyond the error of the floor's height"
+    )
+    share: float = param(0.5, "share", "Minimum fraction of the frames observing a place that must look past it", gt=0, lt=1)
 
 
 def looked_past(run: Run, scene: Scene, click: np.ndarray, kind: Category) -> Mask:
-    """Which cells of the run's grid, as far around a click (column, row) as such an appliance reaches, depth looks past.
+    """Mask of the grid cells that depth looks past, as far around a click (column, row) as such an appliance extends.
 
-    Where the floor is known, those under it count as such.
+    Where the floor is known, cells under it count as looked past.
     """
     params, grid = tuned(Params), run.grid
     step = max(1, round(params.spacing_m / grid.cell_m))

@@ -1,4 +1,4 @@
-"""Where an appliance's doors may end above a drawer: level lines of its run across its front."""
+"""Seams between an appliance's doors and a drawer below: level lines of its run across its front."""
 
 from dataclasses import dataclass
 
@@ -8,16 +8,19 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where such a line may lie."""
+    """Tuned parameters of drawer seams."""
 
     share: tuple[float, float] = param(
-        (0.15, 0.6), "share", "of a front's height that a drawer below takes", source="makers: freezer drawers of 0.4-0.8 m"
+        (0.15, 0.6),
+        "share",
+        "Minimum and maximum fraction of a front's height that a drawer below takes",
+        source="makers: freezer drawers of 0.4-0.8 m",
     )
-    same_m: float = param(0.02, "m", "between lines that are one seam")
+    same_m: float = param(0.02, "m", "Maximum distance between lines that are one seam")
 
 
 def drawer_seams(front: Front) -> tuple[float, ...]:
-    """Heights over the front's middle (m), the likeliest first."""
+    """Heights of the seams above the front's centre (m), the likeliest first."""
     params = tuned(Params)
     run, cell = front.run, front.cell
     cell_m = run.grid.cell_m
