@@ -1,4 +1,4 @@
-"""How likely a front's edges are where they were found: a logistic model on what its run shows of them."""
+"""Logistic model of the probability that a front's edges are where they were found, from the evidence on its run."""
 
 from dataclasses import dataclass
 
@@ -16,25 +16,29 @@ _FITTED = "fitted on 34 development kitchens of five makers: benchmarks/front_ce
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What is looked at, and what it says for an edge."""
+    """Tuned parameters (features and weights) of the logistic model."""
 
-    faintest: float = param(0.1, "share", "of an edge, where it is the least likely one")
-    nearest_m: float = param(0.012, "m", "inside an edge, from where another line is a rival", gt=0)
-    farthest_m: float = param(0.045, "m", "inside an edge, up to where it is", gt=0, source="frames are 2-5 cm wide")
-    faint: float = param(0.41, "ratio", "of log-odds, to those of its faintest part", source=_FITTED)
-    contrast: float = param(0.42, "ratio", "to the logarithm of how far colours change at it", source=_FITTED)
-    rival: float = param(-0.48, "ratio", "to the log-odds of the likeliest line inside it, where that is one", source=_FITTED)
-    front: float = param(1.31, "ratio", "to the mean log-odds of being on a front", source=_FITTED)
-    offset: float = param(-3.52, "log", "that log-odds are worth more", source=_FITTED)
+    faintest: float = param(0.1, "share", "Quantile of the log-odds along an edge that stands for its faintest part")
+    nearest_m: float = param(0.012, "m", "Minimum distance inside an edge of a rival line", gt=0)
+    farthest_m: float = param(
+        0.045, "m", "Maximum distance inside an edge of a rival line", gt=0, source="frames are 2-5 cm wide"
+    )
+    faint: float = param(0.41, "ratio", "Weight of the log-odds of the edge's faintest part", source=_FITTED)
+    contrast: float = param(0.42, "ratio", "Weight of the logarithm of the colour change at the edge", source=_FITTED)
+    rival: float = param(
+        -0.48, "ratio", "Weight of the log-odds of the likeliest line inside the edge, where positive", source=_FITTED
+    )
+    front: float = param(1.31, "ratio", "Weight of the mean log-odds of being on a front", source=_FITTED)
+    offset: float = param(-3.52, "log", "Constant term of the log-odds", source=_FITTED)
 
 
 def edges_right(run: Run, cell: Cell) -> float:
-    """The probability that all edges of a rectangle are within 10 mm of a front's."""
+    """Probability that all edges of a rectangle are within 10 mm of a front's."""
     return float(np.prod([probability(float(odds)) for odds in evidence(run, cell) @ _weights()]))
 
 
 def evidence(run: Run, cell: Cell) -> np.ndarray:
-    """What is seen of each edge, left, right, upper and lower: (4, 5), in the order of the model's numbers, the last one 1."""
+    """Features of each edge (left, right, upper, lower): (4, 5), in the order of the model's weights; the last one is 1."""
     params, field, rows = tuned(Params), LineField(run.odds, run.grid.cell_m), []
     on_front = _mean_odds(run, cell)
     changes = edge_changes(run.mosaic, cell)
@@ -53,7 +57,7 @@ def _weights() -> np.ndarray:
 
 
 def _mean_odds(run: Run, cell: Cell) -> float:
-    """Of being on a front, over a rectangle."""
+    """Mean log-odds of being on a front, over a rectangle."""
     (left, right), (top, bottom) = ((max(round(end / STEP), 0) for end in across(cell, axis)) for axis in (0, 1))
     odds = run.odds.front[top : max(bottom, top + 1), left : max(right, left + 1)]
     return float(odds.mean()) if odds.size else 0.0

@@ -1,4 +1,4 @@
-"""A click on a front that returns no light, taken to the plane of what is round it: black glass has no depth."""
+"""Clicks on a front without depth (black glass), projected onto the plane of the depth around the hole."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,29 +17,33 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a hole in the depth is a front's."""
+    """Tuned parameters of holes in the depth that belong to a front."""
 
-    off_m: float = param(0.03, "m", "off a plane, within which what is round a hole is on it")
+    off_m: float = param(0.03, "m", "Maximum distance from a plane of depth around a hole that lies on it")
     least_share: float = param(
-        0.2, "share", "of what is round a hole, that must be on the plane: a front has neighbours on two sides"
+        0.2,
+        "share",
+        "Minimum fraction of the depth around a hole that must lie on the plane: a front has neighbours on two sides",
     )
     reach_m: float = param(
-        0.6, "m", "from what was seen of a plane to a click: the middle of the widest oven", source="ovens: 60-90 cm"
+        0.6, "m", "Maximum distance from a plane's observed part to a click: half the widest oven", source="ovens: 60-90 cm"
     )
     dark_m: tuple[float, float, float] = param(
         (0.05, 0.1, 0.15),
         "m",
-        "beyond a plane's border, where it goes on as black glass if none of them has depth",
+        "Distances beyond a plane's border that must all lack depth for black glass to continue there",
         source="phones' depth ends 1-3 cm short of an edge; ovens are 0.6 m",
     )
-    margin_step_m: float = param(0.1, "m", "of margins beyond such a border: clicks nearby ask for the same run", gt=0)
+    margin_step_m: float = param(
+        0.1, "m", "Step to which margins beyond such a border are rounded up: clicks nearby share one run", gt=0
+    )
 
 
 def dark_place(scene: Scene, planes: Sequence[PlaneRegion], click: PromptPoint) -> Vector3 | None:
-    """Where a click (world) meets the plane that most of the depth round it lies on; None where it has depth, or none does.
+    """Intersection (world) of a click with the plane of most depth around it; None where it has depth, or no plane fits.
 
-    The surface fused from other frames tells nothing there: through a hole in it one sees what is behind. Black glass parts
-    the plane of what is above it from that of what is below: the depth of both is round it.
+    The surface fused from other frames is no help there: a hole in it shows what is behind. Black glass separates the
+    plane of the fronts above it from that of the fronts below; the depth of both surrounds the hole.
     """
     rim = find_rim(scene.frame(click.frame), scene.depth(click.frame), click.x, click.y)
     if rim is None or scene.depth_at_step(click.frame, click.x, click.y) is not None:
@@ -58,9 +62,9 @@ def dark_place(scene: Scene, planes: Sequence[PlaneRegion], click: PromptPoint) 
 
 
 def dark_beyond(scene: Scene, region: PlaneRegion, click: PromptPoint, point: Vector3, kind: Category) -> float:
-    """How far the front may reach beyond a border of its plane beside which the clicked frame has no depth.
+    """Distance that the front may extend beyond a border of its plane where the clicked frame lacks depth.
 
-    There black glass may go on: in a tall unit it parts the plane of the fronts above from that of those below.
+    Black glass may continue there: in a tall unit it separates the plane of the fronts above from that of those below.
     """
     params, frame = tuned(Params), scene.frame(click.frame)
     local, reach = region.world_from_plane.inverse.apply(point), 0.0
@@ -76,7 +80,7 @@ def dark_beyond(scene: Scene, region: PlaneRegion, click: PromptPoint, point: Ve
 
 
 def _is_dark(scene: Scene, frame_index: int, x_px: float, y_px: float) -> bool:
-    """Whether a pixel is in the picture, and the sensor measured nothing there."""
+    """Whether a pixel lies in the image and has no depth."""
     camera = scene.frame(frame_index).rgb_camera
     inside = 0 <= x_px < camera.width and 0 <= y_px < camera.height
     return inside and not scene.has_depth(frame_index, x_px, y_px)

@@ -1,4 +1,4 @@
-"""A click on a front that stands open in its frame, taken back to where that front is closed."""
+"""Clicks on a front that stands open in the clicked frame, mapped back to where that front is closed."""
 
 from dataclasses import dataclass
 
@@ -20,29 +20,43 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a click is on something that moved."""
+    """Tuned parameters of clicks on moved fronts."""
 
-    past_share: float = param(0.25, "share", "of the frames that look there, that must look past what was clicked")
-    least_frames: int = param(3, "count", "frames that must look past it", ge=1)
-    past_m: float = param(0.06, "m", "behind it, from where they do")
-    reach_m: float = param(1.0, "m", "from a click to the middle of a front that may have been swung or drawn there")
-    least_m: float = param(0.1, "m", "side of a leaf: what is narrower is a frame's", source="makers' narrowest fronts: 150 mm")
-    off_m: float = param(0.03, "m", "of a click off a leaf in one of the states that are tried")
-    gain: float = param(20.0, "log", "by which the clicked frame must show the leaf there rather than in its place")
-    near_steps: int = param(2, "count", "of states beside the likeliest under a click, that are as good as it", ge=0)
-    least: float = param(7.0, "log", "that it must show the leaf there at all: the rest may be that its place is empty")
-    row: float = param(
-        1.5, "ratio", "of a plane's width or height to a leaf's, from which others than that leaf are closed in it"
+    past_share: float = param(
+        0.25, "share", "Minimum fraction of the frames observing the click that must look past the clicked surface"
     )
-    unknown: float = param(0.1, "share", "of the frames of which nothing is known: hands, gloss, a place of the camera's own")
+    least_frames: int = param(3, "count", "Minimum number of frames that must look past it", ge=1)
+    past_m: float = param(0.06, "m", "Minimum distance of depth behind the clicked surface for a frame to look past it")
+    reach_m: float = param(
+        1.0, "m", "Maximum distance from a click to the centre of a front that may have been opened to there"
+    )
+    least_m: float = param(
+        0.1, "m", "Minimum side of a leaf: narrower panels belong to a frame", source="makers' narrowest fronts: 150 mm"
+    )
+    off_m: float = param(0.03, "m", "Maximum distance of a click from a leaf in one of the tested states")
+    gain: float = param(20.0, "log", "Minimum log-likelihood ratio of the open over the closed leaf in the clicked frame")
+    near_steps: int = param(
+        2, "count", "Number of states beside the likeliest one under a click that do not count as rivals", ge=0
+    )
+    least: float = param(
+        7.0,
+        "log",
+        "Minimum log-likelihood ratio of the open leaf over rival states and over unknown: the rest may be its empty place",
+    )
+    row: float = param(
+        1.5,
+        "ratio",
+        "Ratio of a plane's width or height to a leaf's above which the plane has more closed fronts than that leaf",
+    )
+    unknown: float = param(0.1, "share", "Fraction of frames that carry no information: hands, gloss, wrong camera pose")
 
 
 def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int) -> Vector3:
-    """Where a clicked point (world) of an open front lies when it is closed; the point itself where nothing moved there.
+    """Closed position of a clicked point (world) on an open front; the point itself where nothing moved there.
 
-    What a front uncovers, the sides and the back of its unit, are boards too, a drawer held open is one in the room, and a
-    front may be filmed open for longer than closed: all frames weigh whether what was clicked was opened there by a leaf near
-    it, or is closed there and was opened itself, or never moved.
+    An open front uncovers the sides and back of its unit, which are boards too; an open drawer looks like one outside; and a
+    front may be filmed open for longer than closed. So all frames together weigh three cases: a nearby leaf was opened to the
+    click, the click is on a closed leaf that was opened itself, or nothing moved.
     """
     params, scene = tuned(Params), prepared.scene
     if not _moved(point, scene):
@@ -68,7 +82,7 @@ def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int) ->
 
 
 def _moved(point: Vector3, scene: Scene) -> bool:
-    """Whether many frames that look there look past it."""
+    """Whether enough of the frames observing a point look past it."""
     params = tuned(Params)
     past = there = 0
     for frame in scene.frames:
@@ -79,7 +93,7 @@ def _moved(point: Vector3, scene: Scene) -> bool:
 
 
 def _leaves_near(prepared: PreparedCapture, point: Vector3) -> list[Leaf]:
-    """The panels of the runs that it stands before or on."""
+    """Panels of the runs within reach that a point lies on or in front of."""
     found = []
     for region in prepared.planes:
         local = region.world_from_plane.inverse.apply(point)
@@ -100,7 +114,7 @@ def _holds(leaf: Leaf, point: Vector3) -> bool:
 
 
 def _in_a_row(prepared: PreparedCapture, point: Vector3, leaf: Leaf) -> bool:
-    """Whether what was clicked lies flush with more than a leaf: fronts stand in a row where they are closed."""
+    """Whether the clicked point lies on a plane larger than a leaf: closed fronts stand in a row."""
     row = tuned(Params).row
     return any(
         region.width_m > row * leaf.width_m or region.height_m > row * leaf.height_m
@@ -109,24 +123,24 @@ def _in_a_row(prepared: PreparedCapture, point: Vector3, leaf: Leaf) -> bool:
 
 
 def _ways(leaf: Leaf) -> list[Hypothesis]:
-    """The joints that take a leaf out of its plane."""
+    """Joint hypotheses that move a leaf out of its plane."""
     return [each for each in hypotheses(leaf) if not each.lateral]
 
 
 def _in_all(leaf: Leaf, hypothesis: Hypothesis, scene: Scene) -> np.ndarray:
-    """Of each frame and state (frames, states) how much likelier it is than that nothing is known there, as a logarithm."""
+    """Log-likelihood ratios (frames, states) of each state to an unknown one, with an outlier fraction."""
     states, unknown = lay_out(leaf, hypothesis), tuned(Params).unknown
     log = np.stack([evidence(states, scene, frame) for frame in scene.frames])
     return np.logaddexp(np.log(unknown), np.log1p(-unknown) + log)
 
 
 def _opens_by(log: np.ndarray) -> float:
-    """How much likelier all frames make it that a leaf was opened by a joint than that it never moved."""
+    """Log-likelihood ratio over all frames of a leaf opened by a joint to a leaf that never moved."""
     return float((log.max(axis=1) - log[:, 0]).sum())
 
 
 def _is_free(log: np.ndarray, state: int) -> bool:
-    """Whether nothing stands where a leaf is in a state, in the frames that show it closed: another front would."""
+    """Whether the space of an open state is empty in the frames that show the leaf closed: another front would fill it."""
     closed = log.argmax(axis=1) == 0
     return bool(log[closed, state].sum() < 0)
 
@@ -134,10 +148,10 @@ def _is_free(log: np.ndarray, state: int) -> bool:
 def _as_opened(
     leaf: Leaf, hypothesis: Hypothesis, point: Vector3, scene: Scene, frame: Frame
 ) -> tuple[float, float, float, int, Vector3]:
-    """How likely the likeliest state that brings the leaf under a click is, any other, and the closed one; that state; and the
+    """Log-likelihoods in one frame of the best state under a click, the best rival and the closed one; that state; and the
     click where the leaf is closed.
 
-    By one frame, as logarithms, to knowing nothing of what stands there.
+    The log-likelihoods are relative to nothing being known there.
     """
     front = leaf.world_from_front.inverse.apply(point[None])
     local = np.concatenate([hypothesis.pose(float(state)).inverse.apply(front) for state in hypothesis.states])

@@ -1,4 +1,4 @@
-"""A front as a person drew it: its rectangle as it is, its picture for the handle and the frames' pose errors; no cut."""
+"""Front from a rectangle drawn by a person: its edges are kept; mosaics give the handle and the frames' pose errors."""
 
 from dataclasses import dataclass, replace
 
@@ -20,12 +20,12 @@ from r2c2r_core.segment.protocol import SegmentConfig
 from r2c2r_core.segment.runs.run import Run, run_on
 from r2c2r_core.segment.scene import Scene
 
-_AROUND_M = 0.08  # of the plane that is looked at beside it: its neighbours' lines tell the frames' pose errors
+_AROUND_M = 0.08  # margin around the rectangle: its neighbours' lines show the frames' pose errors
 _SUPPORT_M = 0.02  # side of the region's cells
 
 
 def drawn_front(drawn: DrawnFront, scene: Scene, config: SegmentConfig) -> Front:
-    """The drawn rectangle on a grid of its own; `depth_m` is not known here. Raises ObjectNotSeen where no frame sees it."""
+    """Drawn rectangle on a grid of its own; `depth_m` is not known here. Raises ObjectNotSeen where no frame sees it."""
     corners = scene.capture.world_from_capture.apply(np.array(drawn.corners_capture))
     grid, cell = _grid_around(corners, config.cell_m)
     run = _run_of(grid, cell, scene, config.mosaic_frames)
@@ -35,15 +35,15 @@ def drawn_front(drawn: DrawnFront, scene: Scene, config: SegmentConfig) -> Front
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundDrawn(FoundFront):
-    """A furniture front whose rectangle a person drew."""
+    """A furniture front whose rectangle was drawn by a person."""
 
     def panel(self) -> FrontPanel | None:
-        """The rectangle, sure as it is said, and its handle."""
+        """Drawn rectangle, with full confidence, and its handle."""
         return replace(front_panel(self.front), confidence=1.0)
 
 
 def _grid_around(corners_world: Points, cell_m: float) -> tuple[PlaneGrid, Cell]:
-    """A grid whose axes are the rectangle's edges, and the rectangle on it."""
+    """Grid whose axes are the rectangle's edges, and the rectangle on it."""
     across, up = corners_world[1] - corners_world[0], corners_world[0] - corners_world[3]
     width_m, height_m = float(np.linalg.norm(across)), float(np.linalg.norm(up))
     right = across / width_m
@@ -64,7 +64,7 @@ def _grid_around(corners_world: Points, cell_m: float) -> tuple[PlaneGrid, Cell]
 
 
 def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
-    """What `make_run` gives, of one known panel."""
+    """Run of one known panel, as `make_run` builds it."""
     region = _region(grid, cell)
     chosen = choose_frames(frame_quality(grid, region, scene), scene, frame_count)
     tiles = [tile for index in chosen if (tile := make_tile(grid, scene, index)) is not None]
@@ -80,7 +80,7 @@ def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
 
 
 def _region(grid: PlaneGrid, cell: Cell) -> PlaneRegion:
-    """The rectangle as a plane that was seen all over, its axes level."""
+    """Rectangle as a plane observed everywhere, with level axes."""
     width_m, height_m = cell.width * grid.cell_m, cell.height * grid.cell_m
     rows, columns = (max(round(side / _SUPPORT_M), 1) for side in (height_m, width_m))
     return PlaneRegion(
@@ -94,7 +94,7 @@ def _region(grid: PlaneGrid, cell: Cell) -> PlaneRegion:
 
 
 def _handle_on(handle: DrawnHandle | str, cell: Cell, cell_m: float) -> GridHandle | None:
-    """The drawn handle on the grid; None where the person said that there is none."""
+    """Drawn handle on the grid; None where the person marked that there is none."""
     if not isinstance(handle, DrawnHandle):
         return None
     column, row = (cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2

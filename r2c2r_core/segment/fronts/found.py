@@ -1,4 +1,4 @@
-"""A front that clicks found: its rectangle, and its mask in any frame, where its leaves stand there."""
+"""A clicked front: its rectangle, and its mask in any frame at the leaves' pose there."""
 
 from dataclasses import dataclass, field, replace
 
@@ -21,14 +21,16 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How well a front's borders are known."""
+    """Tuned parameters of the masks' confidence."""
 
-    border_m: float = param(0.006, "m", "how far borders are off", source="measured on samples and the real kitchen")
+    border_m: float = param(
+        0.006, "m", "Usual position error of a mask's border", source="measured on samples and the real kitchen"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundFront:
-    """A furniture front."""
+    """A segmented furniture front."""
 
     front: Front
     scene: Scene
@@ -43,7 +45,7 @@ class FoundFront:
         object.__setattr__(self, "_leaves", FilmedLeaves(front_leaf(self.front), self.category, self.scene, self.front.depth_m))
 
     def see(self, frame: Frame) -> View:
-        """Its pixels where its leaves stand in the frame."""
+        """Visible pixels of the front at its leaves' pose in the frame, with their confidence."""
         opened = self._leaves.open_in(frame.index)
         if opened:
             return self._opened(opened, frame)
@@ -52,7 +54,7 @@ class FoundFront:
         return View(mask, expected_iou(mask, share, frame, corners, tuned(Params).border_m, self.fit))
 
     def _opened(self, opened: tuple[OpenLeaf, ...], frame: Frame) -> View:
-        """Its open leaves, and those of a pair that stay closed."""
+        """Mask of its open leaves, and of those of a pair that stay closed."""
         parts = [open_mask(one, self.scene, frame) for one in opened]
         corners = [one.world_from_leaf.apply(leaf_corners(one.leaf)) for one in opened]
         for leaf in self._leaves.closed_in(frame.index):
@@ -63,13 +65,13 @@ class FoundFront:
         return View(mask, expected_iou(mask, share, frame, np.concatenate(corners), tuned(Params).border_m, self.fit))
 
     def panel(self) -> FrontPanel | None:
-        """The rectangle and its handle."""
+        """Front rectangle with its handle."""
         return replace(front_panel(self.front), slides=self.slides)
 
     def motions(self) -> tuple[JointMotion, ...]:
-        """How its leaves were filmed to move."""
+        """Joint motions of its leaves in the recording."""
         return self._leaves.motions
 
     def box(self) -> ThingBox | None:
-        """Fronts are built into something: no box of their own."""
+        """None: built-in fronts have no box of their own."""
         return None

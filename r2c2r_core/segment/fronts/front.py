@@ -1,4 +1,4 @@
-"""The panel under the clicks as a metric rectangle on its run's plane, and its mask in every frame by reprojection."""
+"""The clicked panel as a metric rectangle on its run's plane, and its mask in every frame by reprojection."""
 
 from dataclasses import dataclass, replace
 
@@ -35,47 +35,51 @@ NOWHERE = np.zeros((0, 3))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which panel clicks mean."""
+    """Tuned parameters of the panel choice and of the carcass sides."""
 
     usual_protrusion_m: float = param(
-        0.035, "m", "of a handle whose relief tells nothing", source="bar handles stand out 25-40 mm"
+        0.035, "m", "Protrusion of a handle without relief", source="bar handles protrude by 25-40 mm"
     )
-    handle_share: float = param(0.35, "share", "of a panel that its handle may cover: more is its frame")
+    handle_share: float = param(0.35, "share", "Maximum fraction of a panel that its handle may cover: more is its frame")
     pair_width_share: float = param(
-        0.08, "share", "by which the two doors of a pair may differ in width: they are equally wide"
+        0.08, "share", "Maximum relative difference in width of the two doors of a pair: they are equally wide"
     )
     met_width_share: float = param(
-        0.2, "share", "by which they may differ where their handles meet: a cell may hold the gap beside its door"
+        0.2, "share", "Maximum relative difference where their handles meet: a cell may include the gap beside its door"
     )
-    handles_meet: float = param(0.5, "score", "of a pair whose handles meet")
-    supported_share: float = param(0.25, "share", "of a column or row of cells, for it to belong to the panel")
+    handles_meet: float = param(0.5, "score", "Minimum pair score of doors whose handles meet")
+    supported_share: float = param(
+        0.25, "share", "Minimum observed fraction of a row or column, relative to the panel's, for it to belong to the panel"
+    )
     off_plane_m: float = param(
-        0.06, "m", "off the plane, within which a click is on the panel", source="handles stand out by up to 5 cm"
+        0.06, "m", "Maximum distance from the plane of a click on the panel", source="handles protrude by up to 5 cm"
     )
-    confirm_m: float = param(0.03, "m", "off a side of the carcass beyond the noise, within which depth confirms it")
-    far_before_m: float = param(0.30, "m", "before a side: what hides it from so far tells nothing of it")
-    side_samples: int = param(200, "count", "points of a side that frames must see, for it to be known", ge=1)
-    side_share: float = param(0.5, "share", "of them that depth must confirm")
-    side_inset_m: float = param(0.10, "m", "behind the front, from where a side is asked for: nearer ones are its edge")
-    steady_m: float = param(0.012, "m", "clicks this near a border are within pose error of it")
-    border_m: float = param(0.035, "m", "clicks this near a border correct it: no panel is so narrow")
+    confirm_m: float = param(0.03, "m", "Maximum distance of depth from a side of the carcass, beyond the noise, to confirm it")
+    far_before_m: float = param(
+        0.30, "m", "Distance in front of a side beyond which occluders are ignored as no evidence about it"
+    )
+    side_samples: int = param(200, "count", "Minimum number of observed points of a side for it to be known", ge=1)
+    side_share: float = param(0.5, "share", "Minimum fraction of those points that depth must confirm")
+    side_inset_m: float = param(0.10, "m", "Minimum distance behind the front of side samples: nearer ones are its edge")
+    steady_m: float = param(0.012, "m", "Maximum distance from a border of clicks that are within its pose error")
+    border_m: float = param(0.035, "m", "Maximum distance from a border of clicks that correct it: no panel is so narrow")
     edge_lab: float = param(
         3.0,
         "grey",
-        "CIELAB units that colours change by at an edge, below which it does not show",
+        "Minimum CIELAB colour change at an edge for it to be visible",
         gt=0,
         source="development kitchens of both generators: of 6 edges below it none was within 10 mm, of 1246 above it 97 %",
     )
     unseen_edge: float = param(
         0.125,
         "share",
-        "of certainty of an edge that does not show, at most",
+        "Maximum probability of an edge that is not visible",
         ge=0,
         le=1,
-        source="likewise: none of 6, with Laplace's rule of succession",
+        source="same kitchens: none of 6, with Laplace's rule of succession",
     )
     hull_share: float = param(
-        1.3, "ratio", "two panels whose rectangle is larger than this times theirs do not belong together"
+        1.3, "ratio", "Maximum area of two panels' joint rectangle, relative to their own, for them to belong together"
     )
 
 
@@ -93,9 +97,9 @@ class Front:
 def find_front(
     run: Run, positives: Points, negatives: Points, *, pair: bool, kind: Category | None = None, others: Points = NOWHERE
 ) -> Front | None:
-    """The panel under the clicks (world points, the first one leads); None when that one misses the run's panels.
+    """Panel under the clicks (world points; the first one decides); None when the first misses the run's panels.
 
-    `pair` joins the two doors of a cabinet, `kind` says what was clicked; `others` are clicks on other objects.
+    `pair` joins the two doors of a cabinet, `kind` is the clicked category; `others` are clicks on other objects.
     """
     on, off = run.grid.cells_of(near_plane(run.grid, positives)), run.grid.cells_of(near_plane(run.grid, negatives))
     first = _clicked(run, float(on[0, 0]), float(on[0, 1]), kind) if len(on) else None
@@ -123,7 +127,7 @@ def find_front(
 
 
 def own_handle(handle: GridHandle | None, panel: Cell) -> GridHandle | None:
-    """As much of a handle as lies on a panel; None for a neighbour's, and for what covers it: a raised frame."""
+    """Part of a handle that lies on a panel; None for a neighbour's handle, and for a raised frame, which covers too much."""
     if handle is None or not panel.contains((handle.left + handle.right) / 2, (handle.top + handle.bottom) / 2):
         return None
     left, right = max(handle.left, panel.left), min(handle.right, panel.right)
@@ -134,7 +138,7 @@ def own_handle(handle: GridHandle | None, panel: Cell) -> GridHandle | None:
 
 
 def front_panel(front: Front) -> FrontPanel:
-    """The measured rectangle in the `front` frame."""
+    """Measured rectangle in the `front` frame."""
     grid, cell = front.run.grid, front.cell
     centre = front_middle(front)
     rotation = front.run.region.world_from_plane.rotation
@@ -155,13 +159,13 @@ def front_panel(front: Front) -> FrontPanel:
 
 
 def front_leaf(front: Front) -> Leaf:
-    """The measured rectangle alone, as what may have been filmed to move."""
+    """Measured rectangle as a rigid leaf, for motion analysis."""
     pose, cell_m = Rigid3(front.run.region.world_from_plane.rotation, front_middle(front)), front.run.grid.cell_m
     return Leaf(world_from_front=pose, width_m=front.cell.width * cell_m, height_m=front.cell.height * cell_m)
 
 
 def front_mask(front: Front, scene: Scene, frame: Frame, part: Points | None = None) -> tuple[Mask, float]:
-    """The front's visible pixels in a frame, and the share of its projection that is visible; or those of a part of it."""
+    """Visible pixels of the front, or of a part of it, in a frame, and the visible fraction of its projection."""
     grid = front.run.grid
     if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.03:
         return np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool), 0.0
@@ -173,12 +177,12 @@ def front_mask(front: Front, scene: Scene, frame: Frame, part: Points | None = N
 
 
 def sides_mask(front: Front, scene: Scene, frame: Frame) -> Mask:
-    """The visible pixels of the carcass's seen sides alone."""
+    """Visible pixels of the carcass's observed sides alone."""
     return visible_mask(_side_facets(front, frame, front.run.slide_of(frame.index, scene)), scene, frame)[0]
 
 
 def _side_facets(front: Front, frame: Frame, slide: tuple[float, float]) -> list[Facet]:
-    """The seen sides that face the camera."""
+    """Observed sides that face the camera."""
     grid = front.run.grid
     return [
         Facet(side_corners(front.cell, grid, slide, side, front.depth_m), confirm=True)
@@ -188,7 +192,7 @@ def _side_facets(front: Front, frame: Frame, slide: tuple[float, float]) -> list
 
 
 def depth_behind(front: Front, room: Room, category: Category) -> FrontDepth:
-    """How deep a front of that category is here, as far as its room tells."""
+    """Depth of a front of a category here, as far as the walls constrain it."""
     return front_depth(room.walls, front_middle(front), front.run.grid.outward, category.depth)
 
 
@@ -202,7 +206,7 @@ def seen_sides(front: Front, scene: Scene) -> tuple[str, ...]:
             if not side_faces(front.cell, front.run.grid, side, frame.world_from_camera.translation):
                 continue
             z, depth, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
-            known = (depth > 0) & ~scene.noise.occluded(depth, z, params.far_before_m)  # far occluders say nothing
+            known = (depth > 0) & ~scene.noise.occluded(depth, z, params.far_before_m)  # far occluders are no evidence
             agree += int(scene.noise.agrees(depth, z, params.confirm_m).sum())
             total += int(known.sum())
         if total > params.side_samples and agree > params.side_share * total:
@@ -211,7 +215,7 @@ def seen_sides(front: Front, scene: Scene) -> tuple[str, ...]:
 
 
 def _clicked(run: Run, column: float, row: float, kind: Category | None) -> Cell | None:
-    """The panel under a click; the one beside it where the click is near its border and what is under it is no such front."""
+    """Panel under a click, or a neighbour of plausible size where the click is near its border and its own panel has none."""
     cell = run.cell_at(column, row)
     if cell is None or kind is None:
         return cell
@@ -225,7 +229,7 @@ def _clicked(run: Run, column: float, row: float, kind: Category | None) -> Cell
 
 
 def _may_be(cell: Cell, run: Run, kind: Category) -> bool:
-    """Whether a panel is as large as fronts of that kind, or as one of its two doors."""
+    """Whether a panel's size is plausible for a front of that category, or for one of its two doors."""
     width_m, height_m = cell.width * run.grid.cell_m, cell.height * run.grid.cell_m
     return kind.height.holds(height_m) and (kind.width.holds(width_m) or (kind.may_be_pair and kind.width.holds(2 * width_m)))
 
@@ -237,7 +241,7 @@ def _apart(cell: Cell, column: float, row: float) -> float:
 
 
 def _partner(run: Run, cell: Cell) -> Cell | None:
-    """The other door of a pair: beside it, as high and as wide, preferably where the handle points."""
+    """Other door of a pair: adjacent, equally high and wide, preferably where the handle points."""
     slack = 0.02 / run.grid.cell_m
     beside = [
         other
@@ -253,13 +257,13 @@ def _partner(run: Run, cell: Cell) -> Cell | None:
 
 
 def _width_slack(run: Run, cell: Cell, other: Cell) -> float:
-    """How differently wide two doors of a pair may have been cut, as a share: more where their handles meet at the seam."""
+    """Maximum relative width difference of two doors of a pair: larger where their handles meet at the seam."""
     params = tuned(Params)
     return params.met_width_share if _pair_score(run, cell, other) > params.handles_meet else params.pair_width_share
 
 
 def _pair_score(run: Run, cell: Cell, other: Cell) -> float:
-    """Handles of a pair stand beside the shared seam."""
+    """Score of handles beside the shared seam of a pair."""
     score = 0.0
     for door, mate in ((cell, other), (other, cell)):
         handle = run.handles[run.cells.index(door)]
@@ -271,7 +275,7 @@ def _pair_score(run: Run, cell: Cell, other: Cell) -> float:
 
 
 def near_plane(grid: PlaneGrid, clicks: Points) -> Points:
-    """The clicks that lie on the panels' plane: others are on sides, or on things in front, and say nothing about panels."""
+    """Clicks that lie on the panels' plane: others hit sides or objects in front, and are no evidence about panels."""
     away = grid.world_from_plane.inverse.apply(clicks)[:, 1]
     return clicks[np.abs(away) < tuned(Params).off_plane_m]
 
@@ -283,7 +287,7 @@ def holds(grid: PlaneGrid, cell: Cell, point: Vector3) -> bool:
 
 
 def nudged(cell: Cell, column: float, row: float, label: int, cell_m: float) -> Cell | None:
-    """The cell with its border moved to a click beside it, or left where that is within pose error; None for other clicks."""
+    """Cell with its border moved to a click beside it, or unchanged within pose error; None for clicks farther away."""
     params = tuned(Params)
     if (label == 1) == cell.contains(column, row):
         return cell
@@ -299,9 +303,9 @@ def nudged(cell: Cell, column: float, row: float, label: int, cell_m: float) -> 
 
 
 def _with(cell: Cell, column: float, row: float, run: Run) -> tuple[Cell, list[Cell]]:
-    """The cell made to hold a click, and the panels it took in: a click well off it means the panel there.
+    """Cell extended to contain a click, and the panels it absorbed: a click well off it selects the panel there.
 
-    Where that makes no rectangle with it, or no panel is there, the border goes to the click.
+    Where the two form no rectangle, or no panel is there, the border moves to the click.
     """
     corrected = nudged(cell, column, row, 1, run.grid.cell_m)
     if corrected is not None:
@@ -318,44 +322,44 @@ def _area(cell: Cell) -> float:
 
 
 def _without(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
-    """The cell without a click: its border drawn in where the click is beside it, else cut along the clearest line."""
+    """Cell without a negative click: its border moves to the click if that is near, else it is cut along the clearest line."""
     corrected = nudged(cell, column, row, 0, run.grid.cell_m)
     return corrected if corrected is not None else _cut_off(cell, column, row, run, kept)
 
 
 def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
-    """The part of the cell, of two along the likeliest line between the clicks, that does not hold the click off it."""
+    """Part of the cell without the negative click, cut along the likeliest line between the clicks."""
     line = _line_between(cell, column, row, run, kept)
     return cell if line is None else _side_of(cell, line, kept)
 
 
 def _own_part(cell: Cell, on: np.ndarray, others: np.ndarray, run: Run) -> Cell:
-    """The part of a cell that its own clicks (n, 2) are on, where others (m, 2) of its partition are on it too."""
+    """Part of a cell with its own clicks (n, 2), where other objects' clicks (m, 2) on the same plane lie in it too."""
     clicked = [on, *(other[None] for other in others if cell.contains(*other.tolist()))]
     parts = parted(LineField(run.odds, run.grid.cell_m), cell, clicked).parts
     return next((part for part in parts if part.contains(*on[0].tolist())), cell)
 
 
 def _line_between(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Line | None:
-    """The likeliest line that has all of the kept clicks on one side and the other click on the other."""
+    """Likeliest line with all kept clicks on one side and the negative click on the other."""
     field, found = LineField(run.odds, run.grid.cell_m), []
     for axis, (off, on) in enumerate(((column, kept[:, 0]), (row, kept[:, 1]))):
         below, above = on[on < off], on[on > off]
         if len(below) and len(above):
-            continue  # a click off it between two on it: no straight cut along this axis
+            continue  # a negative click between two positive ones: no straight cut along this axis
         start, stop = (float(below.max()), off) if len(below) else (off, float(above.min())) if len(above) else (off, off)
         found.append(field.best_between(cell, axis, start, stop))
     return max((line for line in found if line is not None), key=lambda line: line.odds, default=None)
 
 
 def _side_of(cell: Cell, line: Line, kept: np.ndarray) -> Cell:
-    """The half of a cut that holds the kept clicks."""
+    """Half of a cut that contains the kept clicks."""
     first, second = halves(cell, line)
     return first if kept[0, line.axis] < line.position else second
 
 
 def _supported(cell: Cell, run: Run) -> Cell:
-    """The cell without margins the scan never saw as part of the plane."""
+    """Cell without margins that the scan never observed as part of the plane."""
     params = tuned(Params)
     rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
     seen = run.seen[rows, columns]
@@ -363,7 +367,7 @@ def _supported(cell: Cell, run: Run) -> Cell:
     down = np.flatnonzero(seen.mean(axis=1) > params.supported_share * max(seen.mean(), 1e-6))
     if len(across) == 0 or len(down) == 0:
         return cell
-    slack = 0.03 / run.grid.cell_m  # seen depth stops short of an edge by about its own resolution
+    slack = 0.03 / run.grid.cell_m  # observed depth stops short of an edge by about its own resolution
     left = cell.left if across[0] < slack else cell.left + float(across[0])
     right = cell.right if cell.width - across[-1] < slack else cell.left + float(across[-1]) + 1
     top = cell.top if down[0] < slack else cell.top + float(down[0])
@@ -392,9 +396,9 @@ def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
 
 
 def edge_strengths(front: Front) -> tuple[float, ...]:
-    """The probability that each edge is where it was found: left, right, top, bottom.
+    """Probability that each edge is where it was found: left, right, top, bottom.
 
-    Where no colour changes, an edge is where depth put it, and depth ends 1-3 cm short of edges.
+    Where no colour changes, an edge comes from depth alone, and depth ends 1-3 cm short of edges.
     """
     params, odds = tuned(Params), front.run.odds.of_edges(front.cell)
     changes = edge_changes(front.run.mosaic, front.cell)
@@ -405,7 +409,7 @@ def edge_strengths(front: Front) -> tuple[float, ...]:
 
 
 def seam_inside(front: Front) -> float:
-    """The probability of the likeliest seam inside a panel, which was not cut."""
+    """Probability of the likeliest uncut seam inside a panel."""
     return probability(LineField(front.run.odds, front.run.grid.cell_m).best_uncut(front.cell, tuned(Params).border_m))
 
 
@@ -416,7 +420,7 @@ def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Po
 
 
 def front_middle(front: Front) -> Vector3:
-    """The world point in the middle of a panel."""
+    """World point at the centre of a panel."""
     cell = front.cell
     at = np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]])
     return np.asarray(front.run.grid.points_at(at)[0])

@@ -1,4 +1,4 @@
-"""Whether a door slides sideways: it stands before a panel beside it that is as high, one track behind (Bayes' rule).
+"""Probability of a sliding door (Bayes' rule): an equally high panel continues beside it, one track behind.
 
 The rival is a hinged door beside a blind panel, which is set back by the door's own thickness.
 """
@@ -20,31 +20,45 @@ _GUESS = "a guess, stated as one"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What is seen beside doors that slide, and beside hinged ones."""
+    """Tuned parameters (priors and likelihoods) of sliding and hinged doors."""
 
-    prior: float = param(0.03, "share", "of doors without a word on how they open that slide", gt=0, lt=1, source=_GUESS)
-    beside: float = param(22.0, "ratio", "of how often such a panel is beside a leaf to beside a hinged door", source=_GUESS)
-    back_m: tuple[float, float] = param((0.015, 0.06), "m", "from a leaf back to the next track", source="boards of 16-22 mm")
-    overlay_m: float = param(0.02, "m", "from a hinged door back to a blind panel", source="boards of 16-22 mm on buffers")
-    overlay_sigma_m: float = param(0.004, "m", "about that, with depth's own error", gt=0)
-    odd: float = param(0.2, "share", "of blind panels that are set back by any other depth", gt=0, lt=1)
-    pull_away: float = param(0.9, "share", "of leaves with the pull at the edge away from the panel", gt=0, lt=1)
-    same_colour: tuple[float, float] = param((0.9, 0.3), "share", "of panels beside leaves, and doors, in the front's colour")
-    colour: float = param(12.0, "grey", "CIELAB units within which two colours are one: shading differs")
-    wide: float = param(0.6, "share", "of the door's width that the panel goes on beside it")
-    covers: float = param(0.6, "share", "of that strip in which depth saw the panel")
-    level_m: float = param(0.03, "m", "by which their upper and lower edges may differ")
-    parallel: float = param(float(np.cos(np.radians(8.0))), "cosine", "between both")
+    prior: float = param(
+        0.03, "share", "Prior probability that a door of unspecified opening slides", gt=0, lt=1, source=_GUESS
+    )
+    beside: float = param(
+        22.0, "ratio", "Likelihood ratio of such a panel beside a sliding leaf to one beside a hinged door", source=_GUESS
+    )
+    back_m: tuple[float, float] = param(
+        (0.015, 0.06), "m", "Minimum and maximum distance from a leaf back to the next track", source="boards of 16-22 mm"
+    )
+    overlay_m: float = param(
+        0.02, "m", "Usual distance from a hinged door back to a blind panel", source="boards of 16-22 mm on buffers"
+    )
+    overlay_sigma_m: float = param(0.004, "m", "Standard deviation of that distance, with depth error", gt=0)
+    odd: float = param(0.2, "share", "Fraction of blind panels that are set back by any other distance", gt=0, lt=1)
+    pull_away: float = param(
+        0.9, "share", "Fraction of sliding leaves with the pull at the edge away from the panel", gt=0, lt=1
+    )
+    same_colour: tuple[float, float] = param(
+        (0.9, 0.3), "share", "Fraction of panels in the front's colour, beside sliding leaves and beside hinged doors"
+    )
+    colour: float = param(12.0, "grey", "Maximum CIELAB distance between equal colours: shading differs")
+    wide: float = param(
+        0.6, "share", "Width of the strip beside the door that the panel must cover, as a fraction of the door's"
+    )
+    covers: float = param(0.6, "share", "Minimum fraction of that strip in which depth observed the panel")
+    level_m: float = param(0.03, "m", "Maximum difference between their upper and lower edges")
+    parallel: float = param(float(np.cos(np.radians(8.0))), "cosine", "Minimum cosine between the two planes' normals")
 
 
 def sliding_chance(front: Front, planes: Sequence[PlaneRegion]) -> float:
-    """The probability that a front slides sideways over what is beside it; 0 where nothing is set back there."""
+    """Probability that a front slides sideways over the panel beside it; 0 where nothing is set back there."""
     odds = max((_odds(front, sign, plane) for plane in planes for sign in (-1, 1)), default=-np.inf)
     return probability(odds)
 
 
 def _odds(front: Front, sign: int, plane: PlaneRegion) -> float:
-    """Log-odds (natural) of it over a plane on the left (-1) or right of the front."""
+    """Log-odds (natural) of sliding over a plane on the left (-1) or right of the front."""
     params, grid = tuned(Params), front.run.grid
     middle = front_middle(front)
     back_m = float((middle - plane.world_from_plane.translation) @ grid.outward)
@@ -60,7 +74,7 @@ def _odds(front: Front, sign: int, plane: PlaneRegion) -> float:
 
 
 def _goes_on(front: Front, sign: int, plane: PlaneRegion) -> bool:
-    """Whether depth saw the plane beside the front, over its height and no higher or lower."""
+    """Whether depth observed the plane beside the front, over its height and no higher or lower."""
     params, cell_m = tuned(Params), front.run.grid.cell_m
     strip, slack = _beside(front, sign), params.level_m / cell_m
     above = Cell(strip.left, strip.top - 3 * slack, strip.right, strip.top - slack)
@@ -70,14 +84,14 @@ def _goes_on(front: Front, sign: int, plane: PlaneRegion) -> bool:
 
 
 def _seen_share(front: Front, part: Cell, plane: PlaneRegion) -> float:
-    """The share of a rectangle (cells of the front's grid) behind which depth saw a plane."""
+    """Fraction of a rectangle (cells of the front's grid) behind which depth observed a plane."""
     columns, rows = np.meshgrid(np.linspace(part.left, part.right, 12), np.linspace(part.top, part.bottom, 12))
     points = front.run.grid.points_at(np.stack([columns.ravel(), rows.ravel()], axis=1))
     return float(plane.supports(points, 0.0).mean())
 
 
 def _beside(front: Front, sign: int) -> Cell:
-    """The strip beside the front, as high, that a panel goes on over."""
+    """Strip beside the front, equally high, that a panel must cover."""
     cell, wide = front.cell, tuned(Params).wide * front.cell.width
     if sign > 0:
         return Cell(cell.right, cell.top, cell.right + wide, cell.bottom)
@@ -85,7 +99,7 @@ def _beside(front: Front, sign: int) -> Cell:
 
 
 def _by_pull(front: Front, sign: int) -> float:
-    """Log of the ratio of both likelihoods by where the handle is; of hinged doors half have it on either side."""
+    """Log-likelihood ratio by the handle's position; hinged doors have it on either side equally often."""
     if front.handle is None:
         return 0.0
     middle = (front.cell.left + front.cell.right) / 2
@@ -95,7 +109,7 @@ def _by_pull(front: Front, sign: int) -> float:
 
 
 def _by_colour(front: Front, sign: int) -> float:
-    """The same by whether the panel has the front's colour; 0 where no photograph shows it."""
+    """Log-likelihood ratio by whether the panel has the front's colour; 0 where no photograph shows it."""
     params = tuned(Params)
     lab, seen = as_lab(front.run.mosaic)
     here, there = (_colour(lab, seen, part) for part in (front.cell, _beside(front, sign)))

@@ -1,4 +1,4 @@
-"""Panel choice with a prior on size: a dishwasher is one front, whatever lines it carries."""
+"""Panel choice with a size prior: a dishwasher is one front, in spite of lines on it."""
 
 from dataclasses import dataclass
 
@@ -14,28 +14,33 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What sizes and rows say for a panel."""
+    """Tuned parameters of the unit choice."""
 
-    edge_weight: float = param(0.5, "ratio", "of the network's log-odds of an edge: the cut has made use of them already", gt=0)
+    edge_weight: float = param(0.5, "ratio", "Weight of the network's log-odds of an edge: the cut has used them already", gt=0)
     seam_worth: float = param(
-        -3.0, "log", "of an upright seam from top to bottom inside", source="one machine in twenty: a control strip at its side"
+        -3.0,
+        "log",
+        "Log-likelihood of an upright seam from top to bottom inside",
+        source="one machine in twenty has one: a control strip at its side",
     )
-    row_worth: float = param(1.0, "log", "of an upper or lower edge in line with a front's beside it")
-    same_area: float = param(0.85, "share", "of the largest area: less is nested, more differs by a strip of shadow")
+    row_worth: float = param(1.0, "log", "Log-likelihood gain of an upper or lower edge aligned with an adjacent front's")
+    same_area: float = param(
+        0.85, "share", "Minimum area relative to the largest: smaller is nested, larger differs by a strip of shadow"
+    )
     nested_worth: float = param(
-        1.0, "log", "by which a window inside a front may be likelier: of equals the outermost is the front"
+        1.0, "log", "Maximum log-likelihood advantage of a window inside a front: of equals the outermost is the front"
     )
-    row_m: float = param(0.015, "m", "how exactly the fronts of a row line up")
-    tall_m: float = param(0.35, "m", "height from which a front is one of a row upright")
+    row_m: float = param(0.015, "m", "Maximum misalignment of the fronts of a row")
+    tall_m: float = param(0.35, "m", "Minimum height of a front that is one of a row side by side")
     lit_share: float = param(
-        0.125, "share", "of the rows of black glass that return light, on average", gt=0, source="ovens: a strip of controls"
+        0.125, "share", "Mean fraction of the rows of black glass that have depth", gt=0, source="ovens: a strip of controls"
     )
-    lit_row: float = param(0.9, "share", "of a row seen by depth, from where it is none of black glass")
-    about_m: float = param(0.02, "m", "about a click, within which depth tells black glass")
+    lit_row: float = param(0.9, "share", "Minimum fraction of a row with depth for it not to be black glass")
+    about_m: float = param(0.02, "m", "Distance around a click within which depth tells black glass")
 
 
 def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | None:
-    """The rectangle between lines of the run around a click that is the likeliest of such a unit."""
+    """Likeliest rectangle of a unit's category between lines of the run around a click."""
     params = tuned(Params)
     cell_m = run.grid.cell_m
     widest, tallest = unit.width.high / cell_m, unit.height.high / cell_m
@@ -62,13 +67,13 @@ def unit_cell(run: Run, column: float, row: float, unit: Category) -> Cell | Non
 
 
 def _returns_light(run: Run, column: float, row: float) -> bool:
-    """Whether most of what is round a click has depth."""
+    """Whether most of the surroundings of a click have depth."""
     reach = tuned(Params).about_m / run.grid.cell_m
     return _seen(run, Cell(column - reach, row - reach, column + reach, row + reach)).mean() > 0.5
 
 
 def _lit(run: Run, cell: Cell) -> float:
-    """The share of a rectangle's rows that return light from end to end."""
+    """Fraction of a rectangle's rows that have depth from end to end."""
     return float((_seen(run, cell).mean(axis=1) > tuned(Params).lit_row).mean())
 
 
@@ -78,7 +83,7 @@ def _seen(run: Run, cell: Cell) -> Mask:
 
 
 def _worth(run: Run, cell: Cell, unit: Category) -> float:
-    """Log-likelihood of a rectangle as such a unit: of its edges, what is inside, its size, and its row."""
+    """Log-likelihood of a rectangle as such a unit: of its edges, inner seam, size, and alignment."""
     params = tuned(Params)
     cell_m = run.grid.cell_m
     off = np.array([unit.width.deviation(cell.width * cell_m), unit.height.deviation(cell.height * cell_m)])
@@ -87,7 +92,7 @@ def _worth(run: Run, cell: Cell, unit: Category) -> float:
 
 
 def _seam_inside(run: Run, cell: Cell) -> float:
-    """The probability of the likeliest of the run's upright lines that would part a rectangle from top to bottom."""
+    """Probability of the likeliest upright line of the run that would split a rectangle from top to bottom."""
     slack = tuned(Params).row_m / run.grid.cell_m
     inside = {other.left for other in run.cells if cell.left + slack < other.left < cell.right - slack}
     odds = max((float(run.odds.along(0, at, cell.top, cell.bottom).mean()) for at in inside), default=-np.inf)
@@ -95,7 +100,7 @@ def _seam_inside(run: Run, cell: Cell) -> float:
 
 
 def _in_row(run: Run, cell: Cell) -> int:
-    """How many of a rectangle's upper and lower edges a front beside it shares: units are made to fit a row of cupboards."""
+    """Number of a rectangle's upper and lower edges shared with an adjacent front: units are made to fit a row of cupboards."""
     params = tuned(Params)
     slack, tall = params.row_m / run.grid.cell_m, params.tall_m / run.grid.cell_m
     beside = [
