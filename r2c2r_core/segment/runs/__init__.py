@@ -1,1 +1,1 @@
-"""A furniture run: its orthomosaic cut into panels (XY-cut), face frames and stiles told apart; `run` puts it together."""
+"""Furniture runs: an orthomosaic cut into panels (XY-cut), with face frames and stiles identified; `run` assembles them."""

@@ -1,4 +1,4 @@
-"""Edges that do not show, taken from the fronts in the same row or column: those of a run end together."""
+"""Invisible edges of fronts, taken from visible ones in the same row or column: fronts of a run end together."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ _NAMES = ("left", "right", "top", "bottom")  # of SIDES
 
 
 def aligned(refined: Refined, cut: Cell, cells: Sequence[Cell], surface: Surface, cell_m: float) -> Refined:
-    """A panel whose edges that do not show lie where the same edge of the nearest front in line shows.
+    """Panel whose invisible edges are moved to the same, visible edge of the nearest aligned front.
 
     Depth ends before an edge: a cut that followed it lies too far inside, by as much as depth may end short.
     """
@@ -33,6 +33,6 @@ def aligned(refined: Refined, cut: Cell, cells: Sequence[Cell], surface: Surface
 
 
 def _between(one: Cell, other: Cell, axis: int) -> float:
-    """How far two cells are apart along an axis."""
+    """Gap between two cells along an axis; 0 where they overlap."""
     (low, high), (first, last) = across(one, axis), across(other, axis)
     return max(first - high, low - last, 0.0)

@@ -1,4 +1,4 @@
-"""How far lines and edges stand out on a run's orthomosaic, wherever along them one looks."""
+"""Contrast of lines and edges on a run's orthomosaic, at any position along them."""
 
 import numpy as np
 
@@ -11,13 +11,13 @@ SIDES = ((0, 0), (0, 1), (1, 0), (1, 1))
 """Left, right, upper, lower: the axis of an edge of a panel, and the end along it."""
 CORNER = 3
 """Cells at a line's ends where lines across it show."""
-_PARTS = 8  # of a line
-_OFF = 2  # cells by which a line may wander
-_MARGIN = 12  # cells around an edge that it is compared with
+_PARTS = 8  # per line
+_OFF = 2  # cells by which a line may deviate
+_MARGIN = 12  # cells around an edge that are read for comparison
 
 
 def edge_changes(mosaic: Image, panel: Cell) -> tuple[float, ...]:
-    """How far colours (CIELAB) change at each edge of a panel, over half of its length: left, right, upper, lower."""
+    """CIELAB colour change at each edge of a panel, median along it: left, right, upper, lower."""
     left, top = max(int(panel.left) - _MARGIN, 0), max(int(panel.top) - _MARGIN, 0)
     lab, _ = as_lab(np.ascontiguousarray(mosaic[top : int(panel.bottom) + _MARGIN, left : int(panel.right) + _MARGIN]))
     moved = Cell(panel.left - left, panel.top - top, panel.right - left, panel.bottom - top)
@@ -30,28 +30,28 @@ def edge_changes(mosaic: Image, panel: Cell) -> tuple[float, ...]:
 
 
 def edges_of(panel: Cell) -> tuple[float, float, float, float]:
-    """In the order of SIDES."""
+    """Edge positions of a panel, in the order of SIDES."""
     return panel.left, panel.right, panel.top, panel.bottom
 
 
 class Contrast:
-    """How far lines stand out from both sides of them, of a mosaic's lightness (rows, columns)."""
+    """Contrast of lines against both of their sides, in a mosaic's lightness (rows, columns)."""
 
     def __init__(self, light: np.ndarray) -> None:
         self._light = light
 
     def near(self, axis: int, start: int, stop: int, low: float, high: float) -> np.ndarray:
-        """Of lines from `low` to `high` at positions from `start` up to `stop`: (parts of the line, positions)."""
+        """Contrast of lines from `low` to `high` at positions from `start` up to `stop`: (parts of the line, positions)."""
         before, middle, after = self._sides(axis, start, stop, low, high, _PARTS)
         darker, lighter = np.minimum(before, after) - middle, middle - np.maximum(before, after)
         return np.asarray(np.maximum(np.maximum(darker, lighter), 0))
 
     def along(self, axis: int, at: float, low: float, high: float) -> np.ndarray:
-        """Of the line at about a position: (parts,)."""
+        """Maximum contrast of the line near a position: (parts,)."""
         return np.asarray(self.near(axis, max(int(at) - _OFF, 0), int(at) + _OFF + 1, low, high).max(axis=1))
 
     def changes(self, axis: int, at: float, low: float, high: float, parts: int = _PARTS) -> np.ndarray:
-        """What changes at and about a position: a gap, or from one side to the other, (parts of the line, positions)."""
+        """Lightness change at and around a position, of a gap or from one side to the other: (parts of the line, positions)."""
         return np.asarray(
             np.ptp(np.stack(self._sides(axis, max(int(at) - _OFF, 0), int(at) + _OFF + 1, low, high, parts)), axis=0)
         )

@@ -1,6 +1,6 @@
-"""Fronts inset in a face frame: gaps all round them, of which those at two sides end before a rail or stile of the frame.
+"""Fronts inset in a face frame: gaps on all sides, of which those at two sides end at a rail or stile of the frame.
 
-A panel sunk in a front has lines all round it too, but there the borders of the front go on beside its rails and stiles.
+A sunk panel of a front has lines on all sides too, but there the front's own borders continue beside its rails and stiles.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,48 +21,52 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What shows of a face frame. Contrasts are lightness, 0 to 255, of a line against both sides of it."""
+    """Tuned parameters of face frames. Contrasts are lightness, 0 to 255, of a line against both of its sides."""
 
-    narrowest_m: float = param(0.014, "m", "of rails and stiles that are looked for", gt=0, source="a cut leaves no less")
-    widest_m: float = param(0.1, "m", "of rails and stiles", gt=0, source="two stiles of 38-50 mm stand side by side")
-    smallest_m: float = param(0.06, "m", "of a front that is inset", gt=0)
-    contrast: float = param(1.0, "grey", "of a gap, at least", gt=0, source="noise of mosaics along 30 mm of a line is 0.3")
+    narrowest_m: float = param(0.014, "m", "Minimum width of rails and stiles", gt=0, source="a cut leaves no less")
+    widest_m: float = param(
+        0.1, "m", "Maximum width of rails and stiles", gt=0, source="two stiles of 38-50 mm stand side by side"
+    )
+    smallest_m: float = param(0.06, "m", "Minimum side of an inset front", gt=0)
+    contrast: float = param(
+        1.0, "grey", "Minimum contrast of a gap", gt=0, source="noise of mosaics along 30 mm of a line is 0.3"
+    )
     alike: float = param(
         0.4,
         "ratio",
-        "of a gap's faintest part to the rest of it, and of a gap to a clear one beside it",
+        "Minimum contrast of a gap's faintest part relative to its median, and of a gap relative to the clearest one",
         gt=0,
-        source="likewise",
+        source="noise of mosaics along 30 mm of a line is 0.3",
     )
     ended: float = param(
         0.6,
         "ratio",
-        "to a gap's contrast, of what changes beside a rail where it would go on",
+        "Maximum change beside a rail where a gap would continue, relative to the gap's contrast, for the gap to have ended",
         gt=0,
         source="development kitchens: 0.0 to 0.55 on face frames, mostly grain; 0.8 to 1.3 where a front's own borders go on",
     )
     other: float = param(
         2.0,
         "ratio",
-        "to an edge's contrast, of what changes beside a front that is no gap going on: a worktop's edge, a wall's",
+        "Change beside a front, relative to its edge's contrast, above which it is another edge: a worktop's or a wall's",
         gt=0,
-        source="likewise: 3.4 to 4 under worktops",
+        source="development kitchens: 3.4 to 4 under worktops",
     )
     flush_m: float = param(
         0.005,
         "m",
-        "behind its face frame, of a front's border at most: deeper is the panel of a frame",
+        "Maximum distance of a front's border behind its face frame: deeper is the panel of a frame",
         gt=0,
         source="fronts are inset flush within 2 mm; the mean depth over a border is known to 1 mm",
     )
     border_m: tuple[float, float] = param(
-        (0.01, 0.035), "m", "from a front's edge, from where and up to where its border is: a front's own panel begins later"
+        (0.01, 0.035), "m", "Minimum and maximum distance from a front's edge of its border: a front's own panel begins later"
     )
-    options: int = param(3, "count", "of lines beside an edge, the clearest, of which one may be the gap", ge=1)
+    options: int = param(3, "count", "Maximum number of lines beside an edge, the clearest, that are tried as the gap", ge=1)
 
 
 def inset_fronts(contrast: Contrast, relief: Relief, odds: PanelOdds, cells: Sequence[Cell], cell_m: float) -> list[Cell]:
-    """The cells, of those that hold a front with rails or stiles of a face frame both on their own."""
+    """Cells in which inset fronts are separated from the rails or stiles of their face frames."""
     field, found = LineField(odds, cell_m), list[Cell]()
     for cell in cells:
         front = _inset(contrast, field, cell, cell_m) if field.is_front(cell) else None
@@ -78,7 +82,7 @@ def inset_fronts(contrast: Contrast, relief: Relief, odds: PanelOdds, cells: Seq
 
 
 def is_rail(contrast: Contrast, front: Cell, strip: Cell, axis: int) -> bool:
-    """Whether a strip beside a front is of its face frame: a gap is between them, and those at its other sides end there."""
+    """Whether a strip beside a front belongs to its face frame: a gap separates them, and the front's side gaps end there."""
     params, ends = tuned(Params), across(front, axis)
     strip_ends, others = across(strip, axis), across(front, 1 - axis)
     own = [float(np.median(contrast.along(1 - axis, at, ends[0] + CORNER, ends[1] - CORNER))) for at in others]
@@ -90,7 +94,7 @@ def is_rail(contrast: Contrast, front: Cell, strip: Cell, axis: int) -> bool:
 
 
 def clear_of_rails(contrast: Contrast, panel: Cell, cut: Cell, cells: Sequence[Cell], cell_m: float) -> Cell:
-    """A panel refined from where it was cut, its edges as cut where they lie past the middle of a rail beside it."""
+    """Refined panel whose edges return to the cut where they lie past the middle of an adjacent rail."""
     edges = dict(zip(SIDES, edges_of(panel), strict=True))
     for other in cells:
         for axis, end in SIDES:
@@ -105,16 +109,16 @@ def clear_of_rails(contrast: Contrast, panel: Cell, cut: Cell, cells: Sequence[C
 
 
 def _beside(other: Cell, cell: Cell, axis: int) -> bool:
-    """Whether one cell is beside most of another's side."""
+    """Whether one cell covers most of another's side."""
     (start, stop), (low, high) = across(other, 1 - axis), across(cell, 1 - axis)
     return min(stop, high) - max(start, low) > 0.5 * (high - low)
 
 
 def _inset(contrast: Contrast, field: LineField, cell: Cell, cell_m: float) -> Cell | None:
-    """The front within a cell, with a frame at most of its sides, the largest of equals; None where there is none.
+    """Largest front inset in a cell, framed on the most sides (at most three); None where there is none.
 
-    Its gaps may be faint. A line on which the network holds no edge possible is grain, unless it is the clearest one at its
-    side and at least as clear as another gap of the front.
+    Its gaps may be faint. A line that the network rules out as an edge is grain, unless it is the clearest one at its side and
+    at least as clear as another gap of the front.
     """
     smallest, best = tuned(Params).smallest_m / cell_m, (0, 0.0, cell)
     options, grain = list[list[float]](), list[float | None]()
@@ -136,12 +140,12 @@ def _inset(contrast: Contrast, field: LineField, cell: Cell, cell_m: float) -> C
 
 
 def shows(contrast: Contrast, axis: int, at: float, low: float, high: float) -> bool:
-    """Whether a line at about a position shows over most of a span."""
+    """Whether a line near a position is visible over most of a span."""
     return bool(np.median(contrast.along(axis, at, low, high)) >= tuned(Params).contrast)
 
 
 def lines_beside(contrast: Contrast, cell: Cell, side: tuple[int, int], cell_m: float) -> list[float]:
-    """Positions of lines beside one edge of a cell that show along the middle of it, the clearest first."""
+    """Positions of lines beside one edge of a cell that are visible along its middle, the clearest first."""
     params, (axis, end) = tuned(Params), side
     (low, high), beside = across(cell, axis), across(cell, 1 - axis)
     widest = params.widest_m / cell_m
@@ -159,7 +163,7 @@ def lines_beside(contrast: Contrast, cell: Cell, side: tuple[int, int], cell_m: 
 
 
 def _is_sunk(relief: Relief, front: Cell, cell: Cell, cell_m: float) -> bool:
-    """Whether depth shows the border of a would-be front behind what is around it in its cell: it is a frame's panel."""
+    """Whether depth shows the border of a supposed front behind its surroundings in the cell: then it is a frame's panel."""
     params = tuned(Params)
     near, far = (size / cell_m for size in params.border_m)
     border = _mean_level(relief, _shrunk(front, near), _shrunk(front, far))
@@ -168,7 +172,7 @@ def _is_sunk(relief: Relief, front: Cell, cell: Cell, cell_m: float) -> bool:
 
 
 def _mean_level(relief: Relief, outer: Cell, inner: Cell) -> float | None:
-    """Mean depth, outwards, of the points between two rectangles one in the other; None without any."""
+    """Mean depth, outwards, of the points between two nested rectangles; None without any."""
     points, total = relief.levels_over(outer) - relief.levels_over(inner)
     return float(total / points) if points > 0 else None
 
@@ -184,9 +188,9 @@ def _within(cell: Cell, outer: Cell) -> Cell:
 
 
 def _is_inset(contrast: Contrast, front: Cell, cell: Cell, moved: Sequence[bool], doubted: Sequence[bool]) -> bool:
-    """Whether a front has gaps from corner to corner where it was moved in, and those at its other sides end there.
+    """Whether a front has gaps from corner to corner at its inset sides, and the gaps at its other sides end there.
 
-    A gap that is doubted has to be as clear as one of those that were not moved.
+    A doubted gap must be as clear as one at a side that is not inset.
     """
     params = tuned(Params)
     parts = [
@@ -201,49 +205,49 @@ def _is_inset(contrast: Contrast, front: Cell, cell: Cell, moved: Sequence[bool]
     for each, own, inner, doubt in zip(parts, usual, moved, doubted, strict=True):
         if doubt and own < faint - params.contrast:
             return False
-        faintest = min(np.sort(each)[1], each[0], each[-1])  # a handle may hide one, but not at a corner
+        faintest = min(np.sort(each)[1], each[0], each[-1])  # a handle may hide one part, but not at a corner
         if inner and (faintest < max(params.alike * own, params.contrast) or own < params.alike * clear):
             return False
     for of in (0, 1):
         told = [k for k, (axis, _) in enumerate(SIDES) if axis != of and beside[k] and not _is_other(beside[k], usual[k])]
         if any(moved[k] for k, (axis, _) in enumerate(SIDES) if axis == of) and not told:
-            return False  # nothing tells a rail from a part of the front
+            return False  # nothing distinguishes a rail from a part of the front
         if not all(usual[k] >= params.contrast and max(beside[k]) <= params.ended * usual[k] for k in told):
             return False
     return True
 
 
 def _beyond(contrast: Contrast, front: Cell, cell: Cell, moved: Sequence[bool], side: int) -> list[float]:
-    """What changes over the strips beside a front, at its ends, where one of its edges would go on."""
+    """Changes across the strips beside a front, where one of its edges would continue."""
     axis, at = SIDES[side][0], edges_of(front)[side]
     return [_change(contrast, axis, at, strip) for strip in _strips(front, cell, moved, 1 - axis)]
 
 
 def _is_other(beside: Sequence[float], own: float) -> bool:
-    """Whether what changes beside a front is far more than its own edge does: no gap that goes on, but a worktop or a wall."""
+    """Whether the change beside a front far exceeds its own edge's: not a continuing gap, but a worktop or a wall."""
     return max(beside, default=0.0) > tuned(Params).other * own
 
 
 def _strips(front: Cell, cell: Cell, moved: Sequence[bool], axis: int) -> Iterator[tuple[float, float]]:
-    """From where to where a frame reaches along an axis, at the edges of a front that were moved in."""
+    """Spans of the frame along an axis, at the inset edges of a front."""
     for (of, _), inner, edge, border in zip(SIDES, moved, edges_of(front), edges_of(cell), strict=True):
         if of == axis and inner:
             yield min(edge, border), max(edge, border)
 
 
 def _ends(contrast: Contrast, axis: int, at: float, strip: tuple[float, float], own: float) -> bool:
-    """Whether a gap of a contrast is no more to be seen over a strip."""
+    """Whether a gap of a given contrast is not visible across a strip."""
     return _change(contrast, axis, at, strip) <= tuned(Params).ended * own
 
 
 def _change(contrast: Contrast, axis: int, at: float, strip: tuple[float, float]) -> float:
-    """What changes at about a position over a strip."""
+    """Maximum lightness change near a position across a strip."""
     corner = min(CORNER, (strip[1] - strip[0]) / 3)
     return float(contrast.changes(axis, at, strip[0] + corner, strip[1] - corner, 1).max())
 
 
 def _around(inner: Cell, outer: Cell) -> list[Cell]:
-    """What is left of a cell around one within it."""
+    """Remaining parts of a cell around one within it."""
     parts = (
         Cell(outer.left, outer.top, outer.right, inner.top),
         Cell(outer.left, inner.bottom, outer.right, outer.bottom),

@@ -1,4 +1,4 @@
-"""Panels of a run: cut one by one, then along faint lines that panels of a row share."""
+"""Panels of a run: cut one by one, then along faint lines that the panels of a row share."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What rows say. Odds are natural logarithms."""
+    """Tuned parameters of shared lines. Odds are natural logarithms."""
 
     in_line_m: float = param(
-        0.006, "m", "within which ends of panels are in line", gt=0, source="as exactly as lines are placed"
+        0.006, "m", "Maximum misalignment of panel ends in one row", gt=0, source="as exactly as lines are placed"
     )
-    most: float = param(2.0, "log", "that one panel says for or against a line of its row, at most", gt=0)
-    least: float = param(-1.0, "log", "odds of a line in a panel, from which the line of its row cuts it too")
+    most: float = param(2.0, "log", "Maximum absolute log-odds that one panel contributes to a line of its row", gt=0)
+    least: float = param(-1.0, "log", "Minimum log-odds of a line in a panel for the line of its row to cut it too")
 
 
 def cut_panels(odds: PanelOdds, grid: Cell, cell_m: float) -> list[Cell]:
@@ -37,7 +37,7 @@ def cut_panels(odds: PanelOdds, grid: Cell, cell_m: float) -> list[Cell]:
 
 
 def _rows(field: LineField, cells: Sequence[Cell], axis: int, end: int) -> list[list[Cell]]:
-    """Fronts whose lower (0) or upper (1) ends along an axis are in line."""
+    """Rows of fronts whose lower (0) or upper (1) ends along an axis are aligned."""
     slack = tuned(Params).in_line_m / field.cell_m * STEP
     rows: list[list[Cell]] = []
     for cell in sorted(filter(field.is_front, cells), key=lambda cell: across(cell, axis)[end]):
@@ -49,9 +49,9 @@ def _rows(field: LineField, cells: Sequence[Cell], axis: int, end: int) -> list[
 
 
 def _shared_lines(field: LineField, row: Sequence[Cell], axis: int) -> list[tuple[Cell, Line]]:
-    """The likeliest line at one position in all cells of a row, for those of them that may have it; none where it is unlikely.
+    """Likeliest line at one position in all cells of a row, for the cells that may have it; none where it is unlikely.
 
-    What is seen counts for each cell, what is usual once: rows are made alike.
+    The evidence counts for each cell, the prior once: rows are made alike.
     """
     params, length = tuned(Params), field.odds[axis].shape[1]
     seen, usual = [], []
@@ -60,7 +60,9 @@ def _shared_lines(field: LineField, row: Sequence[Cell], axis: int) -> list[tupl
         odds, prior = np.full(length, -params.most), np.full(length, np.nan)
         if evidence is not None:
             inside = slice(evidence.start, evidence.start + len(evidence.odds))
-            near = np.max(sliding_window_view(np.pad(evidence.odds, 1, mode="edge"), 3), axis=1)  # lines wander by a cell
+            near = np.max(
+                sliding_window_view(np.pad(evidence.odds, 1, mode="edge"), 3), axis=1
+            )  # lines deviate by up to a cell
             odds[inside], prior[inside] = np.clip(near, -params.most, params.most), evidence.prior
         seen.append(odds)
         usual.append(prior)

@@ -1,4 +1,4 @@
-"""The most probable guillotine partition of a panel that several objects were clicked on, each with a part of its own."""
+"""Most probable guillotine partition of a panel on which several objects were clicked, one part per object."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,18 +13,21 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How far partitions are searched, and what is no seam."""
+    """Tuned parameters of the partition search."""
 
     lines: int = param(
-        12, "count", "of lines, likeliest first, over the objects clicked on a part, that are tried through it", ge=1
+        12,
+        "count",
+        "Maximum number of lines tried through a part, divided by the number of objects clicked on it, likeliest first",
+        ge=1,
     )
     two_names: float = param(
-        3.0, "log", "by which two clicks of different names make a seam between them likelier", source="one in twenty is a slip"
+        3.0, "log", "Log-odds gain of a seam between two clicks of different names", source="one click in twenty is a slip"
     )
 
 
 class Partition(NamedTuple):
-    """Of one panel; the more objects are told apart, then the likelier its seams, the better."""
+    """A partition of one panel; more separated objects are better, then likelier seams."""
 
     cuts: int
     total: float  # log-likelihood of its seams
@@ -32,11 +35,11 @@ class Partition(NamedTuple):
 
 
 def parted(field: LineField, cell: Cell, clicked: Sequence[np.ndarray]) -> Partition:
-    """The partition of a panel by where each object was `clicked` on it, (n, 2) grid cells an object.
+    """Best partition of a panel by where each object was `clicked`, (n, 2) grid cells per object.
 
-    A seam is straight and as long as the part that it cuts, and parts no clicks of one object; what was cut first decides how
-    far the next goes, so the likeliest seam alone need not be one of the likeliest partition. Objects between which no seam
-    is at all likely share a part.
+    A seam is straight, spans the whole part that it cuts, and does not separate clicks of one object. Earlier cuts limit later
+    ones, so the likeliest seam alone need not belong to the likeliest partition. Objects without a plausible seam between them
+    share a part.
     """
     whole, params = Partition(0, 0.0, (cell,)), tuned(Params)
     if len(clicked) < 2:
@@ -57,7 +60,7 @@ def _value(partition: Partition) -> tuple[int, float]:
 def _lines(
     field: LineField, cell: Cell, clicked: Sequence[np.ndarray]
 ) -> Iterator[tuple[Line, Sequence[np.ndarray], Sequence[np.ndarray]]]:
-    """The likeliest seam between each two neighbours along either axis, with the objects before and after it."""
+    """Likeliest seam between adjacent objects along either axis, with the objects before and after it."""
     for axis in (0, 1):
         (low, high), ordered = across(cell, axis), sorted(clicked, key=lambda on: float(on[:, axis].min()))
         for count in range(1, len(ordered)):

@@ -1,4 +1,4 @@
-"""A furniture run: one plane's orthomosaic, line evidence, panels and handles. Keyed by plane, never by click."""
+"""Furniture run: one plane's orthomosaic, line evidence, panels and handles. Keyed by plane, never by click."""
 
 from dataclasses import dataclass, field
 
@@ -37,16 +37,16 @@ STEADY_CELLS = 1.0  # slides below this are measurement noise: poses agree
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a run is prepared."""
+    """Tuned parameters of the preparation of a run."""
 
-    allowed_m: float = param(0.08, "m", "beyond what the scan saw of the plane, within which evidence counts")
-    roll_worth_rad: float = param(float(np.radians(0.2)), "rad", "of a roll that is taken out")
-    relief_frames: int = param(60, "count", "that make the relief", ge=1)
+    allowed_m: float = param(0.08, "m", "Maximum distance of line evidence beyond the observed part of the plane")
+    roll_worth_rad: float = param(float(np.radians(0.2)), "rad", "Minimum roll that is corrected")
+    relief_frames: int = param(60, "count", "Maximum number of frames used for the relief", ge=1)
 
 
 @dataclass(slots=True, eq=False)
 class Run:
-    """Everything computed once about a plane. `slides` fills as frames are asked for."""
+    """Everything computed once per plane. `slides` fills as frames are requested."""
 
     region: PlaneRegion
     grid: PlaneGrid
@@ -55,8 +55,8 @@ class Run:
     horizontal: Evidence
     mosaic: Image
     relief: Relief
-    seams: PanelOdds  # what the network sees
-    odds: PanelOdds  # with lines and what depth shows
+    seams: PanelOdds  # log-odds of the network alone
+    odds: PanelOdds  # with lines and depth evidence
     seen: np.ndarray  # grid cells the scan has depth for
     cells: tuple[Cell, ...]
     handles: tuple[GridHandle | None, ...]  # one a cell
@@ -64,11 +64,11 @@ class Run:
     slides: dict[int, tuple[float, float]] = field(default_factory=dict)
 
     def cell_at(self, column: float, row: float) -> Cell | None:
-        """The panel at a grid position."""
+        """Panel at a grid position."""
         return next((cell for cell in self.cells if cell.contains(column, row)), None)
 
     def slide_of(self, frame_index: int, scene: Scene) -> tuple[float, float]:
-        """How far (columns, rows) a frame's content must move to meet the mosaic: its pose error in the plane."""
+        """Shift (columns, rows) that aligns a frame's content with the mosaic: its pose error in the plane."""
         if self.poses_agree:
             return 0.0, 0.0
         if frame_index not in self.slides:
@@ -84,7 +84,10 @@ class Run:
 
 
 def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int, margin_m: float = 0.0) -> Run | None:
-    """Warp, gather evidence, level the axes to the lines, cut. `margin_m` reaches beyond what the scan saw of the plane."""
+    """Run of a plane: warp, gather evidence, level the axes to the lines, cut; None where no frame shows it.
+
+    `margin_m` extends the grid beyond the observed part of the plane.
+    """
     params = tuned(Params)
     views = _Views(make_grid(region, cell_m, 0.0, margin_m), region, scene, margin_m)
     few = max(frame_count // 2, 4)
@@ -111,9 +114,9 @@ def run_on(
     lines: tuple[Evidence, Evidence],
     cells: tuple[Cell, ...] | None = None,
 ) -> Run:
-    """What is known of a plane from its tiles, its relief and colours' upright and level lines; cut where no panels are given.
+    """Run from a plane's tiles, relief, and upright and level colour lines; cut into panels where no cells are given.
 
-    Where the poses agree, the tiles lie where they are; where not, the mosaic is of the best half of them: more would blur it.
+    Where poses agree, the tiles are not shifted; otherwise the mosaic uses the best half of them only: more would blur it.
     """
     poses_agree = bool(np.median([max(abs(tile.shift[0]), abs(tile.shift[1])) for tile in tiles]) <= STEADY_CELLS)
     if poses_agree:
@@ -137,7 +140,7 @@ def run_on(
 
 
 class _Views:
-    """The frames that show a plane on its grid, best first; each is warped and scored once, however many are asked for."""
+    """The frames that show a plane on its grid, best first; each is warped and scored at most once."""
 
     def __init__(self, grid: PlaneGrid, region: PlaneRegion, scene: Scene, margin_m: float) -> None:
         self.grid, self._scene = grid, scene
@@ -147,15 +150,15 @@ class _Views:
         self._made: dict[int, ScoredTile | None] = {}
 
     def chosen(self, count: int) -> list[int]:
-        """The numbers of the frames that see it best, so many at most."""
+        """Indices of the frames that see the plane best, at most `count`."""
         return choose_frames(self._quality, self._scene, count)
 
     def tiles(self, count: int) -> list[ScoredTile]:
-        """Of the chosen frames, those that show enough."""
+        """Scored tiles of the chosen frames that show enough."""
         return [tile for index in self.chosen(count) if (tile := self._tile(index)) is not None]
 
     def evidence(self, count: int) -> tuple[Evidence, Evidence]:
-        """Of vertical and of horizontal lines; sets the tiles' shifts."""
+        """Evidence of vertical and of horizontal lines; sets the tiles' shifts."""
         tiles = self.tiles(count)
         return gather(tiles, 0, self.grid.cell_m), gather(tiles, 1, self.grid.cell_m)
 
@@ -167,7 +170,7 @@ class _Views:
 
 
 def _with_edges(evidence: Evidence, relief: Relief, axis: int, grid: PlaneGrid) -> Evidence:
-    """Colour evidence, and the plane's own ends as depth shows them."""
+    """Colour evidence combined with the plane's own ends as depth shows them."""
     edges = np.maximum(*relief.edge_evidence(axis, evidence.block, grid.columns, grid.rows))[: len(evidence.score)]
     score = np.where(edges > 1, np.maximum(evidence.score, edges), evidence.score)
     return Evidence(score, evidence.known | (edges > 2), evidence.block, edges)

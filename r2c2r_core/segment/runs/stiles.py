@@ -1,4 +1,4 @@
-"""Frame-and-panel fronts made whole: a strip beside a panel that is a stile or rail of its frame belongs to it."""
+"""Completion of frame-and-panel fronts: a strip beside a panel that is a stile or rail of its frame joins it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,27 +18,41 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a strip is part of a frame. Scores are z-scores of a line over the blocks along it."""
+    """Tuned parameters of frames. Scores are z-scores of a line over the blocks along it."""
 
-    narrowest_m: float = param(0.03, "m", "of stiles and rails", gt=0, source="frames of doors sold are 50-90 mm wide")
-    widest_m: float = param(0.12, "m", "of stiles and rails", gt=0, source="likewise")
-    alike_m: float = param(0.025, "m", "by which two stiles of one front may differ: sunk panels shift as they are looked at")
-    in_line_m: float = param(0.015, "m", "by which a strip may be longer or shorter than its front")
-    panel_line: float = param(0.7, "σ", "of a line around a panel, from where it shows", source="lines of development kitchens")
-    none_share: float = param(0.5, "share", "of that, of what shows where there is no line")
+    narrowest_m: float = param(
+        0.03, "m", "Minimum width of stiles and rails", gt=0, source="frames of doors sold are 50-90 mm wide"
+    )
+    widest_m: float = param(
+        0.12, "m", "Maximum width of stiles and rails", gt=0, source="frames of doors sold are 50-90 mm wide"
+    )
+    alike_m: float = param(
+        0.025, "m", "Maximum difference between the widths of two stiles of one front: sunk panels shift with the view"
+    )
+    in_line_m: float = param(0.015, "m", "Maximum difference between the ends of a strip and of its front")
+    panel_line: float = param(
+        0.7, "σ", "Minimum score of a visible line around a panel", source="lines of development kitchens"
+    )
+    none_share: float = param(0.5, "share", "Fraction of a visible line's score below which there is no line")
     sunk_m: float = param(
         0.003,
         "m",
-        "behind its frame, of a panel at least",
+        "Minimum distance of a panel behind its frame",
         gt=0,
         source="6-12 mm are usual; a strip's mean depth is known to 1 mm",
     )
-    beside_m: tuple[float, float] = param((0.005, 0.025), "m", "from a line, from where and up to where depth beside it counts")
-    edge: float = param(-1.0, "log", "odds of a frame's outer edge, at least")
-    even_m: float = param(
-        0.01, "m", "by which rails and stiles of one front may differ", gt=0, source="as exactly as their lines are placed"
+    beside_m: tuple[float, float] = param(
+        (0.005, 0.025), "m", "Minimum and maximum distance from a line of the depth that is compared beside it"
     )
-    middle: float = param(0.6, "share", "of a side, over whose middle lines count: corners have others")
+    edge: float = param(-1.0, "log", "Minimum log-odds of a frame's outer edge")
+    even_m: float = param(
+        0.01,
+        "m",
+        "Maximum difference between the widths of rails and stiles of one front",
+        gt=0,
+        source="as exactly as their lines are placed",
+    )
+    middle: float = param(0.6, "share", "Fraction of a side over whose middle lines count: corners have other lines")
 
 
 def whole_frames(
@@ -49,9 +63,9 @@ def whole_frames(
     contrast: Contrast,
     relief: Relief,
 ) -> list[Cell]:
-    """The cells, strips of frames joined to their panels; `lines` are evidence of upright and of level ones.
+    """Cells with frame strips joined to their panels; `lines` are the evidence of upright and of level lines.
 
-    Where the gaps at a front's other sides end, what follows is no part of it: a rail of the face frame that it is inset in.
+    Where the gaps at a front's other sides end, the strip is not part of it but a rail of the face frame that it is inset in.
     """
     params, field, found = tuned(Params), LineField(odds, cell_m), list(cells)
     for front in filter(field.is_front, cells):
@@ -74,9 +88,9 @@ def whole_frames(
 
 
 def evenly_framed(contrast: Contrast, relief: Relief, refined: Refined, cell_m: float) -> Cell:
-    """A panel whose upper edge lies in a shadow, that edge as far over its sunk panel as the others are beside it.
+    """Panel with an upper edge in shadow, moved so that its upper rail is as wide as its other rails and stiles.
 
-    The shadow of a worktop lies on a front as on the rail of a face frame over it, and hides the gap between them.
+    The shadow of a worktop covers a front and a face-frame rail above it alike, and hides the gap between them.
     """
     params, panel = tuned(Params), refined.panel
     left, right, top, bottom = (_frame_width(contrast, relief, panel, side, cell_m) for side in SIDES)
@@ -90,7 +104,7 @@ def evenly_framed(contrast: Contrast, relief: Relief, refined: Refined, cell_m: 
 
 
 def _frame_width(contrast: Contrast, relief: Relief, panel: Cell, side: tuple[int, int], cell_m: float) -> float | None:
-    """How far inside one edge of a front its sunk panel begins, in grid cells: at a line, or else as depth shows; else None."""
+    """Width of the frame at one edge of a front, in grid cells, from a line or else from depth; None where neither shows it."""
     params, (axis, end) = tuned(Params), side
     edge, away = across(panel, axis)[end], -1 if end else 1
     lines = lines_beside(contrast, panel, side, cell_m)
@@ -103,7 +117,7 @@ def _frame_width(contrast: Contrast, relief: Relief, panel: Cell, side: tuple[in
 
 
 def _step_at(relief: Relief, front: Cell, axis: int, at: float, away: int, cell_m: float) -> float:
-    """By how much depth lies farther back beyond a position, along the middle of a front's span, than before it, in metres."""
+    """Depth step in metres (positive: farther back) beyond a position, along the middle of a front's span."""
     params, (low, high) = tuned(Params), across(front, 1 - axis)
     margin, level = (high - low) * (1 - params.middle) / 2, []
     for side in (-away, away):
@@ -115,7 +129,7 @@ def _step_at(relief: Relief, front: Cell, axis: int, at: float, away: int, cell_
 
 
 def _strip_beside(field: LineField, cells: Sequence[Cell], front: Cell, axis: int, end: int) -> Cell | None:
-    """What beside one end of a front may be a part of its frame, from the front on to the next line; None where nothing is."""
+    """Strip beside one end of a front up to the next line that may belong to its frame; None where there is none."""
     params = tuned(Params)
     (low, high), beside = across(front, axis), across(front, 1 - axis)
     near, away = (high, 1) if end else (low, -1)
@@ -148,7 +162,7 @@ def _shares_at_corners(contrast: Contrast, front: Cell, axis: int, end: int, cel
 
 
 def _is_sunk(contrast: Contrast, relief: Relief, front: Cell, axis: int, end: int, cell_m: float) -> bool:
-    """Whether depth shows a front behind what is beside one end of it, at a line."""
+    """Whether depth shows a front behind the strip beside one end of it, at a visible line."""
     params, at, (low, high) = tuned(Params), across(front, axis)[end], across(front, 1 - axis)
     margin, out = (high - low) * (1 - params.middle) / 2, 1 if end else -1
     step = _step_at(relief, front, axis, at, -out, cell_m)
@@ -158,9 +172,9 @@ def _is_sunk(contrast: Contrast, relief: Relief, front: Cell, axis: int, end: in
 def _is_stile(
     field: LineField, front: Cell, strip: Cell, lines: tuple[Evidence, Evidence], axis: int, end: int, sunk: bool
 ) -> bool:
-    """Whether lines at a front's other three sides stand as far in as the strip is wide, and none inside its own side.
+    """Whether lines at a front's other three sides are as far inside as the strip is wide, with none inside the strip's side.
 
-    Where depth shows the panel sunk, light may hide one of them.
+    Where depth shows the panel sunk, one of the three may be invisible in the light.
     """
     params, cell_m = tuned(Params), field.cell_m / STEP
     (low, high), beside = across(front, axis), across(front, 1 - axis)
@@ -186,7 +200,7 @@ def _is_stile(
 
 
 def _clearest(lines: Evidence, span: tuple[float, float], start: float, stop: float) -> float:
-    """The highest median score over the middle of a span of the lines from `start` to `stop`."""
+    """Maximum, over lines from `start` to `stop`, of the median score along the middle of a span."""
     margin = (span[1] - span[0]) * (1 - tuned(Params).middle) / 2
     first = int((span[0] + margin) / lines.block)
     blocks = slice(first, max(int((span[1] - margin) / lines.block), first + 1))
@@ -196,7 +210,7 @@ def _clearest(lines: Evidence, span: tuple[float, float], start: float, stop: fl
 
 
 def _without(cell: Cell, strip: Cell) -> list[Cell]:
-    """What a strip that crosses a cell leaves of it."""
+    """Remaining parts of a cell crossed by a strip."""
     left, right = max(cell.left, strip.left), min(cell.right, strip.right)
     top, bottom = max(cell.top, strip.top), min(cell.bottom, strip.bottom)
     if right - left < 1 or bottom - top < 1:

@@ -13,45 +13,55 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where a run is cut. Odds are natural logarithms: 0 is even."""
+    """Tuned parameters of the XY-cut. Odds are natural logarithms: 0 is even."""
 
-    hidden: float = param(0.3, "share", "of a line's span that may show no edge: handles, things before it")
-    apart_m: float = param(0.015, "m", "between two lines: a gap has one", gt=0)
-    beside_m: float = param(0.02, "m", "from a line, where a front must begin for it to be an edge", gt=0)
-    end_m: float = param(0.01, "m", "about where fronts end, within which their edge is", gt=0)
-    shortest_m: float = param(0.06, "m", "of a line's span along fronts", gt=0)
-    block_m: float = param(0.03, "m", "along a line, over which its odds are pooled and it stays at one place", gt=0)
-    step: float = param(0.5, "log", "of a block, that a line's step aside by one cell costs: poses and lenses bend lines")
+    hidden: float = param(0.3, "share", "Maximum fraction of a line's span without a visible edge: handles, occluders")
+    apart_m: float = param(0.015, "m", "Minimum distance between two lines: a gap has one", gt=0)
+    beside_m: float = param(0.02, "m", "Maximum distance from a line to a front for the line to be its edge", gt=0)
+    end_m: float = param(0.01, "m", "Search distance for an edge around the end of fronts", gt=0)
+    shortest_m: float = param(0.06, "m", "Minimum length of a line's span along fronts", gt=0)
+    block_m: float = param(0.03, "m", "Length along a line over which its odds are pooled and its position is constant", gt=0)
+    step: float = param(0.5, "log", "Cost of a one-cell sidestep of a line between blocks: poses and lenses bend lines")
     bend_m: float = param(
         0.03,
         "m",
-        "from its middle, to which a line bends: beyond, it is another stack's seam",
+        "Maximum deviation of a line from its median position: beyond, it is another stack's seam",
         gt=0,
         source="a real kitchen's poses bend its lines by more than 2 cm",
     )
-    usual_width_m: float = param(0.5, "m", "of a front, median", gt=0, source="units sold are 0.3 to 0.6 m wide")
-    usual_height_m: float = param(0.45, "m", "of a front, median", gt=0, source="drawers 0.14 m, doors 0.72 m, tall doors 2 m")
-    width_spread: float = param(0.5, "log", "standard deviation of the logarithm of fronts' widths", gt=0)
-    height_spread: float = param(0.9, "log", "standard deviation of the logarithm of fronts' heights", gt=0)
-    odd_share: float = param(0.05, "share", "of parts of any size: fillers, end panels, wide fronts", gt=0, lt=1)
-    odd_handle: float = param(0.2, "share", "of those, that have a handle: pull-outs, wide fronts", gt=0, lt=1)
-    size_weight: float = param(0.5, "ratio", "of what sizes say: what the network was trained on knows a part of it")
-    handle_weight: float = param(1, "ratio", "of what handles say, likewise")
-    no_handle: float = param(0.5, "share", "of fronts without a handle", gt=0, lt=1)
-    two_handles: float = param(0.01, "share", "of fronts with two", gt=0, lt=1)
-    more_handles: float = param(0.25, "ratio", "of the share of fronts with one handle more", gt=0, lt=1)
-    possible: float = param(-3.0, "log", "mean odds of a line, below which nothing beside it makes it an edge")
-    crossed: float = param(3.0, "log", "at most, that is added to a line beyond which both lines across it end")
-    crossed_m: float = param(0.02, "m", "of their absence, from where it counts in full", gt=0, source="rails are 2-5 cm wide")
-    blur_m: float = param(0.01, "m", "beside a line, where lines across it may seem to go on", source="two cells of the odds")
-    handle_cells: int = param(4, "count", "of cells of the odds, that a handle has at least", gt=0)
+    usual_width_m: float = param(0.5, "m", "Median width of a front", gt=0, source="units sold are 0.3 to 0.6 m wide")
+    usual_height_m: float = param(
+        0.45, "m", "Median height of a front", gt=0, source="drawers 0.14 m, doors 0.72 m, tall doors 2 m"
+    )
+    width_spread: float = param(0.5, "log", "Standard deviation of the logarithm of fronts' widths", gt=0)
+    height_spread: float = param(0.9, "log", "Standard deviation of the logarithm of fronts' heights", gt=0)
+    odd_share: float = param(0.05, "share", "Fraction of parts of any size: fillers, end panels, wide fronts", gt=0, lt=1)
+    odd_handle: float = param(
+        0.2, "share", "Relative frequency of those among parts with a handle: pull-outs, wide fronts", gt=0, lt=1
+    )
+    size_weight: float = param(
+        0.5, "ratio", "Weight of the size prior: the network has learned part of it from its training data"
+    )
+    handle_weight: float = param(1, "ratio", "Weight of the handle prior, for the same reason")
+    no_handle: float = param(0.5, "share", "Fraction of fronts without a handle", gt=0, lt=1)
+    two_handles: float = param(0.01, "share", "Fraction of fronts with two handles", gt=0, lt=1)
+    more_handles: float = param(0.25, "ratio", "Factor of that fraction for each further handle", gt=0, lt=1)
+    possible: float = param(-3.0, "log", "Minimum mean log-odds of a line for other evidence to make it an edge")
+    crossed: float = param(3.0, "log", "Maximum log-odds added to a line beyond which both lines across it end")
+    crossed_m: float = param(
+        0.02, "m", "Length over which those lines must be absent for the full gain", gt=0, source="rails are 2-5 cm wide"
+    )
+    blur_m: float = param(
+        0.01, "m", "Distance beside a line over which lines across it may seem to continue", source="two cells of the odds"
+    )
+    handle_cells: int = param(4, "count", "Minimum number of cells of a handle", gt=0)
 
 
 class Line(NamedTuple):
-    """A cut. `total` is the sum of log-odds along it, over cells of the odds that are beside a front.
+    """A cut. `total` is the sum of log-odds along it, over the cells that are beside a front.
 
-    In the order to cut along them, the last first: a line that is no edge along a part of its span, however likely it is in
-    all, would cut a front there that others part from the rest.
+    Lines compare by priority; the greatest is cut first. Unbroken lines lead: a line that is no edge along part of its span,
+    however likely overall, would cut through a front there that other lines separate from the rest.
     """
 
     unbroken: bool  # an edge is possible all along
@@ -62,24 +72,24 @@ class Line(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """The likeliest path to each position at the end of a span, (blocks, positions)."""
+    """Most probable path to each position at the end of a span, (blocks, positions)."""
 
     at: np.ndarray  # position in each block
     odds: np.ndarray
-    beside: np.ndarray  # whether a front is beside it
-    score: np.ndarray  # (positions,) sum of odds less what stepping aside costs
+    beside: np.ndarray  # whether it is beside a front
+    score: np.ndarray  # (positions,) sum of odds minus the cost of sidesteps
 
 
 class LineEvidence(NamedTuple):
-    """Of lines through a cell, at positions from `start` on."""
+    """Evidence of lines through a cell, at positions from `start` on."""
 
     start: int
-    odds: np.ndarray  # what is seen
-    prior: np.ndarray  # what sizes and handles say
+    odds: np.ndarray  # log-odds of the network and of crossing borders
+    prior: np.ndarray  # log-odds by sizes and handles
 
 
 def cut_alone(field: "LineField", grid: Cell) -> list[Cell]:
-    """Rectangles that tile a grid, each cut by what is seen within it alone."""
+    """Rectangles that tile a grid, each cut by the evidence within it alone."""
     found, waiting = [], [grid]
     while waiting:
         cell = waiting.pop()
@@ -122,13 +132,13 @@ class LineField:
         )
 
     def best_cut(self, cell: Cell) -> Line | None:
-        """The line with the most log-likelihood, of those more likely than not over the span of the cell."""
+        """Cut with the highest log-likelihood, among lines more likely than not over the span of the cell."""
         return max((line for axis in (0, 1) if (line := self._best(cell, axis)) is not None), default=None)
 
     def end_of_fronts(self, cell: Cell) -> Line | None:
-        """The likeliest line where fronts end within a cell: an edge must be there, however faint, if the border is none.
+        """Likeliest line where fronts end within a cell: an edge must be there, however faint, if the border is none.
 
-        What is beyond it must be less likely a front than the line is no edge.
+        Its log-odds must exceed the mean log-odds of a front beyond it.
         """
         margin, reach = max(2, round(self.params.apart_m / self.cell_m)), max(1, round(self.params.end_m / self.cell_m))
         found = []
@@ -151,14 +161,14 @@ class LineField:
         return max(found, default=None)
 
     def _border(self, cell: Cell, axis: int, border: float) -> float:
-        """The odds that a line within a cell must exceed beside a border of it: the border's, where that is an edge itself."""
+        """Log-odds that a line beside a cell border must exceed: the border's, where that is an edge itself."""
         line = self.best_between(cell, axis, border - STEP, border + STEP)
         return line.odds if line is not None and line.odds > 0 else -np.inf
 
     def best_between(self, cell: Cell, axis: int, start: float, stop: float, *, sized: bool = False) -> Line | None:
-        """The likeliest line over the span of a cell with its position from `start` to `stop`, however unlikely.
+        """Likeliest line over the span of a cell with its position from `start` to `stop`, however unlikely.
 
-        `sized`: by what sizes and handles of both parts say, too, which its total counts; its odds are of what is seen.
+        `sized` adds the prior by sizes and handles of both parts to the choice and `total`, but not to `odds`.
         """
         first = max(int(start // STEP), 0)
         last = min(max(round(stop / STEP), first + 1), self.odds[axis].shape[1])
@@ -173,7 +183,7 @@ class LineField:
         return Line(unbroken, (mean + float(prior[best])) * (span.stop - span.start), axis, position * STEP, mean)
 
     def evidence(self, cell: Cell, axis: int) -> LineEvidence | None:
-        """What speaks for a line at each position within a cell; None where none fits."""
+        """Evidence for a line at each position within a cell; None where none fits."""
         start, stop = self._within(cell, axis)
         paths = self._paths(cell, axis, start, stop)
         if paths is None:
@@ -182,18 +192,18 @@ class LineField:
         return LineEvidence(start, odds, self._prior(cell, axis, start, stop))
 
     def _within(self, cell: Cell, axis: int) -> tuple[int, int]:
-        """From which position up to which a line is far enough from a cell's ends."""
+        """Range of positions of lines far enough from a cell's ends."""
         low, high = across(cell, axis)
         margin = max(1, round(self.params.apart_m / self.cell_m))
         return round(low / STEP) + margin, min(round(high / STEP), self.odds[axis].shape[1]) - margin
 
     def is_front(self, cell: Cell) -> bool:
-        """Whether most of a cell is on fronts, and wide and high enough to be more than a rail."""
+        """Whether a cell lies mostly on fronts, and is wide and high enough to be more than a rail."""
         share = self.front[0][self._span(cell, 0), self._span(cell, 1)]
         return bool(share.size and share.mean() > 0.5 and min(share.shape) * self.cell_m > self.params.shortest_m)
 
     def likeliest(self, cell: Cell, axis: int, start: float, stop: float) -> tuple[float, float] | None:
-        """Position and mean log-odds of the likeliest straight line over the span of a cell, whatever is beside it."""
+        """Position and mean log-odds of the likeliest straight line over the span of a cell, whatever lies beside it."""
         first, last = max(int(start // STEP), 0), round(stop / STEP)
         near = self.odds[axis][self._span(cell, axis), first:last]
         if not near.size:
@@ -203,12 +213,12 @@ class LineField:
         return (first + best + 0.5) * STEP, float(odds[best])
 
     def is_possible(self, cell: Cell, axis: int, position: float) -> bool:
-        """Whether a straight line at about a position over the span of a cell may be an edge by what is seen."""
+        """Whether a straight line near a position over the span of a cell may be an edge by its log-odds."""
         found = self.likeliest(cell, axis, position - STEP, position + STEP)
         return found is not None and found[1] > self.params.possible
 
     def best_uncut(self, cell: Cell, inset_m: float) -> float:
-        """Log-odds, sizes and handles in mind, of the likeliest line this far within a cell; -inf where none fits."""
+        """Log-odds, with sizes and handles, of the likeliest line at least `inset_m` within a cell; -inf where none fits."""
         inset, best = inset_m / self.cell_m, -np.inf
         for axis in (0, 1):
             low, high = across(cell, axis)
@@ -243,14 +253,14 @@ class LineField:
         return Line(bool(unbroken[best]), float(total[best] * block), axis, position * STEP, float(total[best] / count[best]))
 
     def _unbroken(self, cell: Cell, axis: int, paths: Paths) -> np.ndarray:
-        """Which lines are possible all along fronts, but for as much as a handle hides."""
+        """Mask of the lines that are possible all along fronts, except for as much as a handle hides."""
         span = self._span(cell, axis)
         block_m = (span.stop - span.start) / len(paths.at) * self.cell_m
         broken = (paths.beside & (paths.odds < self.params.possible)).sum(axis=0)
         return np.asarray(broken * block_m < self.params.shortest_m)
 
     def _paths(self, cell: Cell, axis: int, start: int, stop: int) -> Paths | None:
-        """Through the span of a cell, at positions from `start` up to `stop`, by dynamic programming."""
+        """Viterbi paths through the span of a cell, at positions from `start` up to `stop`."""
         span = self._span(cell, axis)
         if stop <= start or span.stop <= span.start:
             return None
@@ -284,7 +294,7 @@ class LineField:
         return np.asarray(np.add.reduceat(values, starts, axis=0) / sizes[:, None])
 
     def _prior(self, cell: Cell, axis: int, start: int, stop: int) -> np.ndarray:
-        """Log-odds of a cut at each position by the sizes of both parts and their handles, where both are of fronts."""
+        """Log-odds of a cut at each position by sizes and handles of both parts, where both are mostly fronts."""
         low, high = (round(value / STEP) for value in across(cell, axis))
         on = np.cumsum(np.pad(self.front[axis][self._span(cell, axis), low:high].mean(axis=0), (1, 0)))
         at = np.arange(start, stop) - low
@@ -299,9 +309,9 @@ class LineField:
         return np.where(fronts, self.params.size_weight * sizes + self.params.handle_weight * shares, 0.0)
 
     def _crossed(self, cell: Cell, axis: int, start: int, stop: int, paths: Paths) -> np.ndarray:
-        """Log-odds of a cut at each position by a cell's borders across it, which are edges of a front over all its length.
+        """Log-odds of a cut at each position by the cell's borders across it, which are edges of a front over its full length.
 
-        Where both are edges over most of a cell, but not in the lesser part that a cut would leave, the front ends at the cut:
+        Where both are edges over most of a cell, but not in the smaller part that a cut would leave, the front ends at the cut:
         a rail of a frame follows.
         """
         params, worth = self.params, np.zeros(stop - start)
@@ -328,21 +338,21 @@ class LineField:
         return np.stack([odds[span, border - 1 : border + 2].max(axis=1) for border in at])
 
     def _handles_in(self, cell: Cell, axis: int) -> np.ndarray:
-        """Positions of the middles of handles within a cell, ascending."""
+        """Positions of the centres of handles within a cell, ascending."""
         (low, high), span, along = across(cell, axis), self._span(cell, axis), self.handles[:, axis]
         beside = self.handles[:, 1 - axis]
         inside = (along * STEP >= low) & (along * STEP < high) & (beside >= span.start) & (beside < span.stop)
         return np.sort(along[inside])
 
     def _log_share(self, count: np.ndarray) -> np.ndarray:
-        """Of fronts with so many handles."""
+        """Log of the fraction of fronts with `count` handles."""
         params = self.params
         more = np.log(params.two_handles) + np.log(params.more_handles) * (count - 2)
         one = np.log(1 - params.no_handle - params.two_handles / (1 - params.more_handles))
         return np.select([count == 0, count == 1], [np.log(params.no_handle), one], more)
 
     def _log_density(self, cells: np.ndarray, axis: int, handles: np.ndarray) -> np.ndarray:
-        """Of the logarithm of a part's width or height, by how many handles it has: fillers and end panels have none."""
+        """Log-density of the logarithm of a part's size, by its number of handles: fillers and end panels have none."""
         params = self.params
         usual, spread = (
             (params.usual_width_m, params.width_spread) if axis == 0 else (params.usual_height_m, params.height_spread)
@@ -357,7 +367,7 @@ class LineField:
         return slice(round(low / STEP), round(high / STEP))
 
     def _centre(self, cell: Cell, axis: int, at: np.ndarray, beside: np.ndarray) -> float:
-        """The mean position of a path, to a part of a cell: the mean over cells around it, by their mean odds."""
+        """Mean position of a path, with subcell accuracy: the mean over cells around it, weighted by their mean odds."""
         odds = self._pooled(self.odds[axis][self._span(cell, axis)])
         near = np.arange(-2, 3)
         columns = np.clip(at[beside][:, None] + near, 0, odds.shape[1] - 1)
@@ -369,6 +379,6 @@ _ODD_DENSITY = 1 / np.log(4.0 / 0.01)  # of the logarithm of a size between 1 cm
 
 
 def _centres(mask: np.ndarray, least: int) -> np.ndarray:
-    """Columns and rows (n, 2) of the middles of a mask's connected components of so many cells."""
+    """Columns and rows (n, 2) of the centres of a mask's connected components of at least `least` cells."""
     _, _, stats, centres = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
     return np.asarray(centres[1:][stats[1:, cv2.CC_STAT_AREA] >= least])
