@@ -1,1 +1,1 @@
-"""Motion of a leaf against its unit: `track` finds the joint it hangs on and its state in every frame, from depth."""
+"""Motion of leaves relative to their unit: `track` estimates the joint of a leaf and its state in every frame, from depth."""

@@ -1,4 +1,4 @@
-"""The visible pixels of a leaf that stands open: its board, and what a drawer brings out behind it."""
+"""Masks of open leaves: the board, and for a drawer also the box and contents behind its front."""
 
 from dataclasses import dataclass
 
@@ -18,27 +18,40 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What hides a leaf that stands open: its pose is fitted, and a hand may be on it."""
+    """Tuned parameters of occlusion of an open leaf, whose pose is fitted and which a hand may hide."""
 
-    before_m: float = param(0.025, "m", "before it, from where something hides it")
-    in_plane_m: float = param(0.012, "m", "the same of one that slides past others", source="tracks lie 2-4 cm apart")
-    behind_m: float = param(0.04, "m", "behind it, from where depth looks past it")
-    rear_m: float = param(0.03, "m", "behind the face of a drawer's rear board, within which it ends")
-    shade: float = param(2.2, "ratio", "darker or lighter than the leaf usually is, from where it is no shade on it", gt=1)
-    hue_lab: float = param(18.0, "grey", "off the leaf's hue in that shade, from where it is no part of it")
-    touches_m: float = param(0.015, "m", "before its face, within which depth is the leaf's: more may be a hand on its handle")
-    hole_px: float = param(3.0, "px", "of the depth image, of a hole between two surfaces on either side", gt=0)
-    hand_m: float = param(0.03, "m", "width of what may be a hand or a sleeve: handles are narrower")
-    told_share: float = param(0.1, "share", "of a leaf's pixels that need depth, for its usual colour to be known")
-    hand_share: float = param(0.5, "share", "of a leaf that a hand covers, at most: black glass has depth on its rim alone")
+    before_m: float = param(0.025, "m", "Minimum distance in front of the leaf of an occluder")
+    in_plane_m: float = param(
+        0.012,
+        "m",
+        "Minimum distance in front of a leaf that slides past others, of an occluder",
+        source="tracks lie 2-4 cm apart",
+    )
+    behind_m: float = param(0.04, "m", "Minimum distance of depth behind the leaf to look past it")
+    rear_m: float = param(0.03, "m", "Margin behind the face of a drawer's rear board within which the drawer ends")
+    shade: float = param(
+        2.2, "ratio", "Factor of lightness to the leaf's median beyond which a pixel is not a shaded part of it", gt=1
+    )
+    hue_lab: float = param(18.0, "grey", "Maximum hue difference from the leaf's colour in that shade")
+    touches_m: float = param(
+        0.015, "m", "Maximum distance in front of its face of depth on the leaf: more may be a hand on its handle"
+    )
+    hole_px: float = param(3.0, "px", "Maximum distance from a hole in the depth image to the surface that fills it", gt=0)
+    hand_m: float = param(0.03, "m", "Minimum width of what may be a hand or a sleeve: handles are narrower")
+    told_share: float = param(
+        0.1, "share", "Minimum fraction of a leaf's pixels with depth on it for its usual colour to be known"
+    )
+    hand_share: float = param(
+        0.5, "share", "Maximum fraction of a leaf that a hand covers: black glass has depth on its rim alone"
+    )
 
 
 def open_mask(opened: OpenLeaf, scene: Scene, frame: Frame) -> tuple[Mask, float]:
-    """Its visible pixels in a frame, and the share of its projection that is visible."""
+    """Visible pixels of an open leaf in a frame, and the visible fraction of its projection."""
     params = tuned(Params)
     near = Tolerance(
         front_m=params.in_plane_m if opened.way == "along" else params.before_m, behind_m=params.behind_m, fused=False
-    )  # a leaf that slides passes others a track away
+    )  # a sliding leaf passes others one track away
     mask, share = visible_mask(_faces(opened, frame), scene, frame, near)
     seen = _seen(opened, scene, frame)
     mask = mask & ~_hand_before(mask, opened, seen, scene, frame)
@@ -46,9 +59,9 @@ def open_mask(opened: OpenLeaf, scene: Scene, frame: Frame) -> tuple[Mask, float
 
 
 def _seen(opened: OpenLeaf, scene: Scene, frame: Frame) -> np.ndarray:
-    """What depth saw, in the leaf's frame (h, w, 3); NaN where nothing was measured nearby.
+    """Depth points in the leaf's frame (h, w, 3); NaN where nothing was measured nearby.
 
-    Between two surfaces depth has a thin line of holes: each of its pixels is of what is nearest to it.
+    Depth has a thin line of holes between two surfaces: each of its pixels takes the nearest measured depth.
     """
     camera, depth = frame.depth_camera, scene.depth(frame.index)
     away, nearest = distance_transform_edt(depth == 0, return_indices=True)
@@ -58,10 +71,10 @@ def _seen(opened: OpenLeaf, scene: Scene, frame: Frame) -> np.ndarray:
 
 
 def _hand_before(mask: Mask, opened: OpenLeaf, seen: np.ndarray, scene: Scene, frame: Frame) -> Mask:
-    """Pixels of the mask that depth does not see on the leaf, in a patch as wide as a hand that is coloured as the leaf is not.
+    """Pixels of an occluding hand: off the leaf by depth, in a patch as wide as a hand whose colour differs from the leaf's.
 
-    A hand on a handle stands little before its leaf, and skin in shade, gloves and sleeves return no light to a phone's LiDAR:
-    depth alone does not tell them from the leaf.
+    A hand on a handle is close in front of the leaf, and shaded skin, gloves and sleeves return no light to a phone's LiDAR:
+    depth alone does not separate them from the leaf.
     """
     params = tuned(Params)
     size = (mask.shape[1], mask.shape[0])
@@ -86,7 +99,7 @@ def _hand_before(mask: Mask, opened: OpenLeaf, seen: np.ndarray, scene: Scene, f
 
 
 def _faces(opened: OpenLeaf, frame: Frame) -> list[Facet]:
-    """The sides of the board that face the camera."""
+    """Sides of the board that face the camera."""
     face = corners(opened.leaf)
     back = face + opened.leaf.behind
     quads = [face, back[::-1], *(np.stack([face[k], back[k], back[k - 1], face[k - 1]]) for k in range(4))]
@@ -101,9 +114,9 @@ def _side(facet: Facet, point: np.ndarray) -> float:
 
 
 def _drawn_out(opened: OpenLeaf, seen: np.ndarray, frame: Frame) -> Mask:
-    """Pixels whose depth lies behind a drawer's front: its box, and what is in it.
+    """Pixels whose depth lies behind a drawer's front: its box and contents.
 
-    Of a box whose rear was not seen, what has come out of the unit.
+    For a box whose rear was not observed, only as far as the drawer has come out.
     """
     out = float(np.linalg.norm(opened.world_from_leaf.translation - opened.leaf.world_from_front.translation))
     if opened.rear_m is not None:

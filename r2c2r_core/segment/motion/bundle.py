@@ -1,4 +1,4 @@
-"""One robust fit of a joint to all frames: its axis, its pivot and every state, with covariance from the Jacobian."""
+"""Robust fit of one joint to all frames: its axis, its pivot and every state, with covariance from the Jacobian."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,15 +16,22 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What is known of a joint before any frame."""
+    """Tuned parameters (priors and robust scale) of the joint fit."""
 
-    axis_rad: float = param(float(np.deg2rad(0.5)), "rad", "standard deviation of an axis from its front's edge or normal")
-    pivot_m: float = param(
-        0.012, "m", "standard deviation of a hinge from its front's edge", source="concealed hinges turn 5-20 mm inside it"
+    axis_rad: float = param(
+        float(np.deg2rad(0.5)), "rad", "Standard deviation of a joint axis relative to its front's edge or normal"
     )
-    thickness_m: float = param(0.003, "m", "standard deviation of a board's thickness", source="lists: fronts of 16-22 mm")
-    free_state: float = param(1.0, "ratio", "standard deviation of a state before it is seen: radians or metres", gt=0)
-    outlier: float = param(2.0, "σ", "of a frame's plane from which it counts less (Huber 1964)", gt=0)
+    pivot_m: float = param(
+        0.012,
+        "m",
+        "Standard deviation of a hinge relative to its front's edge",
+        source="concealed hinges turn 5-20 mm inside the edge",
+    )
+    thickness_m: float = param(
+        0.003, "m", "Standard deviation of a board's thickness", source="manufacturers' lists: fronts of 16-22 mm"
+    )
+    free_state: float = param(1.0, "ratio", "Prior standard deviation of a state: radians or metres", gt=0)
+    outlier: float = param(2.0, "σ", "Residual of a frame's plane above which its weight falls (Huber 1964)", gt=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,22 +41,22 @@ class FittedJoint:
     axis: Vector3  # unit
     pivot: Vector3
     turns: bool
-    across: np.ndarray  # (2, 3) unit directions square to the axis: of its turns, and of the pivot's shifts
-    covariance: np.ndarray  # (4, 4): two turns of the axis (rad), two shifts of the pivot (m)
+    across: np.ndarray  # (2, 3) unit directions perpendicular to the axis: of its rotations, and of the pivot's shifts
+    covariance: np.ndarray  # (4, 4): two rotations of the axis (rad), two shifts of the pivot (m)
 
     def pose(self, state: float) -> Rigid3:
-        """Where the leaf stands: front_from_leaf, the identity where closed."""
+        """Pose of the leaf in a state: front_from_leaf, the identity where closed."""
         return moved(self.axis, self.pivot, self.turns, state)
 
     def covariance_in(self, rotation: Matrix3) -> np.ndarray:
-        """(6, 6), of a small rotation of the axis (rad) and of the pivot (m), in a frame that `rotation` turns into."""
+        """Covariance (6, 6) of a small rotation of the axis (rad) and of the pivot (m), in the frame `rotation` maps into."""
         spread = np.zeros((6, 4))
         spread[:3, :2] = spread[3:, 2:] = rotation @ self.across.T
         return np.asarray(spread @ self.covariance @ spread.T)
 
 
 def as_supposed(hypothesis: Hypothesis) -> FittedJoint:
-    """The joint as it was known before any frame."""
+    """Prior joint of a hypothesis, before any frame."""
     params = tuned(Params)
     return FittedJoint(
         axis=hypothesis.axis,
@@ -63,7 +70,7 @@ def as_supposed(hypothesis: Hypothesis) -> FittedJoint:
 def fit_joint(
     hypothesis: Hypothesis, fixes: Sequence[PlaneFix], states: np.ndarray
 ) -> tuple[FittedJoint, np.ndarray, np.ndarray]:
-    """The joint near a hypothesis that explains the planes best, and each frame's state with its standard deviation."""
+    """Maximum-a-posteriori joint near a hypothesis, given the planes, and each frame's state with its standard deviation."""
     params = tuned(Params)
     across, seen = _across(hypothesis), _stacked(fixes)
     prior = np.concatenate([np.full(2, params.axis_rad), np.full(2, params.pivot_m), [params.thickness_m]])
@@ -87,12 +94,12 @@ def fit_joint(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stacked:
-    """The fixes of all frames (n, ...)."""
+    """Fixes of all frames, stacked (n, ...)."""
 
     planes: np.ndarray
     whiten: np.ndarray  # (n, 3, 3): residuals of unit variance
     turned: np.ndarray  # (n, 3, 3) and
-    shifted: np.ndarray  # (n, 3): from the front frame into that of the leaf where it was expected
+    shifted: np.ndarray  # (n, 3): from the front frame into that of the leaf at its expected pose
     is_back: np.ndarray
 
 
@@ -117,7 +124,7 @@ def _joint_at(hypothesis: Hypothesis, across: np.ndarray, x: np.ndarray) -> tupl
 
 
 def _predicted(seen: _Stacked, hypothesis: Hypothesis, across: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The planes (n, 3) that the joint and its states predict, as the fixes measure them."""
+    """Planes (n, 3) predicted by the joint and its states, in the parametrisation of the fixes."""
     axis, pivot = _joint_at(hypothesis, across, x)
     states = x[5:]
     if hypothesis.turns:
@@ -132,7 +139,7 @@ def _predicted(seen: _Stacked, hypothesis: Hypothesis, across: np.ndarray, x: np
 
 
 def _differences(residuals: Callable[[np.ndarray], np.ndarray], x: np.ndarray, count: int) -> np.ndarray:
-    """The Jacobian by forward differences: all states at once, for each frame depends on its own alone."""
+    """Jacobian by forward differences: all states in one step, since each frame depends on its own state alone."""
     step, base = 1e-6, residuals(x)
     result = np.zeros((len(base), len(x)))
     for k in range(5):

@@ -1,4 +1,4 @@
-"""The leaves of one object as they were filmed: the motions they were seen to make, found once, and where they stand open."""
+"""Leaves of one object in the recording: their observed motions, estimated once, and their poses where they stand open."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -20,17 +20,17 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a category says of a joint before any frame."""
+    """Tuned parameters of a category's joint prior and of open leaves."""
 
     usual: float = param(
         8.0,
         "log",
-        "by which a category's own way of opening is likelier",
-        source="few frames overrule it: each is worth up to 80",
+        "Log prior odds of the category's own way of opening",
+        source="few frames overrule it: each carries up to 80",
     )
-    ajar_rad: float = param(float(np.deg2rad(25.0)), "rad", "that a door stands open, from where one sees behind it")
-    beyond_m: float = param(0.05, "m", "that a unit may be deeper than is known: usual depths differ by as much")
-    ajar_m: float = param(0.08, "m", "that what slides stands open, from where one sees behind it")
+    ajar_rad: float = param(float(np.deg2rad(25.0)), "rad", "Minimum opening angle of a door to see behind it")
+    beyond_m: float = param(0.05, "m", "Maximum excess of a unit's depth over the expected one: usual depths differ by as much")
+    ajar_m: float = param(0.08, "m", "Minimum opening of a sliding leaf to see behind it")
 
 
 _USUAL: Mapping[Opening, tuple[Way, ...]] = {
@@ -43,22 +43,22 @@ _USUAL: Mapping[Opening, tuple[Way, ...]] = {
 
 @dataclass(slots=True, eq=False)
 class FilmedLeaves:
-    """What moves of an object. Its motions are looked for when they are first asked for."""
+    """The moving leaves of an object. Motions are estimated on first use."""
 
     whole: Leaf
     category: Category
     scene: Scene
-    depth_m: float  # of its unit: to the wall behind it, or the usual depth
+    depth_m: float  # of its unit: to the wall behind it, or the usual depth of its category
     seams_m: tuple[float, ...] = ()  # heights in the front frame at which a drawer below its doors may end, likeliest first
     _filmed: tuple[tuple[Leaf, JointMotion | None], ...] | None = field(default=None, init=False, repr=False)
 
     @property
     def motions(self) -> tuple[JointMotion, ...]:
-        """One of each leaf that was seen to move."""
+        """Motions of the leaves that were observed to move."""
         return tuple(motion for _, motion in self._all() if motion is not None)
 
     def open_in(self, frame_index: int) -> tuple[OpenLeaf, ...]:
-        """Its leaves that stand open in a frame."""
+        """Leaves that stand open in a frame."""
         return tuple(
             _opened(leaf, motion, state)
             for leaf, motion in self._all()
@@ -66,7 +66,7 @@ class FilmedLeaves:
         )
 
     def closed_in(self, frame_index: int) -> tuple[Leaf, ...]:
-        """Its leaves that stand in their place."""
+        """Leaves that are closed in a frame."""
         return tuple(leaf for leaf, motion in self._all() if motion is None or not _state(motion, frame_index))
 
     def _all(self) -> tuple[tuple[Leaf, JointMotion | None], ...]:
@@ -78,7 +78,7 @@ class FilmedLeaves:
         return self._filmed
 
     def _over_drawer(self) -> list[tuple[Leaf, JointMotion | None]]:
-        """A drawer that was filmed below its doors, and those; none where nothing below a seam was drawn out."""
+        """A drawer observed to move below its doors, and those doors; none where nothing below a seam was drawn out."""
         for seam_m in self.seams_m:
             below, above = _parted(self.whole, seam_m)
             drawer = self._looked_for(DRAWER, below, _USUAL["drawer"])
@@ -90,7 +90,7 @@ class FilmedLeaves:
         return []
 
     def _looked_for(self, part: str, leaf: Leaf, ways: tuple[Way, ...]) -> tuple[Leaf, JointMotion | None]:
-        """A leaf with its motion; one that shows itself thicker than a board is looked for again as thick."""
+        """Leaf with its motion; a leaf measured to be thicker than a board is estimated again with that thickness."""
         usual = dict.fromkeys(ways, tuned(Params).usual)
         motion = find_motion(leaf, self.scene, usual, part, only=bool(part))
         thickness_m = motion and front_thickness(leaf, _places(leaf, motion), self.scene)
@@ -106,7 +106,7 @@ def _state(motion: JointMotion, frame_index: int) -> float:
 
 
 def _with_inside(leaf: Leaf, motion: JointMotion, scene: Scene, depth_m: float) -> JointMotion:
-    """The motion with what the frames show behind the leaf, where it stands open far enough to be looked behind."""
+    """Motion with the inside measured behind the leaf, from frames where it is open far enough to see behind it."""
     params, places = tuned(Params), _places(leaf, motion)
     drawn_out = _way(motion, leaf) == "out"
     inside = measure_inside(
@@ -120,7 +120,7 @@ def _with_inside(leaf: Leaf, motion: JointMotion, scene: Scene, depth_m: float) 
 
 
 def _places(leaf: Leaf, motion: JointMotion) -> Callable[[Frame], Rigid3 | None]:
-    """Where a leaf stands (world_from_leaf) in frames in which it is open far enough to be looked behind; None in others."""
+    """Pose function (world_from_leaf) for frames in which a leaf is open far enough to see behind it; None in others."""
     params = tuned(Params)
     ajar = params.ajar_rad if motion.kind == "revolute" else params.ajar_m
 
@@ -132,14 +132,14 @@ def _places(leaf: Leaf, motion: JointMotion) -> Callable[[Frame], Rigid3 | None]
 
 
 def _way(motion: JointMotion, leaf: Leaf) -> Literal["hinge", "out", "along"]:
-    assert motion.axis_world is not None  # what is fixed is never open
+    assert motion.axis_world is not None  # a fixed leaf is never open
     if motion.kind == "revolute":
         return "hinge"
     return "out" if abs(float(motion.axis_world @ leaf.outward)) > np.sqrt(0.5) else "along"
 
 
 def _opened(leaf: Leaf, motion: JointMotion, state: float) -> OpenLeaf:
-    assert motion.axis_world is not None  # what is fixed is never open
+    assert motion.axis_world is not None  # a fixed leaf is never open
     assert motion.pivot_world is not None
     opening = moved(motion.axis_world, motion.pivot_world, motion.kind == "revolute", state)
     depth_m = None if motion.inside is None else motion.inside.depth_m
@@ -148,8 +148,8 @@ def _opened(leaf: Leaf, motion: JointMotion, state: float) -> OpenLeaf:
 
 
 def _leaves(whole: Leaf, category: Category) -> list[tuple[str, Leaf, tuple[Way, ...]]]:
-    """Name, closed rectangle and usual ways of each leaf: of a pair two halves, else the front."""
-    if category.opens in ("fixed", "rigid") or category.several_fronts:  # of which only handles tell where one ends
+    """Name, closed rectangle and usual ways of each leaf: the two halves of a pair, else the whole front."""
+    if category.opens in ("fixed", "rigid") or category.several_fronts:  # only handles show where one of several fronts ends
         return []
     if category.opens != "pair":
         return [("", whole, _USUAL[category.opens])]
@@ -158,7 +158,7 @@ def _leaves(whole: Leaf, category: Category) -> list[tuple[str, Leaf, tuple[Way,
 
 
 def _parted(whole: Leaf, seam_m: float) -> tuple[Leaf, Leaf]:
-    """What of a front lies below a height and above it."""
+    """Parts of a front below a height and above it."""
     half = whole.height_m / 2
     return _band(whole, -half, seam_m), _band(whole, seam_m, half)
 
@@ -169,6 +169,6 @@ def _band(whole: Leaf, low_m: float, high_m: float) -> Leaf:
 
 
 def _part(whole: Leaf, x_m: float, width_m: float) -> Leaf:
-    """The part of a front about x_m from its middle."""
+    """Part of a front centred `x_m` from its middle."""
     place = whole.world_from_front @ Rigid3(np.eye(3), np.array([x_m, 0.0, 0.0]))
     return Leaf(world_from_front=place, width_m=width_m, height_m=whole.height_m)

@@ -1,4 +1,4 @@
-"""How a leaf may move: the joints that are tried, each a family of poses of one number, its state."""
+"""Joint hypotheses of a leaf, each a one-parameter family of poses over its state."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,46 +17,48 @@ Way = Literal["left", "right", "top", "bottom", "out", "slides_left", "slides_ri
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which states are tried."""
+    """Tuned parameters of the tested states."""
 
-    most_rad: float = param(float(np.deg2rad(165.0)), "rad", "that a door opens", source="makers' wide-angle hinges: 155-170°")
+    most_rad: float = param(
+        float(np.deg2rad(165.0)), "rad", "Maximum opening angle of a door", source="makers' wide-angle hinges: 155-170°"
+    )
     most_flap_rad: float = param(
         float(np.deg2rad(120.0)),
         "rad",
-        "that a leaf hung on its lower or upper edge opens",
-        source="makers: ovens and dishwashers 90°, lift systems up to 110°, and play",
+        "Maximum opening angle of a leaf hinged on its lower or upper edge",
+        source="manufacturers: ovens and dishwashers 90°, lift systems up to 110°, and play",
     )
-    under_floor_m: float = param(0.02, "m", "that the edge of an open leaf may come out under the floor: errors of its place")
-    step_rad: float = param(float(np.deg2rad(3.0)), "rad", "between two angles that are tried", gt=0)
-    most_m: float = param(0.75, "m", "that a drawer is drawn out", source="makers' longest runners for kitchens: 600-700 mm")
-    step_m: float = param(0.015, "m", "between two places that are tried", gt=0)
+    under_floor_m: float = param(0.02, "m", "Maximum distance of an open leaf's edge under the floor: position errors")
+    step_rad: float = param(float(np.deg2rad(3.0)), "rad", "Step between tested angles", gt=0)
+    most_m: float = param(0.75, "m", "Maximum opening of a drawer", source="makers' longest runners for kitchens: 600-700 mm")
+    step_m: float = param(0.015, "m", "Step between tested displacements", gt=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Hypothesis:
-    """A joint: a line that the leaf turns about, or a direction in which it slides. Front frame; positive opens."""
+    """A joint: a hinge line, or a sliding direction. Front frame; positive states open."""
 
     way: Way
     axis: Vector3  # unit; right-hand rule for opening
-    pivot: Vector3  # a point of the line; what slides has none, and this is 0
-    states: np.ndarray  # (q,) that are tried, from 0 up: radians or metres
+    pivot: Vector3  # a point on the line; zero for a sliding joint
+    states: np.ndarray  # (q,) tested states, from 0 up: radians or metres
 
     @property
     def turns(self) -> bool:
-        """Whether it is a hinge."""
+        """Whether the joint is a hinge."""
         return self.way in ("left", "right", "top", "bottom")
 
     @property
     def lateral(self) -> bool:
-        """Whether it slides within its own plane."""
+        """Whether the leaf slides within its own plane."""
         return self.way in ("slides_left", "slides_right")
 
     def pose(self, state: float) -> Rigid3:
-        """Where the leaf stands: front_from_leaf, the identity where closed."""
+        """Pose of the leaf in a state: front_from_leaf, the identity where closed."""
         return moved(self.axis, self.pivot, self.turns, state)
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same in all of `states`: rotations (q, 3, 3) and translations (q, 3)."""
+        """Poses in all of `states`: rotations (q, 3, 3) and translations (q, 3)."""
         if not self.turns:
             return np.tile(np.eye(3), (len(self.states), 1, 1)), self.states[:, None] * self.axis
         rotations = Rotation.from_rotvec(self.states[:, None] * self.axis).as_matrix()
@@ -64,7 +66,7 @@ class Hypothesis:
 
 
 def moved(axis: Vector3, pivot: Vector3, turns: bool, state: float) -> Rigid3:
-    """The motion by a joint's state."""
+    """Rigid motion of a joint at a state."""
     if not turns:
         return Rigid3(np.eye(3), axis * state)
     rotation = Rotation.from_rotvec(axis * state).as_matrix()
@@ -72,7 +74,7 @@ def moved(axis: Vector3, pivot: Vector3, turns: bool, state: float) -> Rigid3:
 
 
 def hypotheses(leaf: Leaf, floor_m: float | None = None) -> tuple[Hypothesis, ...]:
-    """Every joint that a rectangular leaf may have, over a floor at that height (world z) where one is known."""
+    """All joint hypotheses of a rectangular leaf, above a floor at that height (world z) where one is known."""
     params = tuned(Params)
     half_w, half_h = leaf.half_m
     angles = np.arange(0.0, params.most_rad + 1e-9, params.step_rad)
@@ -93,7 +95,7 @@ def hypotheses(leaf: Leaf, floor_m: float | None = None) -> tuple[Hypothesis, ..
 
 
 def _above(floor_m: float | None, leaf: Leaf, angles: np.ndarray) -> np.ndarray:
-    """Whether the free edge of a leaf that hangs on its lower one stays above the floor (q,)."""
+    """Mask of the angles (q,) at which the free edge of a leaf hinged on its lower edge stays above the floor."""
     if floor_m is None:
         return np.ones(len(angles), bool)
     hinge_m = leaf.world_from_front.translation[2] - leaf.half_m[1]

@@ -1,4 +1,4 @@
-"""What shows behind an open front: the rear board, the sides and the shelves of its compartment, as peaks of depth points."""
+"""Inside of a compartment behind an open front: rear board, sides and shelves, as peaks in histograms of depth points."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,39 +17,54 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where boards of a compartment are looked for, and what counts as one."""
+    """Tuned parameters of the boards of a compartment."""
 
-    deepest_m: float = param(0.75, "m", "behind a front, to where its compartment may reach", source="worktops are 600-700 mm")
-    shallowest_m: float = param(0.12, "m", "behind it, from where a rear board may stand: wall units are 300 mm")
-    rim_m: float = param(0.03, "m", "inside the front's outline: boards are 16-20 mm, and depth errs at them")
-    bin_m: float = param(0.004, "m", "of the histograms of depth points", gt=0)
-    spread_m: float = param(0.012, "m", "about a face, within which depth points are its own: their noise", gt=0)
-    beside_m: float = param(0.05, "m", "beside a face, where there must be few: what lies about is spread evenly")
-    least_points: int = param(80, "count", "depth points of a face", ge=10)
-    least_frames: int = param(3, "count", "frames that must show it", ge=1)
-    sharp: float = param(3.0, "ratio", "of points at a face to those beside it, over lengths alike", gt=1)
-    spans: float = param(0.4, "share", "of the front's width that a rear board must show over, or its depth of a side or shelf")
-    shows: float = param(0.15, "share", "of the points of the clearest level, that a shelf has: less is what lies on one", gt=0)
-    boards_m: tuple[float, ...] = param((0.01, 0.06), "m", "of a unit's boards and a machine's walls, thinnest and thickest")
-    apart_m: float = param(0.08, "m", "between two shelves, at least")
-    edge_m: float = param(0.02, "m", "of a front's outline that shows its edge: depth errs there by as much", gt=0)
-    thin_m: tuple[float, float] = param((0.01, 0.02), "m", "behind the outer face, where every board has its edge")
-    thick_m: float = param(0.035, "m", "from where a front is thicker than a board: depth blurs its edges by a pixel")
-    thickest_m: float = param(0.1, "m", "of a front: what goes on behind it is a side of what it brings out")
-    free: float = param(0.99, "ratio", "of the way of what moves freely to that of its leaf's middle", gt=0)
-    ends: float = param(0.15, "share", "of the points of so thin an edge, from which it has ended", gt=0)
+    deepest_m: float = param(0.75, "m", "Maximum depth of a compartment behind its front", source="worktops are 600-700 mm")
+    shallowest_m: float = param(0.12, "m", "Minimum distance of a rear board behind the front")
+    rim_m: float = param(0.03, "m", "Margin inside the front's outline: boards are 16-20 mm, with depth errors at their edges")
+    bin_m: float = param(0.004, "m", "Bin size of the histograms of depth points", gt=0)
+    spread_m: float = param(0.012, "m", "Maximum distance from a face of depth points on it: their noise", gt=0)
+    beside_m: float = param(0.05, "m", "Distance beside a face within which there must be few points: clutter is spread evenly")
+    least_points: int = param(80, "count", "Minimum number of depth points on a face", ge=10)
+    least_frames: int = param(3, "count", "Minimum number of frames that must show a face", ge=1)
+    sharp: float = param(3.0, "ratio", "Minimum ratio of points on a face to those beside it, over equal lengths", gt=1)
+    spans: float = param(0.4, "share", "Minimum fraction of the front's width that a rear board or shelf must span")
+    shows: float = param(
+        0.15,
+        "share",
+        "Minimum points of a shelf as a fraction of those of the clearest level: fewer are objects on a shelf",
+        gt=0,
+    )
+    boards_m: tuple[float, ...] = param(
+        (0.01, 0.06), "m", "Minimum and maximum thickness of a unit's boards and of a machine's walls"
+    )
+    apart_m: float = param(0.08, "m", "Minimum distance between two shelves")
+    edge_m: float = param(
+        0.02, "m", "Width of the rim of a front's outline that shows its edge: depth errs there by as much", gt=0
+    )
+    thin_m: tuple[float, float] = param((0.01, 0.02), "m", "Range behind the outer face in which every board has its edge")
+    thick_m: float = param(
+        0.035, "m", "Minimum thickness of a front that is thicker than a board: depth blurs its edges by a pixel"
+    )
+    thickest_m: float = param(0.1, "m", "Maximum thickness of a front: surface farther behind belongs to the side of a drawer")
+    free: float = param(
+        0.99, "ratio", "Minimum displacement of freely moving points relative to that of the leaf's centre", gt=0
+    )
+    ends: float = param(
+        0.15, "share", "Points of an edge, as a fraction of its usual count near the face, below which the edge has ended", gt=0
+    )
     beyond: float = param(
-        0.05, "ratio", "of points behind a rear board to those on it, at most: a row of jars is looked past", gt=0
+        0.05, "ratio", "Maximum ratio of points behind a rear board to those on it: depth looks past a row of jars", gt=0
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cloud:
-    """Depth points of a compartment in the front frame, y from the outer face backwards, and the frame of each."""
+    """Depth points of a compartment in the front frame, y from the outer face backwards, and the frame index of each."""
 
     points: Points
     frame: np.ndarray
-    rest_y: np.ndarray  # from the outer face where the front is closed
+    rest_y: np.ndarray  # distance behind the outer face of the closed front
 
     def where(self, keep: np.ndarray) -> "_Cloud":
         return _Cloud(self.points[keep], self.frame[keep], self.rest_y[keep])
@@ -63,11 +78,11 @@ def measure_inside(
     drawn_out_m: float = 0.0,
     deepest_m: float = np.inf,
 ) -> Inside | None:
-    """The compartment that a front closes, or the drawer that it pulls out; None where none of its boards were seen.
+    """Dimensions of a front's compartment, or of the drawer that it pulls out; None where none of its boards was observed.
 
-    `place` is world_from_front of what is measured in the frames that show its inside, None in others: a drawer's box moves
-    with its front, a carcass stays. `drawn_out_m` is how far a drawer came out at most: its rear board stays in the unit.
-    Beyond `deepest_m` behind the front its unit has ended.
+    `place` is world_from_front of the measured body in the frames that show its inside, None in others: a drawer's box moves
+    with its front, a carcass does not. `drawn_out_m` is the maximum opening of a drawer: its rear board stays in the unit.
+    The unit ends `deepest_m` behind the front.
     """
     params, half = tuned(Params), np.array(leaf.half_m)
     cloud = _behind(leaf, place, scene, min(deepest_m, params.deepest_m))
@@ -95,9 +110,9 @@ def measure_inside(
 
 
 def front_thickness(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -> float | None:
-    """How thick a front is, by how far its free edges reach behind its outer face; None where none is thicker than a board.
+    """Thickness of a front, by how far its free edges extend behind its outer face; None where none is thicker than a board.
 
-    `place` is world_from_leaf in the frames that show it open. At its hinge, and on from there, its unit stands behind it.
+    `place` is world_from_leaf in the frames that show it open. At its hinge and beyond, the unit lies behind the leaf.
     """
     params, (half_w, half_h) = tuned(Params), leaf.half_m
     cloud = _behind(leaf, place, scene, params.thickest_m + params.edge_m)
@@ -115,7 +130,7 @@ def front_thickness(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: 
 
 
 def _free(cloud: _Cloud, leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -> np.ndarray:
-    """Which points lie on the part of a leaf (n,) that goes farther than its middle, or as far."""
+    """Mask of the points (n,) on the part of a leaf that moves at least about as far as its centre."""
     moved = {}
     for frame in scene.frames:
         world_from_leaf = place(frame)
@@ -148,7 +163,7 @@ def _behind(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene, d
 
 
 def _rear(cloud: _Cloud, leaf: Leaf, drawn_out_m: float) -> float | None:
-    """Where the rear board's face stands: the furthest face square to the depth; None where one sees past that.
+    """Position of the rear board's face, the farthest one perpendicular to the depth; None where depth looks past it.
 
     Past a drawer's rear board one sees into the unit, which stays where it is while the drawer moves.
     """
@@ -164,9 +179,9 @@ def _rear(cloud: _Cloud, leaf: Leaf, drawn_out_m: float) -> float | None:
 
 
 def _comes_along(cloud: _Cloud, at: float, count: int, drawn_out_m: float) -> bool:
-    """Whether more points lie in a face that moves with its drawer than in one that stands where the drawer comes from.
+    """Whether a face has more points when it moves with the drawer than when it stays in the unit.
 
-    Where the drawer stood still the two are one: then only what lies in the unit even so is taken for a rear board.
+    Where the drawer did not move the two coincide: then only a face that lies in the unit even so counts as a rear board.
     """
     spread_m = tuned(Params).spread_m
     stands_at = np.median(cloud.rest_y[np.abs(cloud.points[:, 1] - at) < spread_m])
@@ -175,7 +190,7 @@ def _comes_along(cloud: _Cloud, at: float, count: int, drawn_out_m: float) -> bo
 
 
 def _ends(faces: list[float], half_m: float) -> tuple[float | None, float | None]:
-    """The innermost faces of the boards at both ends; None where one was not seen."""
+    """Innermost faces of the boards at both ends; None where one was not observed."""
     thinnest, thickest = tuned(Params).boards_m
     ends = [at for at in faces if half_m - thickest < abs(at) < half_m - thinnest]
     return max((at for at in ends if at < 0), default=None), min((at for at in ends if at > 0), default=None)
@@ -186,7 +201,7 @@ def _between(low: float | None, high: float | None) -> float | None:
 
 
 def _faces(cloud: _Cloud, axis: int, *, across: int, least_span_m: float) -> list[tuple[float, int]]:
-    """Where points crowd along an axis, and how many: flat faces square to it, that reach far enough across."""
+    """Positions and point counts of flat faces perpendicular to an axis: histogram peaks that span far enough across."""
     params = tuned(Params)
     values = cloud.points[:, axis]
     if len(values) < params.least_points:

@@ -1,4 +1,4 @@
-"""How far a leaf slid along its own plane: where the plane's depth ends within the closed place. Its face tells nothing."""
+"""Displacement of a leaf in its own plane, from where the plane's depth ends: depth on its face is the same in all states."""
 
 from dataclasses import dataclass
 
@@ -14,23 +14,25 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a leaf's trailing edge is found."""
+    """Tuned parameters of the detection of a leaf's trailing edge."""
 
-    column_m: float = param(0.008, "m", "width of the columns whose depth is taken together", gt=0)
-    on_plane_m: float = param(0.012, "m", "off the closed plane, within which a column's median is the leaf")
-    least_points: int = param(6, "count", "depth points of a column", ge=1)
-    least_columns: float = param(0.6, "share", "of the closed place's columns that a frame must show")
-    least_clear: float = param(0.85, "share", "of them that must lie on the right side of the edge")
+    column_m: float = param(0.008, "m", "Width of the columns whose depth is pooled", gt=0)
+    on_plane_m: float = param(
+        0.012, "m", "Maximum distance of a column's median depth from the closed plane to lie on the leaf"
+    )
+    least_points: int = param(6, "count", "Minimum number of depth points in a column", ge=1)
+    least_columns: float = param(0.6, "share", "Minimum fraction of the closed place's columns that a frame must show")
+    least_clear: float = param(0.85, "share", "Minimum fraction of those that must lie on the right side of the edge")
     edge_m: float = param(
-        0.005, "m", "standard deviation of an edge in depth", source="half a pixel of a phone's LiDAR at 1.5 m"
+        0.005, "m", "Standard deviation of an edge in depth", source="half a pixel of a phone's LiDAR at 1.5 m"
     )
 
 
 def slid(leaf: Leaf, hypothesis: Hypothesis, scene: Scene, frame: Frame) -> tuple[float, float] | None:
-    """How far it slid in a frame and the standard deviation, metres; None where the frame does not tell."""
+    """Displacement of the leaf in a frame and its standard deviation, metres; None where the frame does not determine it."""
     params = tuned(Params)
     x, off = _over_plane(leaf, scene, frame)
-    x = x * float(np.sign(hypothesis.axis[0]))  # towards where it slides
+    x = x * float(np.sign(hypothesis.axis[0]))  # along the sliding direction
     half = leaf.half_m[0]
     edges = np.arange(-half, half + params.column_m, params.column_m)
     number = np.digitize(x, edges) - 1
@@ -49,12 +51,12 @@ def slid(leaf: Leaf, hypothesis: Hypothesis, scene: Scene, frame: Frame) -> tupl
         return 0.0, params.edge_m
     edge, reach = edges[shown[best]], 2 * params.column_m
     about = np.abs(x - edge) < reach
-    share = (np.abs(off[about]) < params.on_plane_m).mean()  # of a strip about the edge, the part that the leaf covers
+    share = (np.abs(off[about]) < params.on_plane_m).mean()  # fraction of a strip around the edge that the leaf covers
     return float(edge + reach - 2 * reach * share + half), params.edge_m
 
 
 def _over_plane(leaf: Leaf, scene: Scene, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
-    """Of the depth within the closed outline that nothing hides: x where its ray meets the plane, and metres behind it."""
+    """Unoccluded depth within the closed outline: x where its ray meets the plane, and metres behind the plane."""
     params = tuned(Params)
     camera, depth = frame.depth_camera, scene.depth(frame.index)
     outline = frame.world_from_camera.inverse.apply(leaf.world_from_front.apply(corners(leaf)))

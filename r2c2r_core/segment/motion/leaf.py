@@ -1,4 +1,4 @@
-"""A leaf that may move: the rectangle of a closed front, and points on it and around it."""
+"""Movable leaf: the rectangle of a closed front, and sample points on it and around it."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -12,19 +12,26 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where a leaf is looked at."""
+    """Tuned parameters of a leaf's sample points."""
 
     thickness_m: float = param(
-        0.019, "m", "of a front's board, where no more is seen of it", source="European lists: fronts of 16-22 mm"
+        0.019,
+        "m",
+        "Thickness of a front's board where it was not measured",
+        source="European manufacturers' lists: fronts of 16-22 mm",
     )
-    across: int = param(9, "count", "points along each side of the grid on a leaf", ge=3)
-    inside: float = param(0.9, "share", "of a leaf's half width and height that the grid spans: its rim is half a depth pixel")
-    rim_m: tuple[float, float] = param((0.03, 0.05), "m", "beyond a leaf's edges, where it must have ended")
+    across: int = param(9, "count", "Number of sample points along each side of the grid on a leaf", ge=3)
+    inside: float = param(
+        0.9, "share", "Fraction of a leaf's half width and height that the grid spans: its rim is half a depth pixel"
+    )
+    rim_m: tuple[float, float] = param(
+        (0.03, 0.05), "m", "Distances beyond a leaf's edges of the points where it must have ended"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Leaf:
-    """A board in its closed place; `front` frame of transforms.py at the middle of its outer face."""
+    """A board at its closed pose; `front` frame of transforms.py at the centre of its outer face."""
 
     world_from_front: Rigid3
     width_m: float
@@ -33,36 +40,36 @@ class Leaf:
 
     @property
     def outward(self) -> Vector3:
-        """Unit normal of its closed outer face, towards the room."""
+        """Unit normal of the closed outer face, towards the room."""
         return -self.world_from_front.rotation[:, 1]
 
     def at(self, front_from_leaf: Rigid3) -> "Leaf":
-        """The same board where it stands open."""
+        """Same board at an open pose."""
         return replace(self, world_from_front=self.world_from_front @ front_from_leaf)
 
     @property
     def behind(self) -> Vector3:
-        """From the outer face to the back, in the front frame."""
+        """Vector from the outer face to the back, in the front frame."""
         return np.array([0.0, self.thickness_m, 0.0])
 
     @property
     def half_m(self) -> tuple[float, float]:
-        """Half its width and height."""
+        """Half width and half height."""
         return self.width_m / 2, self.height_m / 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OpenLeaf:
-    """A leaf that does not stand in its place."""
+    """A leaf at an open pose."""
 
     leaf: Leaf
     world_from_leaf: Rigid3  # of its outer face, as `front`
     way: Literal["hinge", "out", "along"]  # how it was moved there
-    rear_m: float | None = None  # from its outer face to the rear board of what it brings along, where that was seen
+    rear_m: float | None = None  # from its outer face to the rear board of the drawer, where that was observed
 
 
 def face_points(leaf: Leaf) -> Points:
-    """A grid (n, 3) on the outer face, in the front frame."""
+    """Grid of points (n, 3) on the outer face, in the front frame."""
     params = tuned(Params)
     steps = np.linspace(-params.inside, params.inside, params.across)
     x, z = (grid.ravel() for grid in np.meshgrid(steps * leaf.half_m[0], steps * leaf.half_m[1]))
@@ -70,7 +77,7 @@ def face_points(leaf: Leaf) -> Points:
 
 
 def rim_points(leaf: Leaf, fixed: str | None) -> Points:
-    """Points (n, 3) beyond the edges that are free to move, in the front frame; `fixed` is the edge of the hinge."""
+    """Points (n, 3) beyond the free edges, in the front frame; `fixed` is the edge of the hinge."""
     params = tuned(Params)
     steps = np.linspace(-params.inside, params.inside, params.across)
     half_w, half_h = leaf.half_m
@@ -87,7 +94,7 @@ def rim_points(leaf: Leaf, fixed: str | None) -> Points:
 
 
 def edge_points(leaf: Leaf, fixed: str | None) -> list[tuple[Points, Vector3, float]]:
-    """Of each free edge's narrow face: points (n, 3) in its middle, its normal, and the area about each; in the front frame."""
+    """Per free edge's narrow face: points (n, 3) along its middle, normal, and area per point; in the front frame."""
     params = tuned(Params)
     steps = np.linspace(-params.inside, params.inside, params.across)
     half_w, half_h = leaf.half_m

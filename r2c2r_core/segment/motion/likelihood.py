@@ -1,6 +1,6 @@
-"""What a frame's depth says of each state of a leaf: log-likelihood ratios to knowing nothing of what stands there.
+"""Log-likelihood ratios of a leaf's states given a frame's depth, relative to an unknown scene.
 
-A beam model (Thrun et al. 2005, 6.3): depth is measured on the leaf, on something before it, or anywhere by mistake.
+A beam model (Thrun et al. 2005, 6.3): depth is measured on the leaf, on an occluder in front of it, or anywhere as an outlier.
 """
 
 from collections.abc import Sequence
@@ -21,49 +21,55 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How depth errs about a leaf."""
+    """Tuned parameters of the beam model of depth on a leaf."""
 
-    hit: float = param(0.6, "share", "of readings towards a leaf that are of the leaf")
+    hit: float = param(0.6, "share", "Probability that a reading towards a leaf is on the leaf")
     before: float = param(
-        0.95, "ratio", "of finding something before a leaf to finding it there without one: what hides says nothing"
+        0.95, "ratio", "Likelihood of an occluder in front of a leaf relative to one without the leaf: occlusion is no evidence"
     )
-    wild: float = param(0.05, "share", "of them that are anything: gloss, glass, flying pixels")
-    range_m: float = param(3.0, "m", "over which depth lies that nothing is known of", gt=0)
-    floor_m: float = param(0.006, "m", "standard deviation of a front's place: poses, warp, profile", gt=0)
-    same: float = param(2.0, "σ", "within which what lies beyond an edge is of the same surface")
-    rim_cost: float = param(1.5, "log", "for a point beyond a free edge that the leaf should have ended at")
-    rim_free_m: float = param(0.06, "m", "from the closed plane, within which neighbours explain what lies beyond its edges")
-    seen_past: float = param(-1.0, "log", "of a reading below which what is behind the leaf's place was seen", ge=-10, le=0)
-    told_apart: float = param(0.25, "share", "of a frame's readings that count: their errors go together", gt=0)
-    flattest: float = param(0.12, "cosine", "of the angle from which a leaf is seen")
+    wild: float = param(0.05, "share", "Probability that a reading is an outlier: gloss, glass, flying pixels")
+    range_m: float = param(3.0, "m", "Depth range over which readings of an unknown scene are uniform", gt=0)
+    floor_m: float = param(0.006, "m", "Standard deviation of a front's position: poses, warp, profile", gt=0)
+    same: float = param(2.0, "σ", "Maximum residual of depth beyond an edge for it to be of the same surface")
+    rim_cost: float = param(1.5, "log", "Cost of a point beyond a free edge where the leaf should have ended")
+    rim_free_m: float = param(
+        0.06, "m", "Distance from the closed plane within which neighbouring fronts explain surface beyond the leaf's edges"
+    )
+    seen_past: float = param(
+        -1.0, "log", "Log-likelihood ratio of a reading below which it looks past the leaf's place", ge=-10, le=0
+    )
+    told_apart: float = param(0.25, "share", "Fraction of a frame's readings that count: their errors are correlated", gt=0)
+    flattest: float = param(
+        0.12, "cosine", "Minimum cosine between the viewing ray and the normal of a leaf for its readings to count"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Samples:
-    """Points of a leaf in each state (q, n, 3), world frame, and what each stands for."""
+    """Points of a leaf in each state (q, n, 3), world frame, with their normals and areas."""
 
     points: np.ndarray
     outward: np.ndarray  # (q, 3) unit normal of their face
-    spread_m: np.ndarray  # (n,) by which a point may lie off along the normal between two states that are tried
-    area_m2: float  # of the face about each point
-    on_plane: np.ndarray  # (q, n) bool: so near the closed plane that the fronts beside the leaf explain what is seen there
-    beside: np.ndarray  # (q, n) bool: beyond the closed leaf's outline, as a person facing it sees them
+    spread_m: np.ndarray  # (n,) standard deviation along the normal from the step between tested states
+    area_m2: float  # of the face around each point
+    on_plane: np.ndarray  # (q, n) bool: close enough to the closed plane for adjacent fronts to explain the depth there
+    beside: np.ndarray  # (q, n) bool: outside the closed leaf's outline, as seen by a person facing it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class States:
-    """A hypothesis laid out: where the leaf is in each state."""
+    """Sample points of a hypothesis: the leaf in each state."""
 
     leaf: Leaf
     hypothesis: Hypothesis
-    faces: tuple[Samples, Samples]  # the outer one and the back
-    edges: tuple[Samples, ...]  # the narrow faces of its free edges: all that shows of a leaf that is seen edge on
+    faces: tuple[Samples, Samples]  # the outer face and the back
+    edges: tuple[Samples, ...]  # the narrow faces of its free edges: all that is visible of a leaf seen edge-on
     rim: Samples  # beyond its free edges
     covered: np.ndarray  # (q, n) bool: closed points that a leaf sliding within its plane still covers
 
 
 def lay_out(leaf: Leaf, hypothesis: Hypothesis) -> States:
-    """The points of every state that is tried."""
+    """Sample points of every tested state."""
     fixed = hypothesis.way if hypothesis.turns else None
     face, rim = face_points(leaf), rim_points(leaf, fixed)
     area = leaf.width_m * leaf.height_m / len(face)
@@ -97,7 +103,7 @@ def _moved(leaf: Leaf, hypothesis: Hypothesis, points: Points, outward: Vector3,
 
 
 def closed_counts(leaf: Leaf, frames: Sequence[Frame], scene: Scene) -> np.ndarray:
-    """Of the closed leaf's points, how many (frames, 4) depth agrees with, looks past, sees hidden, and is silent of."""
+    """Counts (frames, 4) of the closed leaf's points where depth agrees, looks past, is of an occluder, or is missing."""
     points = leaf.world_from_front.apply(face_points(leaf))
     looks = [look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index)) for frame in frames]
     z, seen = np.stack([look.z_m for look in looks]), np.stack([look.seen_m for look in looks])
@@ -116,9 +122,9 @@ def in_view(leaf: Leaf, pose: Rigid3, scene: Scene, frame: Frame) -> bool:
 
 
 def evidence(states: States, scene: Scene, frame: Frame, *, edges: bool = False) -> np.ndarray:
-    """The log-likelihood ratio of each state (q,) in a frame to knowing nothing of what stands there.
+    """Log-likelihood ratio of each state (q,) in a frame, relative to an unknown scene.
 
-    With `edges`, those of the leaf's narrow faces count too: worth asking where states lie closer than a board is thick.
+    `edges` adds the leaf's narrow faces, which helps where states are closer together than a board's thickness.
     """
     params = tuned(Params)
     if states.hypothesis.lateral:
@@ -134,7 +140,7 @@ def evidence(states: States, scene: Scene, frame: Frame, *, edges: bool = False)
 
 
 def _towards(camera: Vector3, front: Samples, back: Samples) -> Samples:
-    """Of each state the face that a camera sees."""
+    """Face visible to a camera in each state."""
     is_back = ((camera - front.points[:, 0]) * front.outward).sum(axis=1)[:, None] < 0
     return replace(
         front,
@@ -145,7 +151,7 @@ def _towards(camera: Vector3, front: Samples, back: Samples) -> Samples:
 
 
 def _lateral(states: States, scene: Scene, frame: Frame) -> np.ndarray:
-    """By the closed place alone: what is covered still agrees, what is vacated is seen through; beside it others may stand."""
+    """Lateral states by the closed place alone (others may stand beside it): covered points agree, vacated are seen past."""
     params, front = tuned(Params), states.faces[0]
     read = _readings(replace(front, points=front.points[:1], outward=front.outward[:1]), scene, frame)
     vacated = np.where(read.agrees, np.log(params.wild), np.where(read.ratio < params.seen_past, -np.log(params.hit), 0.0))
@@ -154,22 +160,22 @@ def _lateral(states: States, scene: Scene, frame: Frame) -> np.ndarray:
 
 
 class _Readings(NamedTuple):
-    """What depth says of points (q, n)."""
+    """Depth evidence at points (q, n)."""
 
     ratio: np.ndarray  # log-likelihood ratios
     agrees: np.ndarray  # bool
-    weight: np.ndarray  # what each reading is worth
+    weight: np.ndarray  # weight of each reading
 
 
 def _readings(samples: Samples, scene: Scene, frame: Frame, *, facing: bool = False) -> _Readings:
-    """Depth at the samples' pixels, by how far it lies from their face along its normal."""
+    """Depth readings at the samples' pixels, by their distance from the samples' face along its normal."""
     params, camera = tuned(Params), frame.world_from_camera.translation
     shape, flat = samples.points.shape[:2], samples.points.reshape(-1, 3)
     z, seen, _ = look_up(flat, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
-    known = np.flatnonzero(seen > 0)  # most frames show few of the places where a leaf may stand
+    known = np.flatnonzero(seen > 0)  # most frames show few of the possible poses of a leaf
     state, point = np.divmod(known, shape[1])
     z, seen, ray = z[known], seen[known], flat[known] - camera
-    towards = ((camera - samples.points[:, 0]) * samples.outward).sum(axis=1)  # one a state: a face is flat
+    towards = ((camera - samples.points[:, 0]) * samples.outward).sum(axis=1)  # one per state: a face is flat
     height = np.abs(towards)[state]  # of the camera over the face
     cosine = height / np.sqrt(np.einsum("ij,ij->i", ray, ray))
     behind_m = (seen / z - 1) * height
@@ -177,7 +183,7 @@ def _readings(samples: Samples, scene: Scene, frame: Frame, *, facing: bool = Fa
     shows = (cosine > params.flattest) & ((towards[state] > 0) | (not facing))
     density = np.exp(-0.5 * (behind_m / sigma) ** 2) / (np.sqrt(2 * np.pi) * sigma) * params.range_m * height / z
     ratio = np.log(params.hit * density + params.before * (behind_m < 0) + params.wild)
-    # Readings are pixels: a leaf seen flatly or from far has fewer than it has points.
+    # Readings are pixels: a leaf seen at a flat angle or from afar has fewer than it has points.
     pixels = samples.area_m2 * frame.depth_camera.fx * frame.depth_camera.fy * cosine / z**2
     found = _Readings(np.zeros(shape), np.zeros(shape, bool), np.zeros(shape))
     for grid, values in zip(found, (ratio, np.abs(behind_m) < params.same * sigma, np.minimum(pixels, 1.0)), strict=True):

@@ -1,4 +1,4 @@
-"""How far a leaf was seen to open, and whether that was its stop: held still where its motion ended."""
+"""Joint limit from the observed motion: the largest opening, and whether it was a stop, where the motion ended at rest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,20 +10,22 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What counts as a stop."""
+    """Tuned parameters of the detection of a stop."""
 
-    still_rad: float = param(float(np.deg2rad(2.0)), "rad", "within which a door stands still: a frame's error")
-    still_m: float = param(0.006, "m", "within which a drawer stands still: a frame's error")
+    still_rad: float = param(float(np.deg2rad(2.0)), "rad", "Maximum change of angle of a door at rest: a frame's error")
+    still_m: float = param(0.006, "m", "Maximum displacement of a drawer at rest: a frame's error")
     dwell_s: float = param(
-        0.4, "s", "that it must have stood still at its widest", source="what turns back at once has not stopped"
+        0.4, "s", "Minimum time at rest at the largest opening", source="a leaf that turns back at once has not stopped"
     )
-    fps: float = param(15.0, "count", "frames of a second, where a recording has no times", gt=0)
-    least_frames: int = param(3, "count", "that show it at its widest", ge=2)
-    arrives: float = param(4.0, "ratio", "of what is still, that it must be seen to open further before it stops", ge=2)
+    fps: float = param(15.0, "count", "Frames per second of a recording without timestamps", gt=0)
+    least_frames: int = param(3, "count", "Minimum number of frames that show the largest opening", ge=2)
+    arrives: float = param(
+        4.0, "ratio", "Minimum opening motion observed before a stop, relative to the tolerance of rest", ge=2
+    )
 
 
 def widest(fitted: np.ndarray, values: np.ndarray, *, turns: bool) -> float:
-    """The widest state: of those fitted, or of all that stay so wide for some frames; one frame's error does not count."""
+    """Largest state, among fitted states and those sustained for some frames; a single frame's error does not count."""
     still, count = _still(turns=turns), tuned(Params).least_frames
     top = float(np.quantile(fitted, 1 - min(2 / len(fitted), 0.05)))
     if len(values) >= count:
@@ -33,13 +35,13 @@ def widest(fitted: np.ndarray, values: np.ndarray, *, turns: bool) -> float:
 
 
 def stop_seen(values: np.ndarray, seconds: Sequence[float | None], largest: float, *, turns: bool) -> bool:
-    """Whether it was moved to its widest state before the camera and stood still there."""
+    """Whether the leaf moved to its largest state on camera and rested there."""
     params, still = tuned(Params), _still(turns=turns)
     held = np.abs(values - largest) < still
     times = np.array([k / params.fps if t is None else t for k, t in enumerate(seconds)])
     for start, stop in _stretches(held):
         long = stop - start >= params.least_frames and times[stop - 1] - times[start] >= params.dwell_s
-        before = values[:start]  # what stands open from the first frame on, or closes from here, need not have met a stop
+        before = values[:start]  # a leaf open from the first frame on, or one that closes from here, need not have met a stop
         arrived = start > 0 and 2 * still < before[-1] and before.min() < largest - params.arrives * still
         if long and arrived:
             return True
@@ -52,6 +54,6 @@ def _still(*, turns: bool) -> float:
 
 
 def _stretches(flags: np.ndarray) -> list[tuple[int, int]]:
-    """First, and one past the last, of each stretch of true flags."""
+    """First index, and one past the last, of each stretch of true flags."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""The likeliest course of a leaf's states over the frames: dynamic programming with a motion prior (Viterbi 1967)."""
+"""Most probable sequence of a leaf's states over the frames: dynamic programming with a motion prior (Viterbi 1967)."""
 
 from dataclasses import dataclass
 
@@ -9,14 +9,14 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How leaves are moved."""
+    """Tuned parameters of the motion prior."""
 
-    step_cost: float = param(0.3, "log", "for each step that a state changes between two frames")
-    jump_cost: float = param(12.0, "log", "at most: a recording may pause, and a leaf may be moved unseen")
+    step_cost: float = param(0.3, "log", "Cost of each step that a state changes between two frames")
+    jump_cost: float = param(12.0, "log", "Maximum cost of a change: a recording may pause, and a leaf may be moved unseen")
 
 
 def best_path(log: np.ndarray) -> tuple[np.ndarray, float]:
-    """State numbers (frames,) of the likeliest course through log-likelihoods (frames, states), and its log-likelihood."""
+    """Viterbi path: state indices (frames,) of the most probable sequence by log-likelihoods (frames, states), and its sum."""
     params = tuned(Params)
     count = log.shape[1]
     apart = np.abs(np.arange(count)[:, None] - np.arange(count)[None])

@@ -1,4 +1,4 @@
-"""The leaf's own pose in one frame, free of any joint: where depth has its plane, with covariance."""
+"""Pose of a leaf in one frame without a joint constraint: its plane by robust least squares on depth, with covariance."""
 
 from dataclasses import dataclass
 
@@ -16,23 +16,29 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a frame tells a leaf's plane."""
+    """Tuned parameters of the plane fit."""
 
-    gates_m: tuple[float, ...] = param((0.05, 0.025, 0.015), "m", "off the plane so far, within which depth is the leaf's")
-    inside: float = param(0.92, "share", "of a leaf's half width and height within which depth is its own")
-    least_points: int = param(40, "count", "depth points of a plane", ge=10)
-    spans: float = param(0.35, "share", "of a leaf's width and of its height that they must reach over")
-    near_m: float = param(0.035, "m", "of the leaf's middle from where it was expected: a step and its thickness")
-    near_rad: float = param(float(np.deg2rad(6.0)), "rad", "of its direction from the expected one: two steps of states")
-    together: float = param(6.0, "ratio", "of a frame's points to as many as would err independently", gt=0)
-    place_m: float = param(0.003, "m", "standard deviation of a frame's pose", source="ARKit over a kitchen: millimetres")
-    turn_rad: float = param(float(np.deg2rad(0.15)), "rad", "standard deviation of a frame's direction")
-    scale_m: float = param(0.004, "m", "residual from which points count little (Geman and McClure 1987)", gt=0)
+    gates_m: tuple[float, ...] = param(
+        (0.05, 0.025, 0.015), "m", "Maximum distances from the plane of depth on the leaf, in successive rounds"
+    )
+    inside: float = param(0.92, "share", "Fraction of a leaf's half width and height within which depth is its own")
+    least_points: int = param(40, "count", "Minimum number of depth points on a plane", ge=10)
+    spans: float = param(0.35, "share", "Minimum fraction of a leaf's width and height that they must span")
+    near_m: float = param(
+        0.035, "m", "Maximum distance of the leaf's centre from the expected one: a step of states and its thickness"
+    )
+    near_rad: float = param(
+        float(np.deg2rad(6.0)), "rad", "Maximum slope of the plane relative to the expected one: two steps of states"
+    )
+    together: float = param(6.0, "ratio", "Number of correlated points that count as one independent measurement", gt=0)
+    place_m: float = param(0.003, "m", "Standard deviation of a frame's position", source="ARKit over a kitchen: millimetres")
+    turn_rad: float = param(float(np.deg2rad(0.15)), "rad", "Standard deviation of a frame's orientation")
+    scale_m: float = param(0.004, "m", "Residual scale above which points lose weight (Geman and McClure 1987)", gt=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneFix:
-    """A leaf's plane in one frame: y = plane @ (1, x, z) in the frame of the leaf where it was `expected`."""
+    """A leaf's plane in one frame: y = plane @ (1, x, z) in the frame of the leaf at its `expected` pose."""
 
     frame_index: int
     expected: Rigid3  # front_from_leaf
@@ -43,7 +49,7 @@ class PlaneFix:
 
 
 def fix_plane(leaf: Leaf, expected: Rigid3, scene: Scene, frame: Frame) -> PlaneFix | None:
-    """The plane that depth shows near an expected pose; None where it shows too little of it."""
+    """Plane of depth near an expected pose; None where the frame shows too little of it."""
     params = tuned(Params)
     world_from_leaf = leaf.world_from_front @ expected
     local, sigma = _points_near(leaf, world_from_leaf, scene, frame)
@@ -70,7 +76,7 @@ def fix_plane(leaf: Leaf, expected: Rigid3, scene: Scene, frame: Frame) -> Plane
 
 
 def _points_near(leaf: Leaf, world_from_leaf: Rigid3, scene: Scene, frame: Frame) -> tuple[Points, np.ndarray]:
-    """Depth points within the leaf's outline, in its frame, and how far each may err along its normal."""
+    """Depth points within the leaf's outline, in its frame, and the standard deviation of each along the leaf's normal."""
     params = tuned(Params)
     camera, depth = frame.depth_camera, scene.depth(frame.index)
     outline = frame.world_from_camera.inverse.apply(world_from_leaf.apply(corners(leaf)))

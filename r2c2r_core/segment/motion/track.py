@@ -1,8 +1,8 @@
 """READ FIRST: a leaf's motion over all frames: the joint by model comparison, then joint and states by one robust fit.
 
-For each joint that a leaf may have, the likeliest course of its states is found by dynamic programming; the joint whose
-course explains the depth best is taken, where it explains it better than a leaf that never moved. What category the leaf is
-of weighs as a prior that a few frames overrule.
+For each joint that a leaf may have, dynamic programming finds the most probable sequence of states. The joint whose sequence
+explains the depth best is chosen, if it explains it better than a leaf that never moved. The leaf's category acts as a prior
+that a few frames overrule.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,30 +27,38 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a leaf is said to have moved."""
+    """Tuned parameters of motion detection."""
 
-    vacated_share: float = param(0.5, "share", "of the readings towards a closed place, below which it may be vacated")
-    closed_share: float = param(0.7, "share", "of them that agree, from which it is closed")
-    least_known: int = param(20, "count", "readings towards it that a frame must have", ge=1)
-    least_closed: int = param(5, "count", "of them that tell whether it is filled, where few are in view", ge=1)
-    silent_cost: float = param(2.0, "log", "against every other state where black glass is silent as when it is closed")
-    least_frames: int = param(3, "count", "frames that must show it so, and that must show the leaf elsewhere", ge=1)
-    free_share: float = param(0.5, "share", "of the readings towards where it stands open, that must lie behind there before")
-    closed_cost: float = param(60.0, "log", "against every other state where it is closed")
-    gain: float = param(40.0, "log", "by which a course must explain the depth better than a leaf that never moved")
-    support: float = param(40.0, "log", "of the readings on the leaf where it stands open: what hides it is none")
-    told: float = param(3.0, "log", "of a frame's evidence for its state, from which the leaf is looked for in it")
-    closed_rad: float = param(float(np.deg2rad(2.0)), "rad", "a door that stands open by less is closed: a frame's error")
-    closed_m: float = param(0.01, "m", "what slides and stands open by less is closed: a frame's error, and a handle's relief")
-    moves_steps: float = param(4.0, "count", "steps of states that a leaf never seen closed must move over")
-    sure: float = param(20.0, "log", "of a frame's evidence, up to which its neighbours' fits are asked about, too")
-    around_steps: float = param(2.0, "count", "steps of states about its course, in which a frame without a fit is asked")
-    finer: float = param(6.0, "ratio", "of those steps to the ones then tried: a board is thicker than these", gt=0)
+    vacated_share: float = param(
+        0.5, "share", "Fraction of readings agreeing with the closed leaf below which a frame may show it open"
+    )
+    closed_share: float = param(0.7, "share", "Minimum fraction of readings agreeing with the closed leaf for it to be closed")
+    least_known: int = param(20, "count", "Minimum number of readings towards the closed leaf in a frame", ge=1)
+    least_closed: int = param(
+        5, "count", "Minimum number of readings that show whether the closed place is filled, where few are in view", ge=1
+    )
+    silent_cost: float = param(2.0, "log", "Cost of every open state where black glass lacks depth, as it does when closed")
+    least_frames: int = param(
+        3, "count", "Minimum number of frames that must show the closed place vacated, and the leaf elsewhere", ge=1
+    )
+    free_share: float = param(
+        0.5, "share", "Fraction of readings towards the open leaf's place that must look past it while the leaf is closed"
+    )
+    closed_cost: float = param(60.0, "log", "Cost of every open state in a frame that shows the leaf closed")
+    gain: float = param(40.0, "log", "Minimum log-likelihood gain of a sequence over a leaf that never moved")
+    support: float = param(40.0, "log", "Minimum log-likelihood of the readings on the open leaf: occluders contribute none")
+    told: float = param(3.0, "log", "Minimum evidence for a frame's state for the leaf to be localised in it")
+    closed_rad: float = param(float(np.deg2rad(2.0)), "rad", "Minimum angle of an open door: a frame's error")
+    closed_m: float = param(0.01, "m", "Minimum displacement of an open sliding leaf: a frame's error, and a handle's relief")
+    moves_steps: float = param(4.0, "count", "Minimum range, in steps of states, of the motion of a leaf never seen closed")
+    sure: float = param(20.0, "log", "Evidence of a frame below which the neighbouring fits extend its search range")
+    around_steps: float = param(2.0, "count", "Margin of the search range, in steps of states, in a frame without a fit")
+    finer: float = param(6.0, "ratio", "Ratio of those steps to the finer ones searched: a board is thicker than these", gt=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Course:
-    """A hypothesis, and the likeliest state of the leaf in each frame."""
+    """A hypothesis, and the most probable state of the leaf in each frame."""
 
     hypothesis: Hypothesis
     values: np.ndarray  # (frames,) radians or metres
@@ -68,10 +76,10 @@ NO_PRIOR: Mapping[Way, float] = MappingProxyType({})
 def find_motion(
     leaf: Leaf, scene: Scene, prior: Mapping[Way, float] = NO_PRIOR, part: str = "", *, only: bool = False
 ) -> JointMotion | None:
-    """The joint that a leaf was seen to move on; None where it was never seen anywhere but in its closed place.
+    """Joint on which a leaf was observed to move; None where it was never observed away from its closed place.
 
-    `prior` says by how much each way of opening is likelier than the others before any frame, as a logarithm; with `only`, a
-    leaf that turns out to move in no way that it names is none: half a front is a leaf only where it opens as one of a pair.
+    `prior` gives the log prior odds of each way of opening over the others. With `only`, motion in a way that `prior` does not
+    name is rejected: half a front is a leaf only where it opens as one of a pair.
     """
     params = tuned(Params)
     counts = closed_counts(leaf, scene.frames, scene)
@@ -84,15 +92,15 @@ def find_motion(
     silent &= closed.sum() < params.least_frames  # black glass, which never shows its closed face
     through = counts[:, 1] >= params.least_closed
     tried = [each for each in hypotheses(leaf, scene.floor_m) if not each.lateral or closed.sum() >= params.least_frames]
-    if through.sum() < params.least_frames:  # hidden, and never seen into: by what it is itself, drawn out, or by others
+    if through.sum() < params.least_frames:  # hidden and never seen into: hidden by the leaf itself, drawn out, or by others
         tried = [each for each in tried if each.way == "out"]
     courses = [_course(lay_out(leaf, each), scene, closed, silent, prior.get(each.way, 0.0)) for each in tried]
     for course in sorted(courses, key=lambda course: -course.gain):
         if course.gain < params.gain:
             break
-        # Its place is seen into where it is seen elsewhere; a place that is only hidden tells of what stands before it.
+        # Its place is seen into while the leaf is seen elsewhere; a place that is only hidden shows an occluder, no motion.
         empty = (through & (course.values > 0) & (course.log > params.told)).sum() >= params.least_frames
-        if course.hypothesis.way == "out":  # a drawer hides its own place: it stands where one looked through before
+        if course.hypothesis.way == "out":  # a drawer hides its own place: the space where it stands was seen through before
             empty |= _was_free(leaf, course, scene, closed)
         motion = _measured(leaf, course, scene, closed, silent, part) if empty and course.support > params.support else None
         if motion is not None:
@@ -101,7 +109,7 @@ def find_motion(
 
 
 def _course(states: States, scene: Scene, closed: np.ndarray, silent: np.ndarray, prior: float) -> Course:
-    """The likeliest course under a hypothesis."""
+    """Most probable sequence of states under a hypothesis."""
     params, values = tuned(Params), states.hypothesis.states
     shut = np.where(np.arange(len(values)) > 0, -params.closed_cost, 0.0)
     log = np.stack([shut if is_shut else evidence(states, scene, f) for is_shut, f in zip(closed, scene.frames, strict=True)])
@@ -124,7 +132,7 @@ def _was_free(leaf: Leaf, course: Course, scene: Scene, closed: np.ndarray) -> b
 
 
 def _filled(leaf: Leaf, frames: Sequence[Frame], scene: Scene) -> bool:
-    """Whether frames that look where a leaf stands see something there or before it, most of them."""
+    """Whether most readings towards a leaf's place are on a surface there or in front of it."""
     counts = closed_counts(leaf, frames, scene).sum(axis=0) if frames else np.zeros(4)
     return bool(counts[1] < tuned(Params).free_share * counts[:3].sum())
 
@@ -132,13 +140,13 @@ def _filled(leaf: Leaf, frames: Sequence[Frame], scene: Scene) -> bool:
 def _measured(
     leaf: Leaf, course: Course, scene: Scene, closed: np.ndarray, silent: np.ndarray, part: str
 ) -> JointMotion | None:
-    """The joint fitted to the frames that show the leaf; None where too few of them have it in one piece."""
+    """Joint fitted to the frames that show the leaf; None where too few of them show it in one piece."""
     params, step = tuned(Params), float(course.hypothesis.states[1])
     joint, seen = _fitted(leaf, course, scene)
     seen |= {int(k): (0.0, params.closed_rad) for k in np.flatnonzero(silent & (course.values == 0)) if k not in seen}
     opened = [value for k, (value, _) in seen.items() if course.values[k] > 0]
     shut = sum(course.values[k] == 0 for k in seen)
-    # What never changes is how things are, not a motion: a rectangle that was drawn too wide looks like a leaf half slid away.
+    # A constant state is the static scene, no motion: a rectangle drawn too wide looks like a leaf half slid away.
     moves = shut >= params.least_frames or (len(opened) > 0 and np.ptp(opened) > params.moves_steps * step)
     if len(opened) < params.least_frames or not moves:
         return None
@@ -163,7 +171,7 @@ def _measured(
 
 
 def _fitted(leaf: Leaf, course: Course, scene: Scene) -> tuple[FittedJoint, Seen]:
-    """The joint, and the states of the frames that tell it."""
+    """Fitted joint, and the states of the frames that determine it."""
     told = [k for k in range(len(scene.frames)) if course.log[k] > tuned(Params).told or course.values[k] == 0]
     if course.hypothesis.lateral:
         found = {k: slid(leaf, course.hypothesis, scene, scene.frames[k]) for k in told}
@@ -180,14 +188,14 @@ def _fitted(leaf: Leaf, course: Course, scene: Scene) -> tuple[FittedJoint, Seen
 
 
 def _states(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene, closed: np.ndarray) -> dict[int, State]:
-    """The state in every frame that shows the leaf: as fitted, else as the likeliest near the fitted ones beside it.
+    """State in every frame that shows the leaf: as fitted, else the likeliest near the neighbouring fits.
 
-    A floor or a wall beside an open leaf shows where the leaf would stand, and is there while the leaf is closed.
+    A floor or a wall beside an open leaf looks like the leaf at a wrong state, but is there while the leaf is closed too.
     """
     states: dict[int, State] = {}
     shut_frames = [frame for frame, is_closed in zip(scene.frames, closed, strict=True) if is_closed]
     shut = np.pad(course.values == 0, 1, mode="edge")
-    rests = shut[:-2] & shut[1:-1] & shut[2:]  # what moves is past the first step that is tried within a frame or two
+    rests = shut[:-2] & shut[1:-1] & shut[2:]  # a moving leaf passes the first tested step within a frame or two
     for k, frame in enumerate(scene.frames):
         if k in seen:
             value, sigma = seen[k]
@@ -205,9 +213,9 @@ def _states(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: S
 def _likeliest(
     leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene, k: int, *, strays: bool
 ) -> tuple[float, float]:
-    """The state of a frame that has no fit of its own: it may show the leaf edge on, or a part of it.
+    """State and standard deviation of a frame without a fit of its own: it may show the leaf edge-on, or a part of it.
 
-    With `strays` its course is where other things stand: it is asked for between the fits beside it alone.
+    With `strays` its state lies where another surface is: then only the range between the neighbouring fits is searched.
     """
     params, step = tuned(Params), float(course.hypothesis.states[1])
     beside = [max((j for j in seen if j < k), default=None), min((j for j in seen if j > k), default=None)]
@@ -228,6 +236,6 @@ def _likeliest(
 
 
 def _opening(value: float, joint: FittedJoint, rest: float) -> float:
-    """A state, 0 where it cannot be told from closed, or up to `rest`."""
+    """State, set to 0 where it is indistinguishable from closed, or at most `rest`."""
     params = tuned(Params)
     return value if value > max(params.closed_rad if joint.turns else params.closed_m, rest) else 0.0
