@@ -1,1 +1,1 @@
-"""A vertical plane as its frames show it: orthomosaic, line evidence, relief, the networks' odds, edges and handles on it."""
+"""A vertical plane in its frames: orthomosaic, line evidence, relief, network odds, edges and handles on it."""

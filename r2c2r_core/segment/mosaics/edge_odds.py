@@ -1,4 +1,4 @@
-"""Log-odds of fronts' edges: what the seam network sees, the lines that frames agree on, and where depth shows an end."""
+"""Log-odds of fronts' edges from the seam network, from lines that frames agree on, and from ends of the plane in depth."""
 
 from dataclasses import dataclass, replace
 
@@ -12,57 +12,67 @@ from r2c2r_core.segment.mosaics.panel_net import SUREST, PanelOdds, panel_odds
 from r2c2r_core.segment.mosaics.relief import Relief
 from r2c2r_core.tuning import param, tuned
 
-_BESIDE = 3  # cells of the odds from a seam, where a front is
+_BESIDE = 3  # distance from a seam to a front, in cells of the odds
 _SOURCE = "chosen on development kitchens of both generators"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What lines and ends add to the network's odds."""
+    """Tuned parameters of lines and ends added to the network's odds."""
 
-    line_weight: float = param(0.7, "log", "a σ that a line adds where the network holds an edge possible", source=_SOURCE)
-    line_from: float = param(1.0, "σ", "from where a line adds", source=_SOURCE)
-    line_most: float = param(4.0, "σ", "beyond that, of which more adds nothing", source=_SOURCE)
-    possible: float = param(-3.5, "log", "of an edge by the network, below which a line is a front's profile", source=_SOURCE)
-    dark: float = param(110.0, "grey", "lightness, of 255, below which gaps beside a front may be lighter than it", gt=0)
-    block_m: float = param(0.03, "m", "along a line, over which depth is pooled", gt=0)
+    line_weight: float = param(
+        0.7, "log", "Log-odds per σ that a line adds where the network considers an edge possible", source=_SOURCE
+    )
+    line_from: float = param(1.0, "σ", "Minimum z-score of a line for it to add log-odds", source=_SOURCE)
+    line_most: float = param(4.0, "σ", "Maximum excess over that z-score that counts", source=_SOURCE)
+    possible: float = param(
+        -3.5, "log", "Network log-odds below which no edge is possible and a line is a front's profile", source=_SOURCE
+    )
+    dark: float = param(110.0, "grey", "Maximum lightness of a front that is dark: gaps beside it may be lighter than it", gt=0)
+    block_m: float = param(0.03, "m", "Length along a line over which depth is pooled", gt=0)
     end_off_m: float = param(
         0.01,
         "m",
-        "by which what adjoins a front goes on in its plane",
+        "Standard deviation of how far surface adjoining a front continues in its plane",
         gt=0,
         source="1-2 of a phone's 256 columns: 1-3 cm at 2 m",
     )
     lost_m: float = param(
         0.02,
         "m",
-        "by which depth may fall short of an end: sensors drop what is beside a step",
+        "Standard deviation of how far depth falls short of an end: sensors drop pixels beside a step",
         gt=0,
         source="fronts of development kitchens end 15-30 mm beyond their depth",
     )
     seen: float = param(
-        0.3, "share", "of usual depth points, from which depth shows what is beyond an end", gt=0, source=_SOURCE
+        0.3,
+        "share",
+        "Minimum density of depth points, relative to the usual one, for depth to show what lies beyond an end",
+        gt=0,
+        source=_SOURCE,
     )
-    straight_m: float = param(0.1, "m", "along an end, over which what the network sees is pooled", gt=0, source=_SOURCE)
-    end_from: float = param(2.0, "σ", "of 6, from where depth shows an end")
+    straight_m: float = param(0.1, "m", "Length along an end over which the network's odds are averaged", gt=0, source=_SOURCE)
+    end_from: float = param(2.0, "σ", "z-score, of at most 6, above which depth shows an end")
 
 
 def edge_odds(odds: PanelOdds, mosaic: Image, relief: Relief, vertical: Evidence, horizontal: Evidence) -> PanelOdds:
-    """What the network sees in a mosaic (rows, columns, 3), the relief of the same plane and the evidence of its lines."""
+    """Log-odds from the network, the plane's relief, and the evidence of vertical and horizontal lines."""
     rows, columns = odds.front.shape
     seen = mosaic[: rows * STEP, : columns * STEP].any(axis=2).reshape(rows, STEP, columns, STEP).any(axis=(1, 3))
     return replace(
         odds,
-        front=np.where(seen, odds.front, -SUREST).astype(np.float32),  # or what nobody saw would speak against lines through it
+        front=np.where(seen, odds.front, -SUREST).astype(
+            np.float32
+        ),  # else unobserved cells would be evidence against lines through them
         upright=_with_ends(_with_lines(odds.upright, vertical), relief, 0),
         level=np.ascontiguousarray(_with_ends(_with_lines(odds.level.T, horizontal), relief, 1).T),
     )
 
 
 def seam_odds(mosaic: Image, relief: Relief) -> PanelOdds:
-    """What the network sees; where fronts are dark, also in the negative, in which seams that are lighter than they look usual.
+    """Network log-odds; between dark fronts also of the negative image, in which seams lighter than the fronts look usual.
 
-    Between dark fronts a lit carcass shows; what the network was trained on has dark gaps.
+    A lit carcass shows between dark fronts, whereas the network's training data have dark gaps.
     """
     odds = panel_odds(mosaic, relief.count, relief.raised, relief.level_m)
     rows, columns = odds.front.shape
@@ -79,7 +89,7 @@ def seam_odds(mosaic: Image, relief: Relief) -> PanelOdds:
 
 
 def _lit(light: np.ndarray, dark: np.ndarray, axis: int) -> np.ndarray:
-    """Where it is lighter (or is a cell beside it) than the dark at both sides, along an axis of the array."""
+    """Mask of the cells (or neighbours) lighter than the dark fronts on both sides, along an axis of the array."""
     before, after = (np.roll(light, off, axis=axis) for off in (_BESIDE, -_BESIDE))
     between = np.roll(dark, _BESIDE, axis=axis) & np.roll(dark, -_BESIDE, axis=axis)
     ridge = between & (light > np.maximum(before, after))
@@ -87,11 +97,11 @@ def _lit(light: np.ndarray, dark: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _with_ends(odds: np.ndarray, relief: Relief, axis: int) -> np.ndarray:
-    """Log-odds of edges (lines, positions), not below what depth says where it shows that the plane ends.
+    """Log-odds of edges (lines, positions), raised to the depth evidence where depth shows that the plane ends.
 
-    What adjoins may go on in the plane for a little, and depth may fall short of the end where it shows nothing beyond: the
-    edge is about there, where the network thinks it likeliest, and nowhere else that far. Where the network holds no edge
-    possible, a step back is the border of a deep panel in its frame, and an enclosed hole glass.
+    Adjoining surface may continue in the plane a little, and depth may fall short of the end where it shows nothing beyond: the
+    edge lies near the end where the network's odds are highest, and nowhere else in that range. Where the network rules an edge
+    out, a step back is the border of a deep panel in its frame, and an enclosed hole is glass.
     """
     params, known = tuned(Params), odds.copy()
     block, (lines, positions) = round(params.block_m / relief.cell_m) * STEP, odds.shape
@@ -114,7 +124,7 @@ def _with_ends(odds: np.ndarray, relief: Relief, axis: int) -> np.ndarray:
 
 
 class _NearEnds:
-    """What speaks for an edge at each of the offsets from where depth shows an end: negative ones lie beyond it."""
+    """Scores of an edge at offsets from where depth shows an end; negative offsets lie beyond it."""
 
     def __init__(self, odds: np.ndarray, relief: Relief, axis: int) -> None:
         params = tuned(Params)
@@ -125,18 +135,18 @@ class _NearEnds:
         self._pooled, self._density = _along(odds, relief), _density(relief, axis)
 
     def positions(self, line: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """(ends, offsets)."""
+        """Positions of the candidate edges (ends, offsets)."""
         return self._at(line, end, self._off)
 
     def worth(self, line: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Log-odds less what the offset costs (ends, offsets); -inf beyond where depth shows what follows."""
+        """Log-odds minus the cost of the offset (ends, offsets); -inf beyond where depth shows the surface that follows."""
         outer = self._at(line, end, np.minimum(self._off, -_BESIDE))
         beyond = np.where(self._off < 0, self._density[line[:, None], outer], 0)
         beyond = np.maximum.accumulate(beyond[:, ::-1], axis=1)[:, ::-1]
         return np.where(beyond > self._seen, -np.inf, self._pooled[line[:, None], self.positions(line, end)] - self._cost)
 
     def short_of(self, best: np.ndarray) -> np.ndarray:
-        """Which offsets lie between an end's edge, by its index, and where depth ends: no other edge is there."""
+        """Mask of the offsets between an end's edge, given by its index, and the end of depth: no other edge is there."""
         return (self._off > self._off[best][:, None] + 1) & (self._off <= 1)
 
     def _at(self, line: np.ndarray, end: np.ndarray, off: np.ndarray) -> np.ndarray:
@@ -144,18 +154,18 @@ class _NearEnds:
 
 
 def _along(odds: np.ndarray, relief: Relief) -> np.ndarray:
-    """Means along lines, over about as far as an end is straight."""
+    """Means along lines, over about the length on which an end is straight."""
     return np.asarray(cv2.blur(odds, (1, 2 * round(tuned(Params).straight_m / relief.cell_m / 2) + 1)))
 
 
 def _density(relief: Relief, axis: int) -> np.ndarray:
-    """Of depth points on or before the plane along lines (lines, positions), as a share of what is usual."""
+    """Density of depth points on or before the plane, averaged along lines (lines, positions), relative to the usual one."""
     points = (relief.count if axis == 0 else relief.count.T).astype(np.float32)
     return _along(points, relief) / (float(np.median(points[points > 0])) if points.any() else 1.0)
 
 
 def _inwards(relief: Relief, axis: int, reach: int) -> np.ndarray:
-    """On which side (1 or -1) of each position (lines, positions) depth saw more of the plane."""
+    """Side (1 or -1) of each position (lines, positions) on which depth shows more of the plane."""
     points = relief.count * (1 - relief.raised)
     sums = np.pad(points if axis == 0 else points.T, ((0, 0), (reach, reach))).cumsum(axis=1)
     middle = sums[:, reach:-reach]
@@ -164,7 +174,7 @@ def _inwards(relief: Relief, axis: int, reach: int) -> np.ndarray:
 
 
 def _with_lines(odds: np.ndarray, evidence: Evidence) -> np.ndarray:
-    """Log-odds of edges (lines, positions) with what lines say where the network holds an edge possible."""
+    """Log-odds of edges (lines, positions) plus line evidence where the network considers an edge possible."""
     params, (lines, positions) = tuned(Params), odds.shape
     score = evidence.score[:, : positions * STEP]
     score = np.pad(score, ((0, 0), (0, positions * STEP - score.shape[1])))

@@ -1,4 +1,4 @@
-"""Panel edges refined by colour: the first clear change met from inside, near the cut or where depth ends."""
+"""Colour refinement of panel edges: the first clear change met from inside, near the cut or near the end of depth."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,78 +14,97 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a cut is refined by colour."""
+    """Tuned parameters of edge refinement by colour."""
 
-    inside_m: float = param(0.0125, "m", "inside the cut, where an edge is looked for")
-    outside_m: float = param(0.010, "m", "outside the cut, where an edge is looked for")
+    inside_m: float = param(0.0125, "m", "Search distance for an edge inside the cut")
+    outside_m: float = param(0.010, "m", "Search distance for an edge outside the cut")
     depth_short_m: float = param(
         0.04,
         "m",
-        "by which depth may end before the panel",
+        "Maximum distance by which depth may end before the panel",
         source="phones leave out 1-2 of 256 columns at an edge: 1-3 cm at 2 m",
     )
-    least_gradient: float = param(1.5, "grey", "CIELAB units a cell, of an edge on a panel without texture")
+    least_gradient: float = param(
+        1.5, "grey", "Minimum gradient, in CIELAB units per cell, of an edge on a panel without texture"
+    )
     shadow_m: float = param(
-        0.03, "m", "height of the shadow of a lip", source="worktops stand 1-3 cm over fronts, lights are above"
+        0.03, "m", "Maximum height of the shadow of a lip", source="worktops protrude 1-3 cm over fronts, lights are above"
     )
-    even_shade: float = param(0.1, "share", "by which colours may be darkened unequally in a shadow")
-    darkest_shade: float = param(0.2, "share", "of the light that a shadow leaves: a gap is darker")
-    least_shade: float = param(0.75, "share", "of the light in what is a shadow")
-    half_gap_m: float = param(0.0015, "m", "half a gap, assumed where no edge is clear", source="gaps are 2-4 mm")
-    widest_gap_m: float = param(0.012, "m", "of a gap, as blurred as it looks")
-    clear: float = param(3.5, "ratio", "to the panel's own median gradient, of an edge")
-    strong_share: float = param(0.45, "share", "of the strongest gradient nearby, of an edge")
+    even_shade: float = param(0.1, "share", "Maximum relative difference between the darkening of colour channels in a shadow")
+    darkest_shade: float = param(0.2, "share", "Minimum fraction of light in a shadow: a gap is darker")
+    least_shade: float = param(0.75, "share", "Maximum fraction of light in a shadow")
+    half_gap_m: float = param(0.0015, "m", "Half width of a gap, assumed where no edge is clear", source="gaps are 2-4 mm")
+    widest_gap_m: float = param(0.012, "m", "Maximum apparent width of a gap, with blur")
+    clear: float = param(3.5, "ratio", "Minimum gradient of an edge relative to the panel's median gradient")
+    strong_share: float = param(0.45, "share", "Minimum gradient of an edge as a fraction of the strongest one nearby")
     one_colour: float = param(
-        0.35, "ratio", "to the depth of a gap, by which colours may differ from one side of it to the other", gt=0
+        0.35,
+        "ratio",
+        "Maximum colour difference between both sides of a gap, relative to its lightness dip, for them to match",
+        gt=0,
     )
-    gap_noise: float = param(6.0, "σ", "of dips within a panel, of a gap between surfaces of one colour")
+    gap_noise: float = param(
+        6.0, "σ", "Minimum lightness dip of a gap between surfaces of one colour, relative to the noise of dips in a panel"
+    )
     rail_m: float = param(
         0.05,
         "m",
-        "of a front inside its edge, whose dips count alone too: the grain of a frame's rail runs across that of its panel",
+        "Width of the rim of a front whose dips alone may set that noise: the grain of a rail runs across its panel's",
         gt=0,
         source="frames of doors sold are 50-90 mm wide",
     )
-    gap_contrast: float = param(1.5, "grey", "CIELAB units by which such a gap is darker, at least")
+    gap_contrast: float = param(1.5, "grey", "Minimum CIELAB lightness dip of such a gap")
     upper_face_m: float = param(
         0.02,
         "m",
-        "of a front's upper face, seen in a gap over it",
+        "Maximum height of a front's upper face seen in a gap above it",
         source="fronts are 16-22 mm thick, views slant by up to 45°",
     )
     channel_m: float = param(
-        0.02, "m", "of what is dark of a channel over a front, at most", source="worktops are 20-40 mm thick"
+        0.02, "m", "Maximum height of the dark part of a channel above a front", source="worktops are 20-40 mm thick"
     )
-    open_gap_m: float = param(0.004, "m", "of a gap wide enough to see into", source="gaps between fronts are 2-4 mm")
+    open_gap_m: float = param(
+        0.004, "m", "Minimum width of a gap wide enough to see into", source="gaps between fronts are 2-4 mm"
+    )
     open_dark: float = param(
         0.5,
         "share",
-        "of the light that is missing in such a gap, at least",
+        "Minimum fraction of light missing in such a gap",
         gt=0,
-        source="development kitchens: 0.2 to 0.4 in shadows of worktops on fronts as white as they",
+        source="development kitchens: 0.2 to 0.4 in shadows of worktops on equally white fronts",
     )
-    known: float = param(0.3, "share", "of the panel's depth points, of what depth sees")
-    recess_m: float = param(0.0125, "m", "of a recessed channel as depth shows it", source="the least that hands reach into")
-    thick_m: float = param(0.014, "m", "of fronts at least, and so the depth of a channel", source="boards of 16-22 mm")
-    behind_m: float = param(0.006, "m", "behind the plane, on average, of what is not the panel", source="depth of many frames")
-    lip_m: float = param(0.06, "m", "of a lip's height, at most", gt=0, source="worktops are 20-40 mm thick, some 60")
-    before_m: float = param(0.004, "m", "before the plane, on average, of a lip", source="worktops stand 1-3 cm over fronts")
+    known: float = param(
+        0.3, "share", "Minimum depth points per cell, relative to the panel's median, for a cell to count as observed"
+    )
+    recess_m: float = param(
+        0.0125, "m", "Minimum height of a recessed channel in depth", source="the smallest gap that hands reach into"
+    )
+    thick_m: float = param(
+        0.014, "m", "Minimum thickness of fronts, and so minimum depth of a channel", source="boards of 16-22 mm"
+    )
+    behind_m: float = param(
+        0.006, "m", "Minimum mean distance behind the plane of surface that is not the panel", source="depth of many frames"
+    )
+    lip_m: float = param(0.06, "m", "Maximum height of a lip", gt=0, source="worktops are 20-40 mm thick, some 60")
+    before_m: float = param(
+        0.004, "m", "Minimum mean distance of a lip in front of the plane", source="worktops protrude 1-3 cm over fronts"
+    )
     depth_off_m: float = param(
-        0.005, "m", "by which depth of many frames is off along the plane", source="a cell of the relief"
+        0.005, "m", "Position error along the plane of depth from many frames", source="a cell of the relief"
     )
 
 
 class Surface(NamedTuple):
-    """What a run shows of its plane, on grid cells (rows, columns)."""
+    """Colour and depth of a run's plane on grid cells (rows, columns)."""
 
     lab: np.ndarray  # (rows, columns, 3), the mosaic's CIELAB colours
-    seen: np.ndarray  # where it has colour
+    seen: np.ndarray  # mask of the cells with colour
     height_m: np.ndarray  # mean height of depth over the plane; 0 where there is none
-    points: np.ndarray  # of depth that the mean is of
-    seams: PanelOdds | None = None  # what the network sees in it
+    points: np.ndarray  # number of depth points in that mean
+    seams: PanelOdds | None = None  # log-odds of the network on it
 
     def shows(self, cell: Cell) -> tuple[bool, bool, bool, bool]:
-        """Which edges of a panel the network sees where it was cut, more likely than not: left, right, top, bottom."""
+        """Flags of a panel's edges (left, right, top, bottom) that the network sees at the cut, more likely than not."""
         if self.seams is None:
             return False, False, False, False
         left, right, top, bottom = self.seams.of_edges(cell)
@@ -93,17 +112,17 @@ class Surface(NamedTuple):
 
 
 class Profile(NamedTuple):
-    """What a panel's mosaic shows at each position along an axis, over the middle of its span."""
+    """Profile of a panel's mosaic at each position along an axis, over the middle of its span."""
 
-    gradient: np.ndarray  # CIELAB units a cell
+    gradient: np.ndarray  # CIELAB units per cell
     slope: np.ndarray  # of lightness, signed
-    light: np.ndarray  # relative luminance, 0..1; nan where nothing is known
-    height: np.ndarray  # metres over the plane; nan where nothing is known
-    points: np.ndarray  # of depth, in a cell
+    light: np.ndarray  # relative luminance, 0..1; nan where unknown
+    height: np.ndarray  # metres over the plane; nan where unknown
+    points: np.ndarray  # depth points per cell
     lab: np.ndarray  # mean CIELAB colours, (positions, 3)
 
     def mirrored(self) -> "Profile":
-        """As met from the other end."""
+        """Profile in reverse order, as met from the other end."""
         return Profile(
             self.gradient[::-1],
             -self.slope[::-1],
@@ -115,15 +134,20 @@ class Profile(NamedTuple):
 
 
 class Refined(NamedTuple):
-    """A panel as refined from where it was cut."""
+    """A panel refined from its cut."""
 
     panel: Cell
-    lit_top: float  # its upper edge, or, where that lies in a shadow of a lip, where the shadow ends on it
-    shown: tuple[bool, bool, bool, bool] = (True, True, True, True)  # left, right, top, bottom: or where it was cut
+    lit_top: float  # its upper edge or, where that lies in the shadow of a lip, the lower end of that shadow
+    shown: tuple[bool, bool, bool, bool] = (
+        True,
+        True,
+        True,
+        True,
+    )  # left, right, top, bottom: whether visible, or else at the cut
 
 
 def panel_edges(cell: Cell, surface: Surface, cell_m: float) -> Refined:
-    """The panel's rectangle, refined from where it was cut."""
+    """Panel rectangle refined from its cut."""
     rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
     if rows.stop - rows.start < 12 or columns.stop - columns.start < 12:
         return Refined(cell, cell.top, shown=(False, False, False, False))
@@ -140,7 +164,7 @@ def panel_edges(cell: Cell, surface: Surface, cell_m: float) -> Refined:
 
 
 def _profiles(surface: Surface, across: slice, axis: int) -> Profile:
-    """Along an axis, over the middle of the panel's span."""
+    """Profile along an axis, over the middle of the panel's span."""
     inset = (across.stop - across.start) // 8
     middle = slice(across.start + inset, across.stop - inset)
     if axis == 0:
@@ -163,7 +187,7 @@ def _profiles(surface: Surface, across: slice, axis: int) -> Profile:
 
 
 def _middles(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    """The lower and the upper of the two middle values (2, n) of what is valid of each column; inf where nothing is."""
+    """Lower and upper of the two middle valid values (2, n) of each column; inf where none is valid."""
     ordered, count = np.sort(np.where(valid, values, np.inf), axis=0), valid.sum(axis=0)
     return np.take_along_axis(
         ordered, np.stack([np.maximum(count - 1, 0) // 2, np.minimum(count // 2, len(values) - 1)]), axis=0
@@ -173,7 +197,7 @@ def _middles(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
 def _ends(
     low: float, high: float, seen: tuple[bool, bool], profile: Profile, cell_m: float
 ) -> tuple[tuple[float, float], tuple[bool, bool]]:
-    """Both edges along an axis, and whether each shows; `seen`: by the network, where it was cut."""
+    """Both edges along an axis, and whether each is visible; `seen` flags those that the network sees at the cut."""
     count = len(profile.gradient)
     own = _own(low, high, profile)
     first, begins = _end(low, high, seen[0], profile, own, cell_m)
@@ -182,12 +206,12 @@ def _ends(
 
 
 def _own(low: float, high: float, profile: Profile) -> float:
-    """The panel's own median gradient."""
+    """Median gradient inside the panel."""
     return float(np.median(profile.gradient[round(low) + 4 : round(high) - 4]))
 
 
 def _end(low: float, high: float, seen: bool, profile: Profile, own: float, cell_m: float) -> tuple[float, bool]:
-    """The lower edge, in positions where i + 0.5 is the middle of cell i, and whether it shows or is where it was cut."""
+    """Lower edge, in positions where i + 0.5 is the middle of cell i, and whether it is visible or stays at the cut."""
     params, (gradient, slope, light, *_) = tuned(Params), profile
     start = low + _dark_from(round(low), round((low + high) / 2), light, cell_m)
     least = max(params.clear * own, params.least_gradient)
@@ -197,7 +221,7 @@ def _end(low: float, high: float, seen: bool, profile: Profile, own: float, cell
     first = max(round(low - params.outside_m / cell_m), 1)
     last = min(round(start + params.inside_m / cell_m) + 1, len(gradient) - 1)
     while last - first > 3 and gradient[last - 1] > gradient[last - 2]:
-        last -= 1  # the flank of what lies farther in
+        last -= 1  # the flank of an edge farther inside
     peaks = _peaks(gradient[first:last], least)
     own_gap = _gap_in_one_colour(profile, start, high, last, cell_m)
     if own_gap is not None:
@@ -221,7 +245,7 @@ def _end(low: float, high: float, seen: bool, profile: Profile, own: float, cell
 
 
 def _is_behind(start: int, low: int, high: int, profile: Profile) -> bool:
-    """Whether depth shows what lies before a panel, from `start` to its cut at `low`, to be behind its plane."""
+    """Whether depth shows the surface before a panel, from `start` to its cut at `low`, behind its plane."""
     params, strip = tuned(Params), slice(start, low)
     points = profile.points[strip]
     if points.sum() <= params.known * float(np.median(profile.points[low:high])):
@@ -231,9 +255,9 @@ def _is_behind(start: int, low: int, high: int, profile: Profile) -> bool:
 
 
 def _gap_in_one_colour(profile: Profile, low: float, high: float, last: int, cell_m: float) -> int | None:
-    """The inner flank of the innermost gap with the same colour on both sides, from a cut at `low` on; None where none is.
+    """Inner flank of the innermost gap with the same colour on both sides, from a cut at `low` on; None where there is none.
 
-    A front is one board: beyond such a gap its face frame, or another front, begins, however much clearer that one's end is.
+    A front is one board: beyond such a gap its face frame or another front begins, even if that one's end is clearer.
     """
     params, half = tuned(Params), round(tuned(Params).widest_gap_m / 2 / cell_m)
     lab, (before, after) = profile.lab, _beside(profile.lab, half + 1)
@@ -251,7 +275,7 @@ def _gap_in_one_colour(profile: Profile, low: float, high: float, last: int, cel
 
 
 def _beside(values: np.ndarray, off: int) -> np.ndarray:
-    """Means of two positions (2, n, channels) that far before and after each; the border's beyond the ends."""
+    """Means of two positions (2, n, channels) `off` before and after each position; edge values beyond the ends."""
     padded = np.pad(values, ((off, off), (0, 0)), mode="edge")
     pairs = (padded[:-1] + padded[1:]) / 2
     count = len(values)
@@ -259,13 +283,13 @@ def _beside(values: np.ndarray, off: int) -> np.ndarray:
 
 
 def _median_seen(values: np.ndarray) -> float:
-    """The median of what some frame shows; not a number where nothing is."""
+    """Median of the observed values; NaN where there are none."""
     seen = values[~np.isnan(values)]
     return float(np.median(seen)) if len(seen) else float("nan")
 
 
 def _dark_from(first: int, last: int, light: np.ndarray, cell_m: float) -> float:
-    """How far a gap reaches into a panel whose cut lies on the gap's other side."""
+    """Extent of a gap into a panel whose cut lies on the gap's other side."""
     params = tuned(Params)
     near = light[first : first + round(params.upper_face_m / cell_m)] < params.darkest_shade * _median_seen(light[first:last])
     begins = int(np.argmax(near))
@@ -274,10 +298,10 @@ def _dark_from(first: int, last: int, light: np.ndarray, cell_m: float) -> float
 
 
 def _plane_from(low: float, high: float, profile: Profile, cell_m: float) -> tuple[int, int] | None:
-    """Between which positions depth shows a panel to begin beside a recessed channel; None where there is none.
+    """Range of positions in which depth shows a panel to begin beside a recessed channel; None without a channel.
 
-    A channel is a strip behind the plane, between two on it. What cameras above see in it lies below where they see it on the
-    plane: a part of the channel under the front over it has no depth.
+    A channel is a strip behind the plane, between two on it. Cameras above see its surface lower than it would be on the plane:
+    the part of the channel under the front above has no depth.
     """
     params, first = tuned(Params), round(low)
     inside = slice(first, round(high))
@@ -296,7 +320,7 @@ def _plane_from(low: float, high: float, profile: Profile, cell_m: float) -> tup
 
 
 def _step_near(earliest: int, latest: int, gradient: np.ndarray, least: float, cell_m: float) -> float:
-    """The innermost clear step of colour about where depth shows a panel to begin, or else the clearest one there."""
+    """Innermost clear colour step near where depth shows a panel to begin, or else the clearest one there."""
     params = tuned(Params)
     off = round(params.depth_off_m / cell_m)
     first, last = earliest - off, latest + off + 1
@@ -305,7 +329,7 @@ def _step_near(earliest: int, latest: int, gradient: np.ndarray, least: float, c
 
 
 def _rim(surface: Surface, rows: slice, columns: slice) -> float:
-    """Mean height over the plane of a panel's outer eighths at both sides, half way up: of the stiles, where it is framed."""
+    """Mean height over the plane of a panel's outer eighths at both sides, half way up: the stiles, where it is framed."""
     quarter, eighth = (rows.stop - rows.start) // 4, (columns.stop - columns.start) // 8
     rim = np.r_[columns.start : columns.start + eighth, columns.stop - eighth : columns.stop]
     height, points = (values[rows.start + quarter : rows.stop - quarter, rim] for values in (surface.height_m, surface.points))
@@ -313,10 +337,10 @@ def _rim(surface: Surface, rows: slice, columns: slice) -> float:
 
 
 def _under_lip(top: float, bottom: float, profile: Profile, rim_m: float, cell_m: float) -> float:
-    """The upper edge, moved down where a lip of the panel's colour, as a worktop's, was taken for its upper part.
+    """Upper edge, moved down where a lip of the panel's colour, such as a worktop's, was cut as its upper part.
 
-    Depth shows a lip before the panel's plane, and before its rim: the upper rail of a frame is as high as its stiles. What
-    stands out of a front, as a grip along its edge, has another front or a lip over it.
+    Depth shows a lip in front of the panel's plane and of its rim: the upper rail of a frame is as high as its stiles. A raised
+    part of a front, such as a grip along its edge, has another front or a lip above it.
     """
     params, start, middle = tuned(Params), round(top), round((top + bottom) / 2)
     reach, off = round(params.lip_m / cell_m), round(params.depth_off_m / cell_m)
@@ -337,7 +361,7 @@ def _under_lip(top: float, bottom: float, profile: Profile, rim_m: float, cell_m
 
 
 def _lip_over(top: float, profile: Profile, cell_m: float) -> bool:
-    """Whether something stands out directly over a panel, which may throw a shadow on it."""
+    """Whether something protrudes directly above a panel and may cast a shadow on it."""
     params, start = tuned(Params), round(top)
     over = profile.height[max(start - round(params.shadow_m / cell_m), 0) : start]
     known = over[np.isfinite(over)]
@@ -345,9 +369,9 @@ def _lip_over(top: float, profile: Profile, cell_m: float) -> bool:
 
 
 def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> float:
-    """The upper edge, moved up where what it follows is the end of a shadow that a lip, as a worktop's, throws on the panel.
+    """Upper edge, moved up where it was found at the end of a shadow that a lip, such as a worktop's, casts on the panel.
 
-    The shadow reaches up to where the surface is no longer darker by one factor in all colours, or darkest.
+    The shadow extends up to where the surface is no longer darkened equally in all channels, or to where it is darkest.
     """
     params = tuned(Params)
     middle = lab[:, lab.shape[1] // 8 : lab.shape[1] - lab.shape[1] // 8]
@@ -361,7 +385,7 @@ def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> 
         k -= 1
     mixed = k
     while mixed > 0 and params.darkest_shade < shade[mixed - 1] < shade[mixed] - 0.005:
-        mixed -= 1  # with what is over the panel
+        mixed -= 1  # with the surface above the panel
     darkened = shade[k] < params.least_shade
     other = not (even & (shade > params.least_shade))[max(mixed - reach, 0) : mixed].any()
     if darkened and even[k] and other and (up := _half_way(shade[: mixed + 1])) is not None:
@@ -374,7 +398,7 @@ def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> 
 
 
 def _half_way(shade: np.ndarray) -> float | None:
-    """How far before its last, darkest position light is half way to the uneven light beyond; None where that is dark too."""
+    """Distance before the last, darkest position of half the light beyond, which is uneven; None where that is dark too."""
     usual = float(np.median(shade[:-3])) if len(shade) > 3 else 0.0
     if usual <= shade[-1] / tuned(Params).least_shade:
         return None
@@ -385,9 +409,9 @@ def _half_way(shade: np.ndarray) -> float | None:
 
 
 def shading(lab: np.ndarray, usual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Light of colours (n, 3) relative to a usual one (3,), and its unevenness over red, green and blue.
+    """Light of colours (n, 3) relative to a reference colour (3,), and its unevenness over red, green and blue.
 
-    In a shadow a surface is darker by one factor in all of them: its unevenness is 0.
+    A shadow darkens a surface by one factor in all channels: its unevenness is 0.
     """
     relative = _linear_light(lab) / np.maximum(_linear_light(usual[None]), 1e-3)
     shade = relative.mean(axis=1)
@@ -395,13 +419,13 @@ def shading(lab: np.ndarray, usual: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _linear_light(lab: np.ndarray) -> np.ndarray:
-    """Linear light in red, green and blue, 0..1, of rows of colours."""
+    """Linear light in red, green and blue, 0..1, of rows of Lab colours."""
     rgb = cv2.cvtColor(np.clip(lab, 0, 255).astype(np.uint8)[None], cv2.COLOR_LAB2RGB)[0]
     return np.asarray((rgb / 255.0) ** 2.2)
 
 
 def _peaks(window: np.ndarray, least: float) -> list[int]:
-    """Where the gradient has clear peaks."""
+    """Positions of clear peaks of the gradient."""
     least = max(least, tuned(Params).strong_share * float(window.max(initial=0.0)))
     return [
         i for i in range(1, len(window) - 1) if window[i] >= least and window[i] >= window[i - 1] and window[i] >= window[i + 1]
@@ -409,7 +433,7 @@ def _peaks(window: np.ndarray, least: float) -> list[int]:
 
 
 def _gap(slope: np.ndarray, inner: int, low: int) -> tuple[int, int] | None:
-    """Outer and inner flank of a dark gap whose inner flank lies at `inner`; None when what is beyond stays dark."""
+    """Outer and inner flank of a dark gap whose inner flank lies at `inner`; None when the surface beyond stays dark."""
     if slope[inner] <= 0 or inner <= low:
         return None
     outer = low + int(np.argmin(slope[low:inner]))
@@ -417,7 +441,7 @@ def _gap(slope: np.ndarray, inner: int, low: int) -> tuple[int, int] | None:
 
 
 def _dark_width(light: np.ndarray, outer: int, inner: int, cell_m: float) -> float:
-    """Width in positions of a gap without light that is as dark as what lies between two flanks, however blurred."""
+    """Width in positions of a lightless gap that would be as dark in total as the blurred one between two flanks."""
     around = round(tuned(Params).half_gap_m / cell_m) + 2
     low, high = max(outer - around, 0), inner + around + 1
     beside = min(float(np.nanmax(side, initial=1e-3)) for side in (light[low : outer + 1], light[inner:high]))
@@ -425,10 +449,10 @@ def _dark_width(light: np.ndarray, outer: int, inner: int, cell_m: float) -> flo
 
 
 def _below_upper_face(top: float, bottom: float, profile: Profile, lab: np.ndarray, cell_m: float) -> float | None:
-    """The upper edge of a panel below the gap to another of its colour that is wide enough to see into; None where none is.
+    """Upper edge of a panel below an open gap to another panel of its colour; None where there is no such gap.
 
-    From above, a camera sees through such a gap (a recessed channel, mostly) the upper face of the front, of its colour in
-    another light; the front begins where that light changes. Under another colour the same may be a lip's shadow.
+    From above, a camera sees through such a gap (mostly a recessed channel) the upper face of the front, of the same colour in
+    different light; the front begins where that light changes. Under another colour the same may be a lip's shadow.
     """
     params, light, gradient = tuned(Params), profile.light, profile.gradient
     start, reach = round(top), round(params.upper_face_m / cell_m)
@@ -468,7 +492,7 @@ def _luminance(lightness: np.ndarray) -> np.ndarray:
 
 
 def surface_of(mosaic: np.ndarray, relief: Relief, seams: PanelOdds) -> Surface:
-    """Of a mosaic (rows, columns, 3), the relief of the same plane and what the network sees in both."""
+    """Surface of a mosaic (rows, columns, 3), the relief of the same plane and the network's log-odds."""
     lab, seen = as_lab(mosaic)
     height = relief.raised * relief.lift_m + (1 - relief.raised) * relief.level_m
     height, points = (
@@ -479,6 +503,6 @@ def surface_of(mosaic: np.ndarray, relief: Relief, seams: PanelOdds) -> Surface:
 
 
 def as_lab(mosaic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The mosaic in Lab (float), and where it has colour."""
-    seen = (mosaic[..., 0] | mosaic[..., 1] | mosaic[..., 2]) > 0  # numpy is slow along an axis of three
+    """Mosaic in Lab (float), and the mask of cells with colour."""
+    seen = (mosaic[..., 0] | mosaic[..., 1] | mosaic[..., 2]) > 0  # numpy is slow along an axis of length three
     return cv2.cvtColor(mosaic, cv2.COLOR_RGB2LAB).astype(np.float32), np.asarray(seen)

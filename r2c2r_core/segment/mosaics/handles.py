@@ -1,4 +1,4 @@
-"""Handle detection on panels: what the panel network takes for one, and how far depth saw it stand out."""
+"""Handle detection on panels: the network's log-odds, with protrusion and parallax from depth."""
 
 from dataclasses import dataclass
 
@@ -14,11 +14,20 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where on a panel its handle is."""
+    """Tuned parameters of handle detection."""
 
-    parallax_m: float = param(0.02, "m", "beside its true place that a mosaic shows it", source="4 cm seen from 25 degrees off")
-    seen: float = param(0.25, "share", "of the usual count of depth points, from which a handle is at a place", gt=0)
-    parted_m: float = param(0.04, "m", "between parts of one handle", source="glare parts bars, a cup pull's rim its middle")
+    parallax_m: float = param(
+        0.02,
+        "m",
+        "Maximum displacement of a handle in the mosaic from its true place",
+        source="4 cm of protrusion seen from 25 degrees off",
+    )
+    seen: float = param(
+        0.25, "share", "Minimum count of depth points at a position of a handle, relative to their median", gt=0
+    )
+    parted_m: float = param(
+        0.04, "m", "Maximum gap between parts of one handle", source="glare splits bars, the rim of a cup pull its middle"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,17 +43,17 @@ class GridHandle:
 
     @property
     def width(self) -> float:
-        """In grid cells."""
+        """Width in grid cells."""
         return self.right - self.left
 
     @property
     def height(self) -> float:
-        """In grid cells."""
+        """Height in grid cells."""
         return self.bottom - self.top
 
 
 def find_handle(odds: PanelOdds, relief: Relief, cell: Cell) -> GridHandle | None:
-    """The likeliest handle of a panel; None where the network sees none."""
+    """Likeliest handle of a panel; None where the network sees none."""
     top, bottom, left, right = (max(round(edge / STEP), 0) for edge in (cell.top, cell.bottom, cell.left, cell.right))
     panel = odds.handle[top:bottom, left:right]
     area = (slice(top, top + panel.shape[0]), slice(left, left + panel.shape[1]))
@@ -71,7 +80,7 @@ def find_handle(odds: PanelOdds, relief: Relief, cell: Cell) -> GridHandle | Non
 
 
 def _shift(raised: np.ndarray, rows: np.ndarray, columns: np.ndarray, reach: int) -> tuple[float, float]:
-    """How far (rows, columns) the middle of a handle's depth points lies from where the mosaic, which is flat, shows it."""
+    """Offset (rows, columns) of the centre of a handle's depth points from its place in the mosaic, which is flat."""
     top, left = max(rows[0] - reach, 0), max(columns[0] - reach, 0)
     near = raised[top : rows[-1] + reach + 1, left : columns[-1] + reach + 1]
     if not near.any():
@@ -81,5 +90,5 @@ def _shift(raised: np.ndarray, rows: np.ndarray, columns: np.ndarray, reach: int
 
 
 def _middle(points: np.ndarray) -> float:
-    """The middle of the positions that depth saw about as often as their median: nearer ends of a handle have more points."""
+    """Centre of the positions with a usual number of depth points: nearer ends of a handle have more points."""
     return float(np.flatnonzero(points > tuned(Params).seen * np.median(points[points > 0])).mean())

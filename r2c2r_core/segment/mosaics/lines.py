@@ -15,31 +15,31 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How lines are scored."""
+    """Tuned parameters of line scores."""
 
     block_m: float = param(
         0.03,
         "m",
-        "of the line's length over which evidence is pooled, so that a line must be seen along most of its span",
+        "Length along a line over which evidence is pooled, so that a line must be visible along most of its span",
         gt=0,
     )
-    scales_m: tuple[float, float] = param((0.005, 0.0075), "m", "widths of the ridge and of the colour step")
-    noise_floor: float = param(0.35, "grey", "below this, differences mean nothing", gt=0)
-    max_shift_m: float = param(0.03, "m", "pose error between frames, at most", source="30 mm on a KinectFusion trajectory")
+    scales_m: tuple[float, float] = param((0.005, 0.0075), "m", "Widths of the ridge and of the colour step")
+    noise_floor: float = param(0.35, "grey", "Noise added to the spread of line strengths", gt=0)
+    max_shift_m: float = param(0.03, "m", "Maximum pose error between frames", source="30 mm on a KinectFusion trajectory")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """Robust z-scores (blocks, positions); `known` where at least one tile saw both sides."""
+    """Robust z-scores (blocks, positions); `known` where at least one tile observed both sides."""
 
     score: np.ndarray
     known: np.ndarray
     block: int  # cells in a block
-    ends: np.ndarray | None = None  # the part of the score that depth gave: where the plane begins or ends
+    ends: np.ndarray | None = None  # the part of the score from depth: where the plane begins or ends
 
 
 class Scores(NamedTuple):
-    """One tile's robust z-scores (blocks, positions) and their weights, 0 where unseen."""
+    """One tile's robust z-scores (blocks, positions) and their weights, 0 where unobserved."""
 
     score: np.ndarray
     weight: np.ndarray
@@ -60,7 +60,7 @@ def gather(tiles: Sequence[ScoredTile], axis: int, cell_m: float) -> Evidence:
     """
     reach = round(tuned(Params).max_shift_m / cell_m)
     scored = [tile.scores[axis] for tile in tiles]
-    placed: list[np.ndarray] = []  # of each tile: its weighted score and its weight, slid
+    placed: list[np.ndarray] = []  # per tile: its weighted score and its weight, after the slide
     slides: list[int] = []
     total = np.zeros((2, *scored[0][0].shape))
     for score, weight in scored:
@@ -70,7 +70,7 @@ def gather(tiles: Sequence[ScoredTile], axis: int, cell_m: float) -> Evidence:
         slides.append(slide)
         placed.append(np.roll(np.stack([score * weight, weight]), slide, axis=2))
         total += placed[-1]
-    for i, (score, weight) in enumerate(scored):  # the first tiles met few others: place all once more
+    for i, (score, weight) in enumerate(scored):  # the first tiles met few others: slide all once more
         total -= placed[i]
         if len(placed) > 1:
             slides[i], weight = _placed_on(score, weight, total, reach)
@@ -84,13 +84,13 @@ def gather(tiles: Sequence[ScoredTile], axis: int, cell_m: float) -> Evidence:
 
 
 def _placed_on(score: np.ndarray, weight: np.ndarray, reference: np.ndarray, reach: int) -> tuple[int, np.ndarray]:
-    """A tile's slide and its weight: next to nothing where its lines agree with no slide."""
+    """Slide and weight of a tile; the weight is reduced to 15 % where its lines agree at no slide."""
     slide, agreement = _best_slide(score, weight, reference[0], reference[1], reach)
     return (0, weight * 0.15) if agreement < 0.25 else (slide, weight)
 
 
 def scored(tile: Tile, cell_m: float, allowed: np.ndarray | None = None) -> ScoredTile:
-    """A tile with its scores, of the cells (rows, columns) that are allowed."""
+    """Tile with its scores, from the allowed cells (rows, columns)."""
     weight = tile.weight if allowed is None else tile.weight * allowed
     lab = cv2.GaussianBlur(tile.lab, (0, 0), 0.8).astype(np.float32)
     weighted = cv2.multiply(lab, cv2.merge([weight] * 3))
@@ -98,7 +98,7 @@ def scored(tile: Tile, cell_m: float, allowed: np.ndarray | None = None) -> Scor
 
 
 def _scores(weighted: np.ndarray, weight: np.ndarray, axis: int, cell_m: float) -> Scores:
-    """Of colours (rows, columns, 3) times their weights (rows, columns)."""
+    """Scores of colours (rows, columns, 3) premultiplied by their weights (rows, columns)."""
     block = _block(cell_m)
     weights = _pooled(weight, block, axis)
     means = _pooled(weighted, block, axis) / np.maximum(weights, 1e-6 / block)[..., None]
@@ -124,7 +124,7 @@ def _pooled(values: np.ndarray, block: int, axis: int) -> np.ndarray:
 
 
 def _row_medians(values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """The median over the known part of each row, (rows, 1); nought where nothing is known."""
+    """Median over the known part of each row, (rows, 1); zero where nothing is known."""
     ordered = np.sort(np.where(known, values, np.inf), axis=1)
     count = known.sum(axis=1, keepdims=True)
     pair = np.take_along_axis(
@@ -134,7 +134,7 @@ def _row_medians(values: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _strength(means: np.ndarray, seen: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """The stronger of a ridge, dark or lit, and a colour step, in grey levels, over two widths."""
+    """Stronger of a ridge (dark or lit) and a colour step, in grey levels, maximum over two widths; and where it is known."""
     params = tuned(Params)
     best = np.full(means.shape[:2], -9.0, np.float32)
     known = seen.copy()
@@ -153,7 +153,7 @@ def _strength(means: np.ndarray, seen: np.ndarray, cell_m: float) -> tuple[np.nd
 
 
 def _best_slide(score: np.ndarray, weight: np.ndarray, total: np.ndarray, weights: np.ndarray, reach: int) -> tuple[int, float]:
-    """The slide in cells that best correlates a tile's profile with the running one, and that correlation."""
+    """Slide in cells that best correlates a tile's profile with the running one, and that correlation."""
     profile = _smooth((score * weight).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-6))
     reference = _smooth(total.sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-6))
     seen, known = weight.sum(axis=0) > 0, weights.sum(axis=0) > 0
@@ -172,13 +172,13 @@ def _best_slide(score: np.ndarray, weight: np.ndarray, total: np.ndarray, weight
 
 
 def _rolled(values: np.ndarray, slides: np.ndarray) -> np.ndarray:
-    """np.roll of a row by each of the slides, (slides, positions); rows of their own when `values` has as many."""
+    """np.roll of a row by each of the slides, (slides, positions), or of one row per slide if `values` is 2-D."""
     at = (np.arange(values.shape[-1]) - slides[:, None]) % values.shape[-1]
     return values[at] if values.ndim == 1 else np.take_along_axis(values, at, axis=1)
 
 
 def frame_slide(tile: ScoredTile, axis: int, cell_m: float, evidence: Evidence) -> float:
-    """The slide in cells that lays one more frame onto finished evidence (0 when nothing decides)."""
+    """Slide in cells that aligns one more frame with finished evidence (0 when undetermined)."""
     score, weight = tile.scores[axis]
     seen = np.where(weight > 0, np.clip(score, 0, 4), 0)
     reference = np.where(evidence.known, np.clip(evidence.score, 0, 4), 0)
@@ -192,8 +192,8 @@ def frame_slide(tile: ScoredTile, axis: int, cell_m: float, evidence: Evidence) 
 
 
 def find_roll(vertical: Evidence, horizontal: Evidence, most_rad: float = np.radians(5.0)) -> float:
-    """The in-plane tilt of the lines: the turn of the axes under which the line profiles have most energy."""
-    best, best_angle = 1.05 * (_sheared_energy(vertical, 0.0) + _sheared_energy(horizontal, 0.0)), 0.0  # a tilt must pay
+    """In-plane roll of the lines: the rotation of the axes that maximises the energy of the line profiles."""
+    best, best_angle = 1.05 * (_sheared_energy(vertical, 0.0) + _sheared_energy(horizontal, 0.0)), 0.0  # a roll must pay
     for angle in np.radians(np.arange(-np.degrees(most_rad), np.degrees(most_rad) + 0.01, 0.25)):
         energy = _sheared_energy(vertical, angle) + _sheared_energy(horizontal, -angle)
         if energy > best * (1 + 1e-9):

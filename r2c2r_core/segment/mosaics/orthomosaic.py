@@ -1,4 +1,4 @@
-"""Orthomosaic of a vertical plane: every frame warped by a homography onto one metric grid, occluders left out."""
+"""Orthomosaic of a vertical plane: every frame warped by a homography onto one metric grid, without occluders."""
 
 from dataclasses import dataclass, field
 
@@ -19,26 +19,33 @@ STEP = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which frames show a plane, and how far it is drawn."""
+    """Tuned parameters of the orthomosaic and of the choice of its frames."""
 
-    pad_m: float = param(0.08, "m", "around the seen part, so that its outer edges lie inside")
+    pad_m: float = param(0.08, "m", "Margin around the observed part, so that its outer edges lie inside")
     border_share: float = param(
-        0.004, "share", "of the width left out at an image's border: a tile is shifted by pixels to meet the others"
+        0.004, "share", "Fraction of the image width left out at the border: tiles are shifted by pixels to align"
     )
     view_in_front_m: float = param(
-        0.08, "m", "nearer by more hides the plane from a view", source="handles (5 cm) and the fused surface's error do not"
+        0.08,
+        "m",
+        "Minimum distance in front of the plane of an occluder that hides a part of it from a view",
+        source="handles (5 cm) and the fused surface's error do not reach it",
     )
-    in_front_m: float = param(0.05, "m", "nearer than the plane by more is an occluder", source="handles are not")
-    odd_lab: float = param(25.0, "grey", "off what most frames show, from where a frame counts little", gt=0)
-    odd_weight: float = param(0.02, "share", "of its weight that such a frame keeps", gt=0)
-    least_cosine: float = param(0.12, "cosine", "of the angle from which a plane is seen")
+    in_front_m: float = param(0.05, "m", "Minimum distance in front of the plane of an occluder", source="handles are not")
+    odd_lab: float = param(
+        25.0, "grey", "Colour difference from the median of all frames at which a frame's weight falls to 1/e", gt=0
+    )
+    odd_weight: float = param(0.02, "share", "Fraction of its weight that a frame of another colour keeps", gt=0)
+    least_cosine: float = param(0.12, "cosine", "Minimum cosine between the viewing direction and the plane's normal")
     past_m: float = param(
-        0.1, "m", "behind the plane, from where a view looks past it: deeper than a panel is sunk, nearer than a unit's rear"
+        0.1,
+        "m",
+        "Minimum distance of depth behind the plane to look past it: deeper than sunk panels, nearer than a unit's rear",
     )
-    hole_m: float = param(0.2, "m", "side of the least square that a front leaves empty when it opens", gt=0)
-    across_m: float = param(0.08, "m", "of a shelf's edge, or of what stands at it, that parts such a hole", gt=0)
-    about_m: float = param(0.04, "m", "of a hole's frame: the edges of a unit's boards, and a depth pixel")
-    coarse_m: float = param(0.02, "m", "cells in which holes are looked for: depth is coarser than colour", gt=0)
+    hole_m: float = param(0.2, "m", "Minimum side of the square hole that an opened front leaves", gt=0)
+    across_m: float = param(0.08, "m", "Maximum width of a shelf's edge, or of objects on it, that splits such a hole", gt=0)
+    about_m: float = param(0.04, "m", "Margin around a hole: the edges of a unit's boards, and a depth pixel")
+    coarse_m: float = param(0.02, "m", "Cell size for the search for holes: depth is coarser than colour", gt=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,12 +97,12 @@ class Cell:
 
     @property
     def width(self) -> float:
-        """In grid cells."""
+        """Width in grid cells."""
         return self.right - self.left
 
     @property
     def height(self) -> float:
-        """In grid cells."""
+        """Height in grid cells."""
         return self.bottom - self.top
 
     def contains(self, column: float, row: float) -> bool:
@@ -105,7 +112,7 @@ class Cell:
 
 @dataclass(slots=True, eq=False)
 class Tile:
-    """One frame on the grid. `shift` is how far (columns, rows) its content must move to meet the other frames."""
+    """One frame on the grid. `shift` (columns, rows) moves its content into alignment with the other frames."""
 
     frame_index: int
     lab: np.ndarray  # (rows, columns, 3) uint8
@@ -114,7 +121,7 @@ class Tile:
 
 
 def make_grid(region: PlaneRegion, cell_m: float, roll_rad: float = 0.0, margin_m: float = 0.0) -> PlaneGrid:
-    """The grid over a region and a margin, its axes turned in the plane by `roll_rad` (positive lifts the right side)."""
+    """Grid over a region and a margin, its axes rotated in the plane by `roll_rad` (positive lifts the right side)."""
     params = tuned(Params)
     c, s = np.cos(roll_rad), np.sin(roll_rad)
     turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
@@ -132,7 +139,7 @@ def make_grid(region: PlaneRegion, cell_m: float, roll_rad: float = 0.0, margin_
 
 
 def support_on(grid: PlaneGrid, region: PlaneRegion, reach_m: float) -> np.ndarray:
-    """Grid cells (rows, columns) within `reach_m` of what the scan saw of the region."""
+    """Mask of the grid cells (rows, columns) within `reach_m` of the observed part of the region."""
     step = 4
     column, row = np.meshgrid(np.arange(0, grid.columns, step) + step / 2, np.arange(0, grid.rows, step) + step / 2)
     points = grid.points_at(np.stack([column.ravel(), row.ravel()], axis=1))
@@ -141,7 +148,7 @@ def support_on(grid: PlaneGrid, region: PlaneRegion, reach_m: float) -> np.ndarr
 
 
 def frame_quality(grid: PlaneGrid, region: PlaneRegion, scene: Scene) -> np.ndarray:
-    """How well each frame sees each coarse part of a region (frames, parts): large, sharp and frontal is best, 0 not at all."""
+    """Quality of each frame's view of each coarse part of a region (frames, parts): large, sharp, frontal is best; 0 unseen."""
     spacing = min(0.1, region.width_m / 2, region.height_m / 2) / grid.cell_m
     column, row = np.meshgrid(np.arange(spacing / 2, grid.columns, spacing), np.arange(spacing / 2, grid.rows, spacing))
     points = grid.points_at(np.stack([column.ravel(), row.ravel()], axis=1))
@@ -152,10 +159,10 @@ def frame_quality(grid: PlaneGrid, region: PlaneRegion, scene: Scene) -> np.ndar
 
 
 def choose_frames(quality: np.ndarray, scene: Scene, count: int) -> list[int]:
-    """The frames that show a region best together by their `frame_quality`, most telling first: any first few show all of it.
+    """Frames that together show a region best by their `frame_quality`, best first, so that any first few show all of it.
 
-    Greedy for a submodular sum (Nemhauser 1978): what a frame adds to a part falls with what the frames before it show of it,
-    and counts against the best view of that part, or its worst seen end would have none; squared, as weights of a blend are.
+    Greedy maximisation of a submodular sum (Nemhauser 1978): a frame's gain on a part falls with what earlier ones show of it,
+    and is relative to the best view of that part (else its worst seen end would get none); squared like the blend's weights.
     """
     seen = quality[:, quality.max(axis=0, initial=0.0) > 0]
     share, shown, chosen = (seen / seen.max(axis=0, initial=0.0)) ** 2, np.zeros(seen.shape[1]), list[int]()
@@ -193,7 +200,7 @@ def _stored_size(scene: Scene, frame: Frame) -> tuple[int, int]:
 
 
 def make_tile(grid: PlaneGrid, scene: Scene, frame_index: int) -> Tile | None:
-    """One frame warped onto the grid; None when it shows too little of it."""
+    """Tile of one frame warped onto the grid; None when it shows too little of it."""
     frame = scene.frame(frame_index)
     if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.05:
         return None
@@ -213,7 +220,7 @@ def make_tile(grid: PlaneGrid, scene: Scene, frame_index: int) -> Tile | None:
 
 
 def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
-    """Cells (rows, columns) inside the image with no occluder in front, and the plane's z-depth there."""
+    """Mask of the cells (rows, columns) in the image without an occluder in front, and the plane's z-depth there."""
     column, row = np.arange(grid.columns) + 0.5, np.arange(grid.rows) + 0.5
     homography = grid.pixel_from_cell(frame, frame.rgb_camera)
     z, u, v = (
@@ -234,9 +241,9 @@ def visible_cells(grid: PlaneGrid, scene: Scene, frame: Frame) -> tuple[np.ndarr
 
 
 def opened_cells(grid: PlaneGrid, scene: Scene, frame: Frame) -> np.ndarray:
-    """Cells (rows, columns) at which a frame looks past a plane that the scan has there: a front of it stands open.
+    """Mask of the cells (rows, columns) at which a frame looks past a plane of the scan: a front stands open there.
 
-    Glass, past which all frames look, is no plane of the scan; nor is a gap, or a reading gone astray, as large as a front.
+    Glass, which all frames look past, is no plane of the scan; gaps and stray readings are smaller than a front.
     """
     params = tuned(Params)
     size = np.ceil(np.array([grid.columns, grid.rows]) * grid.cell_m / params.coarse_m).astype(int)
@@ -267,9 +274,9 @@ def opened_cells(grid: PlaneGrid, scene: Scene, frame: Frame) -> np.ndarray:
 
 
 def blend(tiles: list[Tile]) -> Image:
-    """RGB mosaic of tiles, each moved by its own shift; what few of them show counts little.
+    """RGB mosaic of tiles, each moved by its own shift; colours that few tiles show get little weight.
 
-    A drawer that is open in some frames, or something that passed by, must not leave a shade on the mosaic.
+    A drawer that is open in some frames, or a passing object, must not leave a shade on the mosaic.
     """
     params, usual = tuned(Params), _usual(tiles)
     total = np.zeros((*tiles[0].weight.shape, 3), np.float32)
@@ -289,7 +296,7 @@ def blend(tiles: list[Tile]) -> Image:
 
 
 def _moved(tile: Tile) -> tuple[np.ndarray, np.ndarray]:
-    """A tile's colour and its weight in the mosaic, moved by its shift."""
+    """Colour and mosaic weight of a tile, moved by its shift."""
     if tile.shift == (0.0, 0.0):
         return tile.lab, tile.weight**2
     move = np.array([[1, 0, tile.shift[0]], [0, 1, tile.shift[1]]], np.float32)
@@ -298,11 +305,11 @@ def _moved(tile: Tile) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _usual(tiles: list[Tile]) -> np.ndarray:
-    """The median colour (rows, columns, 3) of the tiles that show a cell, on cells of STEP."""
+    """Median colour (rows, columns, 3) over the tiles that show a cell, at a resolution of STEP cells."""
     thinned = [[array[::STEP, ::STEP].copy() for array in _moved(tile)] for tile in tiles]  # copied: a view keeps all of it
     coarse = np.stack([colour for colour, _ in thinned])
     shown = np.stack([weight for _, weight in thinned]) > 0
-    coarse[~shown] = 255  # sorts behind all that is shown
+    coarse[~shown] = 255  # sorts behind all visible colours
     coarse.sort(axis=0)
     count = shown.sum(axis=0)
     pair = np.stack([np.maximum(count - 1, 0) // 2, np.minimum(count // 2, len(coarse) - 1)])
@@ -313,14 +320,14 @@ def _usual(tiles: list[Tile]) -> np.ndarray:
 
 
 def _for_opencv(pixel_from_cell: Matrix3) -> Matrix3:
-    """OpenCV puts cell and pixel centres at integers; ours lie at i + 0.5."""
+    """Homography for OpenCV, whose cell and pixel centres are at integers; ours are at i + 0.5."""
     shift = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
     back = np.array([[1, 0, -0.5], [0, 1, -0.5], [0, 0, 1]])
     return back @ pixel_from_cell @ shift
 
 
 def joined(cells: list[Cell]) -> Cell:
-    """The smallest rectangle around cells."""
+    """Smallest rectangle around cells."""
     return Cell(
         min(c.left for c in cells), min(c.top for c in cells), max(c.right for c in cells), max(c.bottom for c in cells)
     )

@@ -1,8 +1,8 @@
-"""Log-odds of fronts' edges and handles on an orthomosaic, by small networks trained on elevations drawn at random.
+"""Log-odds of fronts' edges and handles on an orthomosaic, by small networks trained on randomly drawn elevations.
 
-An ensemble of two (`panel_net_*.onnx`, U-Nets of 0.57 million weights, trained by `training/train.py` on unlike images): the
-mean of their probabilities, so that one that sees a faint gap is not outvoted by one that holds it impossible. No kitchen
-generator that the benchmarks use has a part in what they are trained on.
+An ensemble of two (`panel_net_*.onnx`, U-Nets of 0.57 million weights, trained by `training/train.py` on different images):
+the mean of their probabilities, so that one that sees a faint gap is not outvoted by one that rules it out. The training data
+contain no kitchen generator that the benchmarks use.
 """
 
 import threading
@@ -19,7 +19,7 @@ from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
 NETWORKS = tuple(sorted(Path(__file__).parent.glob("panel_net_*.onnx")))
 _LOCAL = threading.local()
 _MULTIPLE = 16
-SUREST = 4.0  # nats: what was drawn says nothing of surer
+SUREST = 4.0  # nats: the drawn training data support no higher confidence
 _LEVEL_M = 0.02
 _AROUND = 61  # cells over which lightness is normalised
 
@@ -34,12 +34,12 @@ class PanelOdds:
     front: np.ndarray  # of being on a front
 
     def near(self, axis: int) -> np.ndarray:
-        """Of an edge here or a cell beside it: lines wander by about that much. Axis 0 is upright."""
+        """Maximum log-odds of an edge here or one cell beside: lines deviate by about that much. Axis 0 is upright."""
         odds, size = (self.upright, (1, 3)) if axis == 0 else (self.level, (3, 1))
         return np.asarray(cv2.dilate(odds, np.ones(size, np.uint8)))
 
     def along(self, axis: int, position: float, low: float, high: float) -> np.ndarray:
-        """Log-odds of an edge along a line at `position`, from `low` to `high`, in grid cells: one a cell of the odds."""
+        """Log-odds of an edge along a line at `position`, from `low` to `high`, in grid cells: one per cell of the odds."""
         odds = self.near(axis) if axis == 0 else self.near(axis).T
         at = min(max(round(position / STEP - 0.5), 0), odds.shape[1] - 1)
         first = min(max(round(low / STEP), 0), len(odds) - 1)
@@ -56,7 +56,7 @@ class PanelOdds:
 
 
 def panel_odds(mosaic: Image, count: np.ndarray, raised: np.ndarray, level_m: np.ndarray) -> PanelOdds:
-    """What the network sees in a mosaic (rows, columns, 3) and the relief of the same plane."""
+    """Network log-odds on a mosaic (rows, columns, 3) and the relief of the same plane."""
     inputs = features(mosaic, count, raised, level_m)
     rows, columns = inputs.shape[1:]
     padded = np.pad(inputs, ((0, 0), (0, -rows % _MULTIPLE), (0, -columns % _MULTIPLE)))
@@ -67,7 +67,7 @@ def panel_odds(mosaic: Image, count: np.ndarray, raised: np.ndarray, level_m: np
 
 
 def features(mosaic: Image, count: np.ndarray, raised: np.ndarray, level_m: np.ndarray) -> np.ndarray:
-    """(19, rows, columns) float32 on cells of STEP grid cells: colours, normalised lightness, depth points, level."""
+    """Network input (19, rows, columns), float32 on cells of STEP grid cells: colours, normalised lightness, depth."""
     rows, columns = mosaic.shape[0] // STEP, mosaic.shape[1] // STEP
     colour = mosaic[: rows * STEP, : columns * STEP].astype(np.float32) / 255
     light = colour.mean(axis=2)
@@ -91,7 +91,7 @@ def _forward(network: cv2.dnn.Net, inputs: np.ndarray) -> np.ndarray:
 
 
 def _networks() -> list[cv2.dnn.Net]:
-    """Some a thread: a network holds the buffers of its last run."""
+    """Networks of this thread: a network holds the buffers of its last run."""
     if not hasattr(_LOCAL, "networks"):
         _LOCAL.networks = [cv2.dnn.readNetFromONNX(str(path)) for path in NETWORKS]
     return cast(list[cv2.dnn.Net], _LOCAL.networks)

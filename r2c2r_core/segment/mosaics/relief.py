@@ -15,32 +15,34 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which depth is a plane's relief."""
+    """Tuned parameters of the relief."""
 
-    deepest_m: float = param(0.04, "m", "behind the plane that is kept")
-    raised_m: float = param(0.012, "m", "before the plane, from where it is a handle: above depth noise")
-    highest_m: float = param(0.10, "m", "before the plane that is kept: below things that stand in front")
-    handle_thick_m: float = param(0.05, "m", "of a handle, whose holes are closed")
-    shadow_m: float = param(0.01, "m", "beside a handle, where it hides the plane")
-    ledge_m: float = param(0.035, "m", "width of what is long and raised and no handle")
-    sunk_m: float = param(0.013, "m", "of the panel in a frame, at most", source="shaker doors 6-10 mm, routed ones to 12")
-    board_m: float = param(0.022, "m", "between two fronts one before the other", source="boards of 16-22 mm, and play between")
-    pane_m: float = param(
-        0.08, "m", "least side of a pane of glass", gt=0, source="panes of doors are 15 cm wide and more, channels 3 cm"
+    deepest_m: float = param(0.04, "m", "Maximum distance behind the plane of points that are kept")
+    raised_m: float = param(0.012, "m", "Minimum height of raised points, such as handles: above depth noise")
+    highest_m: float = param(0.10, "m", "Maximum height of points that are kept: below objects in front of the plane")
+    handle_thick_m: float = param(0.05, "m", "Maximum thickness of a handle, whose holes are closed")
+    shadow_m: float = param(0.01, "m", "Distance beside a handle within which it hides the plane")
+    ledge_m: float = param(0.035, "m", "Minimum width of a long raised part that is no handle")
+    sunk_m: float = param(0.013, "m", "Maximum depth of the panel in a frame", source="shaker doors 6-10 mm, routed ones to 12")
+    board_m: float = param(
+        0.022, "m", "Distance between two fronts, one in front of the other", source="boards of 16-22 mm, and play between"
     )
-    end_window_m: float = param(0.02, "m", "beyond an end of the plane there are no points of it for this far")
+    pane_m: float = param(
+        0.08, "m", "Minimum side of a pane of glass", gt=0, source="panes of doors are 15 cm wide and more, channels 3 cm"
+    )
+    end_window_m: float = param(0.02, "m", "Length beyond an end of the plane without points of it")
 
 
 class Edges(NamedTuple):
-    """Of a plane, as depth shows them: z-scores 0..6, (blocks, positions)."""
+    """Edges of a plane as depth shows them: z-scores 0..6, (blocks, positions)."""
 
     ends: np.ndarray
-    within: np.ndarray  # where it may go on: it steps back, or the panel of a frame is sunk so deep; or glass begins
+    within: np.ndarray  # where the plane may continue: it steps back, or a frame's panel is sunk as deep; or glass begins
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Relief:
-    """Over grid cells of `cell_m`: how many depth points fell there, the share that is raised, and how far on average."""
+    """Depth statistics on grid cells of `cell_m`: number of points, the fraction that is raised, and their mean heights."""
 
     cell_m: float
     count: np.ndarray
@@ -49,7 +51,7 @@ class Relief:
     level_m: np.ndarray  # mean of the points that are not raised: the panel itself
 
     def on_plane(self) -> np.ndarray:
-        """Cells dense with points of the plane, as against cells that rays reach only beside or behind it."""
+        """Mask of the cells dense with points of the plane, unlike cells that rays reach only beside or behind it."""
         flat = _box_mean(self.count * (1 - self.raised), 2)
         around = _box_mean(flat, round(0.10 / self.cell_m))
         filled = ((flat > 0.4 * around) & (flat > 0.3)).astype(np.uint8)
@@ -61,7 +63,7 @@ class Relief:
         return np.asarray(cv2.medianBlur(closed, 5) > 0)
 
     def levels_over(self, cell: Cell) -> np.ndarray:
-        """The count of points of the plane over a rectangle of the grid, and the sum of their levels: (2,)."""
+        """Number of points of the plane over a rectangle of the grid, and the sum of their levels: (2,)."""
         (left, right), (top, bottom) = (
             [max(round(end / STEP), 0) for end in ends] for ends in ((cell.left, cell.right), (cell.top, cell.bottom))
         )
@@ -70,7 +72,7 @@ class Relief:
         return np.array([points.sum(), (points * self.level_m[window]).sum()])
 
     def edge_evidence(self, axis: int, block: int, columns: int, rows: int) -> "Edges":
-        """Where the plane ends or steps back, as z-scores 0..6 on (blocks, positions) of the grid, like colour evidence."""
+        """Ends and steps of the plane, as z-scores 0..6 on (blocks, positions) of the grid, like colour evidence."""
         params = tuned(Params)
         points = self.count * (1 - self.raised)
         framed = np.where(self._glazed(), np.median(points[points > 0]) if points.any() else 0.0, points)
@@ -85,7 +87,7 @@ class Relief:
             _end_scores(*_behind_handles(density, raised, handle, shadow, reach), self.cell_m) for density in (whole, flat)
         )
         flat, _ = _behind_handles(flat, raised, handle, shadow, reach)
-        # It goes on further back than the panel of a frame is mostly sunk: a door that slides before another.
+        # The surface continues farther back than the panel of a frame is mostly sunk: a door that slides behind another.
         seen = [np.maximum(window, 1e-6) for window in _windows(flat, reach)]
         before, after = (window / n for window, n in zip(_windows(flat * level, reach), seen, strict=True))
         back = np.where(np.minimum(*seen) > 0.4 * _usual(flat), np.abs(after - before), 0)
@@ -93,7 +95,7 @@ class Relief:
         return Edges(ends=_widened(ends, reach), within=_widened([*panes, (step, back)], reach))
 
     def _glazed(self) -> np.ndarray:
-        """Cells of holes in the plane that are as large as a pane and that it encloses: glass in a frame, or a niche."""
+        """Mask of the cells of enclosed holes in the plane as large as a pane: glass in a frame, or a niche."""
         params = tuned(Params)
         hole = (~self.on_plane()).astype(np.uint8)
         _, labels, stats, _ = cv2.connectedComponentsWithStats(hole, connectivity=4)
@@ -118,7 +120,7 @@ class Relief:
 
 
 def measure_relief(grid: PlaneGrid, scene: Scene, frame_indices: list[int]) -> Relief:
-    """The relief of a plane on cells of STEP grid cells."""
+    """Relief of a plane on cells of STEP grid cells."""
     params = tuned(Params)
     step = STEP
     shape = (grid.rows // step + 1, grid.columns // step + 1)
@@ -153,7 +155,7 @@ def measure_relief(grid: PlaneGrid, scene: Scene, frame_indices: list[int]) -> R
 
 
 def _window(grid: PlaneGrid, frame: Frame, params: Params) -> tuple[slice, slice]:
-    """The rows and columns of a frame's depth image in which the space about a grid that is kept may be seen."""
+    """Rows and columns of a frame's depth image in which the space kept around a grid may be visible."""
     camera, ends = frame.depth_camera, np.array([(x, y) for x in (0, grid.columns + STEP) for y in (0, grid.rows + STEP)])
     corners = np.concatenate([grid.points_at(ends, depth) for depth in (-params.highest_m, params.deepest_m)])
     local = frame.world_from_camera.inverse.apply(corners)
@@ -176,12 +178,12 @@ def _windows(values: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _end_scores(flat: np.ndarray, raised: np.ndarray, cell_m: float) -> list[tuple[np.ndarray, np.ndarray]]:
-    """How surely (0..6) the plane ends at each position and how sharply, by each of what may show it."""
+    """Scores (0..6) and sharpness of the plane's end at each position, per kind of evidence."""
     params, usual = tuned(Params), _usual(flat)
     reach = max(2, round(params.end_window_m / cell_m) * STEP)
-    # The plane ends, or all that is near it: beside the end of a door whose handle is there, little of the plane is left.
+    # The plane ends, or all surface near it: beside the end of a door with its handle there, little of the plane is left.
     found = [_ends(density, usual, reach) for density in (flat, flat + raised)]
-    # Or something broader than a handle stands out beyond the line: a worktop's edge, a refrigerator.
+    # Or something broader than a handle protrudes beyond the line: a worktop's edge, a refrigerator.
     share = raised / np.maximum(flat + raised, 0.05)
     ledge = _windows(share, round(params.ledge_m / cell_m) * STEP)
     beside = _windows(share, reach)
@@ -190,12 +192,12 @@ def _end_scores(flat: np.ndarray, raised: np.ndarray, cell_m: float) -> list[tup
 
 
 def _usual(flat: np.ndarray) -> float:
-    """The density of points where the plane is."""
+    """Usual density of points on the plane."""
     return float(np.median(flat[flat > 0.2])) if (flat > 0.2).any() else 1.0
 
 
 def _ends(density: np.ndarray, usual: float, reach: int) -> tuple[np.ndarray, np.ndarray]:
-    """How surely (0..6) points end at each position, and how sharply."""
+    """Score (0..6) and sharpness of the end of points at each position."""
     before, after = _windows(density, reach)
     high, low = np.maximum(before, after), np.minimum(before, after)
     step = np.where(high > max(0.4 * usual, 0.4), 1 - low / np.maximum(high, 1e-6), 0)
@@ -203,13 +205,13 @@ def _ends(density: np.ndarray, usual: float, reach: int) -> tuple[np.ndarray, np
 
 
 def _widened(found: list[tuple[np.ndarray, np.ndarray]], reach: int) -> np.ndarray:
-    """The highest of scores where they are sharpest; ends wander by a cell or two from block to block: so that blocks agree."""
+    """Maximum of the scores at their peaks, widened: ends deviate by a cell or two from block to block."""
     peaks = np.max([_at_peaks(score, sharp, reach) for score, sharp in found], axis=0)
     return np.asarray(cv2.dilate(peaks.astype(np.float32), np.ones((1, 5), np.uint8)))
 
 
 def _at_peaks(score: np.ndarray, sharp: np.ndarray, reach: int) -> np.ndarray:
-    """A score where it is sharpest: it is as sure a centimetre beside."""
+    """Non-maximum suppression of a score by sharpness, since the score is as high a centimetre beside."""
     score = score.copy()
     score[:, :reach] = score[:, -reach:] = 0
     sharp = np.where(score > 0, sharp, 0).astype(np.float32)
@@ -217,9 +219,9 @@ def _at_peaks(score: np.ndarray, sharp: np.ndarray, reach: int) -> np.ndarray:
 
 
 def _behind_handles(flat: np.ndarray, raised: np.ndarray, width: int, shadow: int, least: int) -> tuple[np.ndarray, np.ndarray]:
-    """Both without what is raised over less than `width` positions between parts of the plane, and without its shadow.
+    """Both densities without handles (raised over less than `width` positions between parts of the plane) and their shadows.
 
-    The plane goes on behind a handle, for `least` positions or more; it ends at a worktop's edge.
+    The plane continues behind a handle, for `least` positions or more; it ends at a worktop's edge.
     """
     element = np.ones((1, width | 1), np.uint8)
     flat, raised = flat.astype(np.float32), raised.astype(np.float32)

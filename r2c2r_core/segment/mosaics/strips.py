@@ -1,7 +1,7 @@
 """Strips of another material along a panel's upper or lower edge: a worktop's edge, a channel, a plinth.
 
 A front is of one material from end to end, or framed by one on all sides. A strip at its upper or lower edge that differs from
-it, is no shadow, and goes on beside it, runs along the fronts and belongs to none of them.
+it, is no shadow, and continues beside it, runs along the fronts and belongs to none of them.
 """
 
 from dataclasses import dataclass, replace
@@ -18,22 +18,26 @@ _SOURCE = "chosen on a real kitchen, compared on ten drawn ones"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a strip is of another material than the panel that it was cut with."""
+    """Tuned parameters of strips of another material."""
 
-    max_strip_m: float = param(
-        0.08, "m", "height of such a strip, at most", gt=0, source="worktops are 20-40 mm thick, some 60"
-    )
-    min_strip_m: float = param(0.008, "m", "height from which it is more than a blurred gap", gt=0, source=_SOURCE)
+    max_strip_m: float = param(0.08, "m", "Maximum height of a strip", gt=0, source="worktops are 20-40 mm thick, some 60")
+    min_strip_m: float = param(0.008, "m", "Minimum height of a strip: lower ones are blurred gaps", gt=0, source=_SOURCE)
     min_difference: float = param(
-        4.0, "σ", "of the panel's own rows, by which a row of the strip differs from them", gt=0, source=_SOURCE
+        4.0,
+        "σ",
+        "Minimum difference of a strip's rows from the panel's, relative to the scatter of the panel's own rows",
+        gt=0,
+        source=_SOURCE,
     )
-    min_sigma: float = param(4.0, "grey", "CIELAB units that rows of one material differ by, at least", gt=0, source=_SOURCE)
-    beside_m: float = param(0.06, "m", "beyond the panel's sides, within which a strip must go on", gt=0, source=_SOURCE)
-    side_m: float = param(0.03, "m", "inside the panel's sides, whose colour tells a frame", gt=0, source=_SOURCE)
+    min_sigma: float = param(4.0, "grey", "Minimum scatter of the CIELAB colours of rows of one material", gt=0, source=_SOURCE)
+    beside_m: float = param(
+        0.06, "m", "Distance beyond the panel's sides within which a strip must continue", gt=0, source=_SOURCE
+    )
+    side_m: float = param(0.03, "m", "Width inside the panel's sides whose colour identifies a frame", gt=0, source=_SOURCE)
 
 
 def clear_of_strips(panel: Cell, surface: Surface, cell_m: float) -> Cell:
-    """The panel without strips of another material along its upper and lower edge."""
+    """Panel without strips of another material along its upper and lower edge."""
     top = panel.top + _strip(panel, surface, cell_m)
     rows = len(surface.lab)
     turned = Surface(surface.lab[::-1], surface.seen[::-1], surface.height_m[::-1], surface.points[::-1])
@@ -70,7 +74,7 @@ def _strip(panel: Cell, surface: Surface, cell_m: float) -> float:
 
 
 def _rows(surface: Surface, rows: slice, columns: slice) -> np.ndarray:
-    """Median colour of each row (n, 3) over columns; nan where nothing was seen. A handle covers less than half of a row."""
+    """Median colour of each row (n, 3) over columns; NaN where unobserved. A handle covers less than half of a row."""
     lab, seen = surface.lab[rows, columns], surface.seen[rows, columns]
     found = np.full((len(lab), 3), np.nan)
     for row in np.flatnonzero(2 * seen.sum(axis=1) > seen.shape[1]):
@@ -79,7 +83,7 @@ def _rows(surface: Surface, rows: slice, columns: slice) -> np.ndarray:
 
 
 def _shaded(rows: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Which rows may be the panel's own material in a shadow: darker by one factor in red, green and blue."""
+    """Mask of the rows that may be the panel's own material in a shadow: darker by one factor in red, green and blue."""
     params = tuned(EdgeParams)
     shade, unevenness = shading(np.nan_to_num(rows), own)
     even = unevenness < 2 * params.even_shade
@@ -87,7 +91,7 @@ def _shaded(rows: np.ndarray, own: np.ndarray) -> np.ndarray:
 
 
 def _alike(surface: Surface, rows: slice, columns: slice, colour: np.ndarray, near: float) -> bool:
-    """Whether a patch has about that colour; not where nothing was seen of it."""
+    """Whether a patch has nearly a given colour; False where it is unobserved."""
     seen = surface.seen[rows, columns]
     if not seen.any():
         return False
@@ -95,7 +99,7 @@ def _alike(surface: Surface, rows: slice, columns: slice, colour: np.ndarray, ne
 
 
 def _boundary(rows: np.ndarray, colour: np.ndarray, own: np.ndarray, height: int) -> float:
-    """Where colours are half way from the strip's to the panel's, in rows from the upper edge."""
+    """Position half way between the strip's and the panel's colour, in rows from the upper edge."""
     share = (rows - colour) @ (own - colour) / max(float((own - colour) @ (own - colour)), 1e-6)
     start = max(height - 4, 0)
     beyond = np.flatnonzero(share[start : height + 4] > 0.5)
