@@ -1,1 +1,1 @@
-"""The weight-free segmenter: `session` is its public class, `finders` sends clicks to the room that answers them."""
+"""Weight-free segmenter: `session` is its public class, `finders` routes clicks to the package that segments them."""

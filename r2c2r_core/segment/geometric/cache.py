@@ -24,9 +24,9 @@ _STORED = (Cell, Evidence, GridHandle, PlaneGrid, PlaneRegion, Relief, PanelOdds
 
 
 def kept(path: Path, compute: Callable[[], T]) -> T:
-    """What `path` holds, else the computed value, stored there. The folder's name must say what it was computed from.
+    """Cached value at `path`, else the computed one, which is stored there. The folder's name must identify its inputs.
 
-    Who else asks for it meanwhile, in this process or another, waits for it rather than computing it too.
+    Concurrent callers, in this process or another, wait for the first one instead of computing the value too.
     """
     with suppress(*_UNREADABLE):
         return _read(path)
@@ -51,7 +51,7 @@ def _alone_at(path: Path) -> Iterator[None]:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Readers see the whole file or none."""
+    """Write a file atomically: readers see the whole file or none."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     temporary.write_bytes(content)
     temporary.replace(path)

@@ -1,4 +1,4 @@
-"""Clicks to an object: the method the category suggests first (front, appliance, thing), then what the scan suggests."""
+"""Clicks to an object: the method of the category first (front, appliance, free-standing), then the one the scan suggests."""
 
 from dataclasses import dataclass, replace
 
@@ -31,17 +31,17 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which things are small."""
+    """Tuned parameters of the choice of method."""
 
-    small_m: float = param(0.25, "m", "radius below which things are carved by silhouettes")
+    small_m: float = param(0.25, "m", "Radius below which objects are carved by silhouettes")
 
 
 def find_object(
     prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits, others: Points
 ) -> Found:
-    """The object under the clicks; raises ObjectNotSeen when neither a front nor a thing is there.
+    """Object under the clicks; raises ObjectNotSeen when there is neither a front nor a free-standing object.
 
-    `others` (n, 3) are points of other objects that were clicked on.
+    `others` (n, 3) are points clicked on other objects.
     """
     if category.kind == "front":
         closed = [closed_place(prepared, p, c.frame) for p, c in zip(positives.points, positives.clicks, strict=True)]
@@ -70,7 +70,7 @@ def find_object(
 
 
 def _without_depth(scene: Scene, clicks: list[PromptPoint]) -> str:
-    """That a click is where the sensor measured nothing; empty where all have depth."""
+    """Hint that a click lies where the sensor measured nothing; empty where all clicks have depth."""
     for click in clicks:
         if not scene.has_depth(click.frame, click.x, click.y):
             at = f"({click.x:.0f}, {click.y:.0f}) in frame {click.frame}"
@@ -79,7 +79,7 @@ def _without_depth(scene: Scene, clicks: list[PromptPoint]) -> str:
 
 
 def find_drawn(prepared: PreparedCapture, prompt: ObjectPrompt, drawn: DrawnFront, category: Category) -> Found:
-    """The front that a person drew, as it was drawn: nothing is cut. Raises ObjectNotSeen where no frame sees it."""
+    """Front as a person drew it, without cutting. Raises ObjectNotSeen where no frame sees it."""
     scene = prepared.scene
     front = drawn_front(drawn, scene, prepared.config)
     behind = depth_behind(front, scene.capture.room, category)
@@ -92,7 +92,7 @@ def find_drawn(prepared: PreparedCapture, prompt: ObjectPrompt, drawn: DrawnFron
 def glimpse_object(
     prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits
 ) -> Found | None:
-    """A first look at what is slow to find, from depth alone: small things, appliances. None for the rest, found at once."""
+    """Preview, from depth alone, of slow objects: small ones and appliances. None for the rest, which are found at once."""
     if category.kind == "appliance":
         return _appliance(prepared, prompt, category, negatives.points, glimpse=True)
     config = sized_as(category)
@@ -112,9 +112,9 @@ def _front(
     others: Points,
     glass: PromptPoint | None = None,
 ) -> FoundFront | None:
-    """On the nearest plane where it is as large as its category is, else on the nearest: at a corner, two are near.
+    """Front on the nearest plane where its size fits its category, else on the nearest: at a corner, two planes are near.
 
-    `glass` is the first click where it has no depth: it is in nothing that was seen of its plane, then, which may go on there.
+    `glass` is the first click where it has no depth: it then lies outside its plane's observed part, which may extend there.
     """
     best: Front | None = None
     for region in regions_at(prepared.planes, positives[0], beside_m=None if glass is None else category.longest_m):
@@ -136,7 +136,7 @@ def _front(
 
 
 def _fit(front: Front, category: Category) -> float:
-    """0..1: how well a front's size fits its category."""
+    """Fit (0..1) of a front's size to its category."""
     cell_m, cell = front.run.grid.cell_m, front.cell
     return category.width.fit(cell_m * cell.width) * category.height.fit(cell_m * cell.height)
 
@@ -185,7 +185,7 @@ def _thing(
 
 
 def _on_thing(prepared: PreparedCapture, hits: Hits, config: ThingConfig) -> Points:
-    """The clicks' points, those that fell on what is behind the thing drawn forward to it; farther ones are left out."""
+    """Points of the clicks; those that hit the background are moved forward to the object; farther ones are left out."""
     first = hits.points[0]
     points = [first]
     across = 1.2 * config.width_m + 0.02 if config.width_m is not None else 2.2 * config.radius_m
@@ -200,7 +200,7 @@ def _on_thing(prepared: PreparedCapture, hits: Hits, config: ThingConfig) -> Poi
 
 
 def _structure_off(prepared: PreparedCapture, point: Vector3) -> tuple[PlaneRegion, ...]:
-    """Walls and runs that a thing may touch; not the one it is itself."""
+    """Walls and runs that an object may touch, except the plane that it lies on itself."""
     structure = tuple(plane for plane in prepared.planes if plane.area_m2 > 0.4)
     own = region_at(structure, point, 0.02)
     return tuple(plane for plane in structure if plane is not own)

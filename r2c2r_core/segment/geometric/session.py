@@ -1,4 +1,4 @@
-"""The weight-free segmenter: fronts cut on orthomosaics, things cut from the fused surface."""
+"""Weight-free segmenter: fronts cut on orthomosaics, free-standing objects cut from the fused surface."""
 
 import contextlib
 import hashlib
@@ -46,10 +46,10 @@ from r2c2r_core.tuning import in_force
 
 
 class GeometricSegmenter(Segmenter):
-    """Needs no weights and no extra."""
+    """Segmenter that needs no weights and no optional dependencies."""
 
     def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> "GeometricSession":
-        """Prepare a capture: see the surface from every frame, find its vertical planes."""
+        """Prepare a capture: render the surface from every frame, find its vertical planes."""
         folder = cache / f"geometric-{_cache_key(capture, config)}"
         _forget_others(folder)
         _import_heavy()
@@ -73,7 +73,7 @@ class GeometricSession:
     _found: dict[ObjectPrompt, Found] = field(default_factory=dict)
 
     def mask_at(self, prompt: ObjectPrompt, frame_index: int) -> Mask:
-        """The object's mask in one frame; empty when that frame does not show it."""
+        """Mask of the object in one frame; empty when that frame does not show it."""
         known = {frame.index for frame in self.scene.frames}
         if frame_index not in known:
             raise PromptError(
@@ -83,7 +83,7 @@ class GeometricSession:
         return self.find(prompt).see(self.scene.frame(frame_index)).mask
 
     def glimpse(self, prompt: ObjectPrompt) -> Glimpse | None:
-        """A first mask in the frame clicked last: what `stream` brings there; of things and appliances, nearly that."""
+        """Preview mask in the frame clicked last, as in `stream`; approximate for free-standing objects and appliances."""
         if prompt.front is not None:
             return None
         whole = replace(prompt, crop=None)
@@ -94,11 +94,11 @@ class GeometricSession:
         return (frame.index, pack_mask(view.mask), view.trust) if self._shows(view) else None
 
     def prefetch(self) -> Iterator[None]:
-        """Decode images, as many as stay in memory."""
+        """Decode as many images as stay in memory."""
         return self.scene.prefetch()
 
     def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
-        """The object in every frame that sees it; raises ObjectNotSeen when none does."""
+        """Mask track of the object over all frames that see it; raises ObjectNotSeen when none does."""
         progress.at(0.0, f"{prompt.name}: finding it")
         found = self.find(prompt)
         masks: dict[int, PackedMask] = {}
@@ -132,28 +132,28 @@ class GeometricSession:
             yield index, pack_mask(view.mask), view.trust
 
     def elevations(self) -> Iterator[Elevation]:
-        """The planes of the capture as a person draws fronts on them."""
+        """Elevations of the capture's planes, on which a person draws fronts."""
         return elevations(self)
 
     def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
-        """The object's flat front."""
+        """Flat front of the object."""
         return self.find(prompt).panel()
 
     def thing_box(self, prompt: ObjectPrompt) -> ThingBox | None:
-        """The box of its points on its support."""
+        """Box of a free-standing object on its support."""
         found = self.find(prompt)
         return found.box() if found.kind == "thing" else None
 
     def motions(self, prompt: ObjectPrompt) -> tuple[JointMotion, ...]:
-        """How its leaves were filmed to move."""
+        """Joint motions of its leaves in the recording."""
         return self.find(prompt).motions()
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
-        """Proposals so far, surest first, with the share of the work done; the last step has them all."""
+        """Proposals so far, the most confident first, with the fraction of the work done; the last step has them all."""
         return propose_steps(self)
 
     def find(self, prompt: ObjectPrompt) -> Found:
-        """What the clicks mean, computed once a prompt."""
+        """Object under the clicks, computed once per prompt."""
         found = self._found.get(prompt)
         if found is None:
             found = self._found[prompt] = self._find(prompt)
@@ -164,19 +164,19 @@ class GeometricSession:
             check_prompt(self.scene.capture, prompt)
             return find_drawn(self, prompt, prompt.front, category_of(prompt.category))
         hint, positives, negatives = self._clicked(prompt)
-        if prompt.crop is not None:  # moved about, it finds nothing anew
+        if prompt.crop is not None:  # moving the crop box does not change the segmentation
             return self._within(self.find(replace(prompt, crop=None)), prompt)
         others = np.array([point for click in prompt.others if (point := self._hit(click)) is not None]).reshape(-1, 3)
         return find_object(self, prompt, hint, positives, negatives, others)
 
     def _within(self, found: Found, prompt: ObjectPrompt) -> Found:
-        """What of it lies in the prompt's crop box; all of it without one."""
+        """Part of an object in the prompt's crop box; the whole object without one."""
         if prompt.crop is None:
             return found
         return cropped(found, world_crop(prompt.crop, self.scene.capture.world_from_capture), self.scene, prompt.name)
 
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
-        """Clicks on other fronts and machines that fall on the same front or machine, by its name; things lie on fronts."""
+        """Clicks of other fronts and appliances on an object's front, by its name; free-standing objects lie on fronts."""
         beside = [prompt for prompt in prompts if category_of(prompt.category).kind != "thing"]
         clicks = [(prompt, click) for prompt in beside for click in prompt.points if click.label == 1]
         hits = [(prompt, click, point) for prompt, click in clicks if (point := self._hit(click)) is not None]
@@ -190,10 +190,10 @@ class GeometricSession:
         return found
 
     def _front_of(self, prompt: ObjectPrompt) -> tuple[PlaneGrid, Cell] | None:
-        """Where the front of an object lies, if it has one; kept, for whenever other clicks change it is asked again."""
+        """Grid and rectangle of an object's front, if any; cached, since it is requested again when other clicks change."""
 
         def where() -> tuple[PlaneGrid, Cell] | None:
-            with contextlib.suppress(R2C2RError):  # what is not found is told by `track`
+            with contextlib.suppress(R2C2RError):  # `track` reports what is not found
                 found = self.find(prompt)
                 if isinstance(found, FoundFront | FoundAppliance):
                     return found.front.run.grid, found.front.cell
@@ -207,7 +207,7 @@ class GeometricSession:
         return self.scene.pick(click.frame, click.x, click.y) if known else None
 
     def run_of(self, region: PlaneRegion, margin_m: float = 0.0) -> Run | None:
-        """The furniture run on a plane, and this far around it; computed once."""
+        """Furniture run on a plane with a margin; computed once."""
         key = f"run{self.planes.index(region)}-{round(margin_m * 1000)}"
         if key not in self._runs:
             cell_m, frames = self.config.cell_m, self.config.mosaic_frames
@@ -216,14 +216,14 @@ class GeometricSession:
         return self._runs[key]
 
     def prepare(self, *, progress: Progress = SILENT) -> None:
-        """Cut the runs of all planes, and those around planes that may be a part of an appliance."""
+        """Cut the runs of all planes, and those around planes that may be part of an appliance."""
         tasks = [(region, 0.0) for region in self.planes]
         tasks += [(region, margin) for region in self.planes for margin in appliance_margins(region)]
         for done, _ in enumerate(in_threads(lambda task: self.run_of(*task), tasks), 1):
             progress.at(done / len(tasks), f"looking for fronts: {done} of {len(tasks)} furniture runs")
 
     def _views(self, prompt: ObjectPrompt) -> Iterator[tuple[int, View]]:
-        """Frames that show it, the one clicked last first, then outwards both ways."""
+        """Frames that show the object, the one clicked last first, then outwards both ways."""
         found = self.find(prompt)
         first = prompt.points[-1].frame if prompt.points else self.scene.frames[0].index
         for frame in _outwards(self.scene.frames, first):
@@ -235,15 +235,15 @@ class GeometricSession:
         return bool(np.count_nonzero(view.mask) >= self.config.least_area_px)
 
     def _clicked(self, prompt: ObjectPrompt) -> tuple[Category, Hits, Hits]:
-        """Its category, and what was clicked on it and off it."""
+        """Category of the prompt, and the points of its positive and negative clicks."""
         check_prompt(self.scene.capture, prompt)
         category = category_of(prompt.category)
         return category, self._hits(prompt, 1, category), self._hits(prompt, 0, category)
 
     def _hits(self, prompt: ObjectPrompt, label: int, category: Category) -> Hits:
-        """What the clicks of one label hit; raises PromptError where the first on what is no appliance hits nothing.
+        """Points of the clicks of one label; raises PromptError where the first on a non-appliance hits nothing.
 
-        A later one on what has no depth (glass, gloss, a far wall) counts where its ray passes nearest to the first.
+        A later positive click without depth (glass, gloss, a far wall) takes the point of its ray nearest to the first.
         """
         clicks: list[PromptPoint] = []
         points: list[Vector3] = []
@@ -276,14 +276,14 @@ def _outwards(frames: tuple[Frame, ...], start: int) -> list[Frame]:
 
 
 def _forget_others(folder: Path) -> None:
-    """Drop what older code, or another setting, prepared here: it is never read again."""
+    """Delete the caches of older code or other settings, which are never read again."""
     for path in folder.parent.glob("geometric-*"):
         if path != folder:
             shutil.rmtree(path, ignore_errors=True)
 
 
 def _import_heavy() -> None:
-    """What the first click would otherwise wait for."""
+    """Import modules that would otherwise delay the first click."""
     for name in ("scipy.ndimage", "scipy.sparse.csgraph", "skimage.measure", "skimage.segmentation"):
         importlib.import_module(name)
 
