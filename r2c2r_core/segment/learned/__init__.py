@@ -1,1 +1,1 @@
-"""Learned segmenters: `sam_video` draws masks, `voting` and `fuse` bring in depth, `measure` measures, `session` joins."""
+"""Learned segmenters: `sam_video` predicts masks, `voting` and `fuse` add depth, `measure` measures, `session` combines."""

@@ -1,10 +1,10 @@
-"""Learned masks and depth: the paper's intersection with a mask of the depth picture, and our evidence from all frames.
+"""Fusion of learned masks with depth: the paper's intersection with a depth-image mask, and multi-view evidence.
 
-`depth-mask` (paper 4.1): the same clicks are followed a second time through pictures of the depth, and both masks are
-intersected; where less than 40 % of the colour mask is left, the colour mask stays and the frame is counted as apart.
-`evidence` (default): all frames vote on the fused surface; a frame loses the pixels whose depth lies off what was agreed
-(leaks over a depth edge), and gets the agreed surface's outline where the model lost an object that is in plain view.
-The intersection also deletes what a depth picture cannot show, such as handles and flush gaps (method.md row 13).
+`depth-mask` (paper 4.1): the same clicks are tracked a second time through depth images, and both masks are intersected;
+where less than 40 % of the colour mask is left, the colour mask stays and the frame is counted as a disagreement.
+`evidence` (default): all frames vote on the fused surface; a frame loses the pixels whose depth lies off the agreed surface
+(leaks over a depth edge), and gets that surface's outline where the model lost an object in plain view.
+The intersection also deletes what a depth image cannot show, such as handles and flush gaps (method.md row 13).
 """
 
 from collections.abc import Mapping
@@ -26,22 +26,26 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What of a learned mask depth believes."""
+    """Tuned parameters of the fusion."""
 
-    least_overlap: float = param(0.4, "share", "of the colour mask that the paper's intersection must keep")
-    off_body_m: float = param(
-        0.04, "m", "from the agreed surface, beyond which a pixel is not the object", source="handles: 4 cm"
+    least_overlap: float = param(0.4, "share", "Minimum fraction of the colour mask that the paper's intersection must keep")
+    off_body_m: float = param(0.04, "m", "Maximum distance of an object pixel from the agreed surface", source="handles: 4 cm")
+    off_body_share: float = param(0.01, "share", "Additional tolerance per metre of depth")
+    leak_share: float = param(
+        0.01, "share", "Minimum fraction of the mask off the surface for a leak: fewer pixels are depth noise"
     )
-    off_body_share: float = param(0.01, "share", "of the pixels that may be so")
-    leak_share: float = param(0.01, "share", "of the mask: fewer pixels off the body are noise of depth, not a leak")
-    lost_share: float = param(0.25, "share", "of the agreed surface's visible pixels: a smaller mask has lost the object")
-    in_plain_view: float = param(0.5, "share", "of the agreed surface's projection that must be visible to fill it in")
-    filled_confidence: float = param(0.3, "score", "confidence, 0 to 1, of a mask that was filled in")
+    lost_share: float = param(
+        0.25, "share", "Fraction of the agreed surface's visible pixels below which a mask has lost the object"
+    )
+    in_plain_view: float = param(
+        0.5, "share", "Minimum visible fraction of the agreed surface's projection for it to fill in a mask"
+    )
+    filled_confidence: float = param(0.3, "score", "Confidence, 0 to 1, of a filled-in mask")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fused:
-    """Masks and their confidence by frame number, and what a person should know."""
+    """Masks and their confidence by frame number, and warnings to the user."""
 
     masks: Mapping[int, PackedMask]
     confidence: Mapping[int, float]
@@ -50,7 +54,7 @@ class Fused:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthPictures:
-    """Depth as 8-bit pictures, one brightness for one distance in the whole recording (near is bright)."""
+    """Depth as 8-bit images, with one brightness per distance over the whole recording (near is bright)."""
 
     scene: Scene
     near_m: float
@@ -58,21 +62,21 @@ class DepthPictures:
 
     @classmethod
     def over(cls, scene: Scene) -> "DepthPictures":
-        """From the 2nd to the 98th percentile of the recording's depth."""
+        """Range from the 2nd to the 98th percentile of the recording's depth."""
         step = max(1, len(scene.frames) // 16)
         seen = [depth[depth > 0][::7] for frame in scene.frames[::step] if (depth := scene.depth(frame.index)).any()]
         near, far = np.percentile(np.concatenate(seen), [2, 98]) if seen else (0.0, 1.0)
         return cls(scene, float(near), max(float(far), float(near) + 0.1))
 
     def picture(self, position: int) -> Image:
-        """The depth of the frame at a position of the recording; holes take the nearest known pixel."""
+        """Depth image of the frame at a position of the recording; holes take the nearest known pixel."""
         depth = nearest_filled(self.scene.filled_depth(self.scene.frames[position].index))
         share = np.clip((self.far_m - depth) / (self.far_m - self.near_m), 0, 1)
         return np.repeat((share * 255).astype(np.uint8)[..., None], 3, axis=2)
 
 
 def nearest_filled(depth_m: np.ndarray) -> np.ndarray:
-    """The depth with every hole given the value of its nearest known pixel (the paper's fill); zeros when none is known."""
+    """Depth with holes filled by their nearest known pixel (the paper's fill); zeros when none is known."""
     known = depth_m > 0
     if known.all() or not known.any():
         return depth_m
@@ -83,9 +87,9 @@ def nearest_filled(depth_m: np.ndarray) -> np.ndarray:
 
 
 def both_masks(colour: Mask, depth: Mask) -> tuple[Mask, bool]:
-    """The intersection (paper 4.1), or the colour mask and False where the intersection keeps less than 40 % of it.
+    """Intersection (paper 4.1), or the colour mask and False where the intersection keeps less than 40 % of it.
 
-    `depth` may have another resolution: the picture's own.
+    `depth` may have another resolution, that of the depth image.
     """
     if depth.shape != colour.shape:
         size = (colour.shape[1], colour.shape[0])
@@ -96,7 +100,7 @@ def both_masks(colour: Mask, depth: Mask) -> tuple[Mask, bool]:
 
 
 def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int) -> Fused:
-    """The masks without their leaks over depth edges, and with the frames the model lost; unchanged without a surface."""
+    """Masks without leaks over depth edges, and filled in where the model lost the object; unchanged without a surface."""
     params = tuned(Params)
     if not body.exists:
         return found
@@ -124,7 +128,7 @@ def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int) ->
 
 
 def without_leaks(mask: Mask, scene: Scene, frame: Frame, near: object) -> Mask:
-    """The mask without pixels whose measured depth lies off the agreed surface (`near` is its cKDTree)."""
+    """Mask without pixels whose measured depth lies off the agreed surface (`near` is its cKDTree)."""
     params = tuned(Params)
     depth = scene.depth(frame.index)
     small = cv2.resize(mask.astype(np.uint8), (depth.shape[1], depth.shape[0]), interpolation=cv2.INTER_NEAREST) > 0

@@ -1,4 +1,4 @@
-"""Masks to measures: the front's rectangle and handle, an appliance's box, a thing's box, whoever drew the masks."""
+"""Measurements from masks of any segmenter: a front's rectangle and handle, the box of an appliance or other object."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,30 +33,34 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How learned masks become measures."""
+    """Tuned parameters of the measurements from learned masks."""
 
-    grid_step_m: float = param(0.01, "m", "between the votes on a plane", gt=0)
-    covered: float = param(0.6, "share", "of the votes: what some views add at one side stays out")
-    on_plane_m: float = param(0.03, "m", "off a plane, within which a body is on it")
-    least_on_plane: float = param(0.08, "share", "of a body's surface that a clicked plane must hold")
-    mainly_on_plane: float = param(0.25, "share", "of a body's surface that a plane nobody clicked must hold")
+    grid_step_m: float = param(0.01, "m", "Spacing of the votes on a plane", gt=0)
+    covered: float = param(
+        0.6, "share", "Minimum fraction of votes inside the masks: parts that few views add at one side are excluded"
+    )
+    on_plane_m: float = param(0.03, "m", "Maximum distance from a plane of surface that lies on it")
+    least_on_plane: float = param(0.08, "share", "Minimum fraction of the object's surface on a clicked plane")
+    mainly_on_plane: float = param(0.25, "share", "Minimum fraction of the object's surface on a plane that was not clicked")
     least_of_plane: float = param(
-        0.3, "share", "of a plane that must be the body, for a click without depth to mean it: not the wall behind"
+        0.3,
+        "share",
+        "Minimum fraction of a plane that is the object, for a click without depth to select it: not the wall behind",
     )
     same_panel: float = param(
-        0.8, "share", "overlap from which the voted rectangle is the panel the lines cut, whose edges are finer"
+        0.8, "share", "Minimum IoU of the voted rectangle with the panel cut by lines, whose edges are finer, to replace it"
     )
-    point_frames: int = param(20, "count", "that give points", ge=1)
-    widest_frames: int = param(7, "count", "that tell how far a mask reaches", ge=1)
-    grid_pad_m: float = param(0.06, "m", "by which the plane's grid reaches a little further anyway")
-    most_beyond_m: float = param(1.0, "m", "that a front may reach beyond what depth saw of its plane")
-    farthest_m: float = param(10.0, "m", "along a click's ray")
-    glass_m: float = param(1.0, "m", "from where a click's ray meets a plane to what depth saw of it")
+    point_frames: int = param(20, "count", "Maximum number of frames that contribute points", ge=1)
+    widest_frames: int = param(7, "count", "Number of largest masks that determine the extent beyond the plane", ge=1)
+    grid_pad_m: float = param(0.06, "m", "Extent beyond the plane that its grid covers without an extra margin")
+    most_beyond_m: float = param(1.0, "m", "Maximum extent of a front beyond the observed part of its plane")
+    farthest_m: float = param(10.0, "m", "Maximum distance along a click's ray")
+    glass_m: float = param(1.0, "m", "Maximum distance from a ray's intersection with a plane to its observed part")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Measured:
-    """What later stages need beside the masks."""
+    """Measurements that later stages need beside the masks."""
 
     kind: Kind
     front: FrontPanel | None = None
@@ -66,7 +70,7 @@ class Measured:
 
 
 def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body) -> Measured:
-    """The object's front or box: `masks` say which part of the scan it is, `body` is that part of the fused surface."""
+    """Front or box of the object: `masks` show which part of the scan it is, `body` is that part of the fused surface."""
     category = category_of(prompt.category)
     if category.kind == "thing":
         return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category))
@@ -104,7 +108,7 @@ def _front(
 
 
 def _front_plane(prepared: PreparedCapture, prompt: ObjectPrompt, body: Body) -> PlaneRegion | None:
-    """The clicked plane among those the body lies on (where glass returns no depth, its side may be larger), or the largest."""
+    """Clicked plane among those the object lies on (its side may be larger, where glass has no depth), or the largest."""
     params = tuned(Params)
     shares = [(plane, _share_on(plane, body)) for plane in prepared.planes] if body.exists else []
     on_body = tuple(plane for plane, share in shares if share > params.least_on_plane)
@@ -127,13 +131,13 @@ def _front_plane(prepared: PreparedCapture, prompt: ObjectPrompt, body: Body) ->
 
 
 def _share_on(plane: PlaneRegion, body: Body) -> float:
-    """The share of a body's surface that lies on a plane."""
+    """Fraction of an object's surface that lies on a plane."""
     off = np.abs(plane.world_from_plane.inverse.apply(body.vertices)[:, 1])
     return float(((off < tuned(Params).on_plane_m) & plane.supports(body.vertices, 0.02)).mean())
 
 
 def _beyond(region: PlaneRegion, scene: Scene, masks: Mapping[int, PackedMask]) -> float:
-    """How far the masks reach beyond what depth saw of the plane, metres: glass and gloss return nothing."""
+    """Extent of the masks beyond the observed part of the plane, metres: glass and gloss have no depth."""
     params = tuned(Params)
     largest = sorted(masks, key=lambda index: -masks[index].area_px)[: params.widest_frames]
     reaches = []
@@ -145,17 +149,17 @@ def _beyond(region: PlaneRegion, scene: Scene, masks: Mapping[int, PackedMask]) 
         inward = region.world_from_plane.inverse.rotation @ frame.world_from_camera.rotation
         eye = region.world_from_plane.inverse.apply(frame.world_from_camera.translation)
         rays = rays @ inward.T
-        if (rays[:, 1] < 0.15).any():  # seen too flatly to say where a ray meets it
+        if (rays[:, 1] < 0.15).any():  # too flat a view to tell where a ray meets the plane
             continue
         met = eye - rays * (eye[1] / rays[:, 1])[:, None]
         over = np.abs(met[:, [0, 2]]) - [region.width_m / 2, region.height_m / 2]
         reaches.append(float(over.max()))
-    reach = float(np.quantile(reaches, 0.25)) if reaches else 0.0  # seen from the side, the mask holds the side too
+    reach = float(np.quantile(reaches, 0.25)) if reaches else 0.0  # from the side, the mask includes the object's side
     return round(min(reach + 0.05, params.most_beyond_m), 2) if reach > params.grid_pad_m else 0.0
 
 
 def _voted_rectangle(run: Run, scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Cell | None:
-    """The rectangle of a run's plane (grid cells) that most masks cover, where the body is."""
+    """Rectangle of a run's plane (grid cells) that most masks cover, where the object's surface is."""
     params = tuned(Params)
     step = max(1, round(params.grid_step_m / run.grid.cell_m))
     columns, rows = np.arange(step / 2, run.grid.columns, step), np.arange(step / 2, run.grid.rows, step)
@@ -174,7 +178,7 @@ def _voted_rectangle(run: Run, scene: Scene, masks: Mapping[int, PackedMask], bo
 
 
 def _frontal(masks: Mapping[int, PackedMask], region: PlaneRegion, scene: Scene) -> dict[int, PackedMask]:
-    """The half of the masks seen most from the front: seen from the side, a box's mask holds its side too."""
+    """The half of the masks with the most frontal views: from the side, a box's mask includes its side."""
 
     def facing(index: int) -> float:
         towards = scene.frame(index).world_from_camera.translation - region.world_from_plane.translation
@@ -184,7 +188,7 @@ def _frontal(masks: Mapping[int, PackedMask], region: PlaneRegion, scene: Scene)
 
 
 def _part_of(labels: np.ndarray, stats: np.ndarray, body: Body, run: Run, step: int) -> int:
-    """The label that most of the body's surface on the plane falls into, else the largest."""
+    """Label containing most of the object's surface on the plane, else the largest."""
     on_plane = body.vertices[np.abs(run.grid.world_from_plane.inverse.apply(body.vertices)[:, 1]) < tuned(Params).on_plane_m]
     column, row = (run.grid.cells_of(on_plane) / step).astype(int).T
     inside = (column >= 0) & (row >= 0) & (column < labels.shape[1]) & (row < labels.shape[0])
@@ -194,7 +198,7 @@ def _part_of(labels: np.ndarray, stats: np.ndarray, body: Body, run: Run, step: 
 
 
 def _as_cut(run: Run, voted: Cell) -> Cell:
-    """The panel, or the neighbouring panels, that the run's lines cut there; the voted rectangle where none fits."""
+    """Panel, or adjacent panels, cut by the run's lines there; the voted rectangle where none fits."""
     within = [cell for cell in run.cells if _overlap(cell, voted) > 0.6 * cell.width * cell.height]
     if not within:
         return voted
@@ -213,7 +217,7 @@ def _overlap(a: Cell, b: Cell) -> float:
 def _thing_box(
     scene: Scene, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, category: Category
 ) -> ThingBox | None:
-    """The box of its points on its support; None where depth never saw it."""
+    """Box of an object's points on its support; None where depth never observed it."""
     points = _points(scene, masks, body)
     if len(points) < 20:
         return None
@@ -228,7 +232,7 @@ def _thing_box(
 
 
 def _points(scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Points:
-    """World points of depth pixels well inside the masks, near the body where there is one."""
+    """World points of depth pixels well inside the masks, near the object's surface where there is one."""
     params = tuned(Params)
     found = [np.zeros((0, 3))]
     for index in voting_frames(masks, params.point_frames):

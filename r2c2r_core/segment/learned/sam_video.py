@@ -1,8 +1,7 @@
-"""SAM 2, EdgeTAM and SAM 3's tracker by transformers' own classes: clicks in, one object followed both ways through a video.
+"""SAM 2, EdgeTAM and SAM 3's tracker via transformers: one object is tracked in both directions from clicks.
 
-No processor is used: those need torchvision, and a resize and a normalisation are all they do. What the model remembers of
-an object is bounded (its clicked frames and the latest `_REACH` frames of each direction), so memory stays flat however
-long the video is.
+No processor is used: those need torchvision, and only resize and normalise. The model's memory of an object is bounded (its
+clicked frames and the latest `_REACH` frames of each direction), so memory use is constant for any video length.
 """
 
 import importlib
@@ -23,7 +22,7 @@ _STABILITY_LOGIT = 1.0  # SAM's stability score: how much the mask changes when 
 
 
 class Click(NamedTuple):
-    """One click, in continuous pixels of the image as a share of its width and height."""
+    """A click, in image coordinates as a fraction of width and height."""
 
     x: float
     y: float
@@ -31,16 +30,16 @@ class Click(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What the model says of one frame."""
+    """The model's prediction for one frame."""
 
     position: int
     mask: Mask  # at the image's resolution
-    confidence: float  # 0..1: that the object is there, times how stable its outline is
+    confidence: float  # 0..1: probability that the object is present, times the stability of its outline
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """The classes of one kind of model, and how it wants its images (transformers' processors: image_mean, image_std)."""
+    """Classes of one model family, and its image normalisation (transformers' processors: image_mean, image_std)."""
 
     model: str
     session: str
@@ -57,7 +56,7 @@ SAM3 = Family(
 
 @dataclass(slots=True, eq=False)
 class VideoModel:
-    """A model on its device. Objects are followed one by one and never see each other."""
+    """A model on its device. Objects are tracked one by one, independently of each other."""
 
     model: Any
     family: Family
@@ -68,10 +67,10 @@ class VideoModel:
     def follow(
         self, image_at: Callable[[int], Image], count: int, clicks: Mapping[int, list[Click]], *, channel: str = "rgb"
     ) -> Iterator[Seen]:
-        """The object in all of `count` frames: the one clicked last, the other clicked ones, then outwards both ways.
+        """Predictions for all `count` frames: the frame clicked last, the other clicked ones, then outwards both ways.
 
         `clicks` are in the order of their frames' last click, at least one of them on the object. The frame of the first
-        such click is read alone; the others with the memory of those before, so that a lone click off the object makes sense.
+        such click is read alone; the others with the memory of those before, so that a lone negative click makes sense.
         """
         follower = _Follower(self, image_at, channel)
         clicked = {position: follower.look(position, clicks[position]) for position in _read_order(clicks)}
@@ -83,12 +82,12 @@ class VideoModel:
                 yield follower.look(position)
 
     def session(self) -> Any:
-        """A fresh memory for one object."""
+        """Empty memory for one object."""
         module = importlib.import_module(type(self.model).__module__)
         return getattr(module, self.family.session)(inference_device=self.device, dtype=self.dtype)
 
     def pixels(self, image: Image) -> Any:
-        """The image as the model wants it: square, normalised, (3, size, size)."""
+        """Model input of an image: square, normalised, (3, size, size)."""
         import torch
 
         size = self.size
@@ -100,12 +99,12 @@ class VideoModel:
 
     @property
     def size(self) -> int:
-        """Side of the square image it sees, pixels."""
+        """Side of the square input image, pixels."""
         return int(self.model.config.image_size)
 
 
 def load_model(weights: Path, family: Family) -> VideoModel:
-    """The model in a folder, on the GPU when there is one (in half precision); never downloads."""
+    """Model from a folder, on the GPU when there is one (in half precision); never downloads."""
     import torch
     import transformers
 
@@ -125,12 +124,12 @@ def load_model(weights: Path, family: Family) -> VideoModel:
 
 
 def on_device(model: Any, family: Family, device: Any, dtype: Any) -> VideoModel:
-    """A loaded model made ready."""
+    """Loaded model moved to a device, in evaluation mode."""
     return VideoModel(model.to(device, dtype).eval(), family, device, dtype)
 
 
 def best_device() -> tuple[str, Any]:
-    """The fastest device here and the precision it is fastest in: CUDA, Apple's GPU, else the CPU."""
+    """Fastest device available and the precision it is fastest in: CUDA, Apple's GPU, else the CPU."""
     import torch
 
     if torch.cuda.is_available():
@@ -144,7 +143,7 @@ def best_device() -> tuple[str, Any]:
 
 
 class _Follower:
-    """One object's memory, moved from frame to frame."""
+    """Memory of one object, moved from frame to frame."""
 
     def __init__(self, owner: VideoModel, image_at: Callable[[int], Image], channel: str) -> None:
         self.owner, self.image_at, self.channel = owner, image_at, channel
@@ -156,11 +155,11 @@ class _Follower:
         self.reach = max(int(config.num_maskmem), int(config.max_object_pointers_in_encoder))
 
     def start_from(self, position: int) -> None:
-        """Where the two directions part."""
+        """Set the position from which the two directions diverge."""
         self.start = self.ahead = self.behind = position
 
     def look(self, position: int, clicks: list[Click] | None = None) -> Seen:
-        """The object in one frame, by its clicks there or by what is remembered of it."""
+        """Prediction in one frame, from its clicks or from memory."""
         first = self.start is None
         if self.start is None:
             self.start = position
@@ -197,13 +196,13 @@ class _Follower:
             self.session.frames_tracked_per_obj[self.index][position] = {"reverse": False}
 
     def _recall(self, position: int) -> None:
-        """Give the session the clicked frame's encoding when it was made for an earlier click."""
+        """Restore a clicked frame's encoding from an earlier click to the session."""
         known = self.owner._encodings.get((self.channel, position))
         if known is not None:
             self.session.cache.cache_vision_features(position, known)
 
     def _keep(self, position: int) -> None:
-        """Hold on to a clicked frame: its encoding for the next click, its outcome for the whole video."""
+        """Keep a clicked frame: its encoding for the next click, its output for the whole video."""
         encodings = self.owner._encodings
         encodings[(self.channel, position)] = self.session.cache.get_vision_features(position)
         while len(encodings) > _KEPT_ENCODINGS:
@@ -214,7 +213,7 @@ class _Follower:
             outputs["cond_frame_outputs"][position] = tracked
 
     def _forget(self, position: int) -> None:
-        """Drop what no later frame will ask for: images, full-size masks, frames out of reach of both fronts."""
+        """Drop data that no later frame needs: images, full-size masks, frames out of reach of both directions."""
         session = self.session
         session.processed_frames.clear()
         outputs = session.output_dict_per_obj[self.index]
@@ -238,7 +237,7 @@ class _Follower:
 
 
 def _read_order(clicks: Mapping[int, list[Click]]) -> list[int]:
-    """The first frame with a click on the object, then the others by their distance from it."""
+    """First frame with a positive click, then the others by their distance from it."""
     start = next(position for position, here in clicks.items() if any(click.label for click in here))
     return sorted(clicks, key=lambda position: (abs(position - start), position))
 

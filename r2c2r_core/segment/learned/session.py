@@ -1,4 +1,4 @@
-"""Learned segmenters: a video model draws masks, depth prunes them, furniture is measured as without weights."""
+"""Learned segmenters: a video model predicts masks, depth prunes them, furniture is measured as without weights."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,13 +25,13 @@ from r2c2r_core.segment.learned.voting import agreed_body
 from r2c2r_core.segment.prompts import check_prompt
 from r2c2r_core.segment.protocol import SegmentConfig, Segmenter
 
-_KEPT_OBJECTS = 8  # followed so far and no further: a later click goes on where it stopped
+_KEPT_OBJECTS = 8  # tracked so far: a later click resumes where it stopped
 
 Found = tuple[int, PackedMask, float]  # frame, mask, confidence
 
 
 class LearnedSegmenter(Segmenter):
-    """A backend whose masks come from a video model in the folder `weights`."""
+    """Backend with masks from a video model in the folder `weights`."""
 
     name: str
     family: Family
@@ -40,7 +40,7 @@ class LearnedSegmenter(Segmenter):
         self.weights = weights
 
     def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> "LearnedSession":
-        """Load the model, and prepare the capture as the weight-free segmenter does: measuring needs its surface and planes."""
+        """Load the model, and prepare the capture as the weight-free segmenter does, for its surface and planes."""
         progress.at(0.0, f"loading {self.name}")
         model = load_model(self.weights, self.family)
         prepared = GeometricSegmenter().open(capture, cache, config, progress=progress.part(0.2, 1.0))
@@ -78,11 +78,11 @@ class LearnedSession:
 
     @property
     def capture(self) -> Capture:
-        """The capture that was opened."""
+        """The opened capture."""
         return self.prepared.scene.capture
 
     def mask_at(self, prompt: ObjectPrompt, frame_index: int) -> Mask:
-        """The model's mask in one frame; follows the object up to there when that was not done yet."""
+        """Mask of the model in one frame; tracks the object up to there if needed."""
         if prompt.front is not None:
             return self.prepared.mask_at(prompt, frame_index)
         known = {frame.index for frame in self.capture.frames}
@@ -96,11 +96,11 @@ class LearnedSession:
         return unpack_mask(found)
 
     def glimpse(self, prompt: ObjectPrompt) -> Found | None:
-        """None: the model's own first mask comes first in `stream`, and the model is not for two threads."""
+        """None: `stream` yields the model's own first mask first, and the model is not thread-safe."""
         return None
 
     def prepare(self, *, progress: Progress = SILENT) -> None:
-        """What measuring and proposals need."""
+        """Prepare runs for measurements and proposals."""
         self.prepared.prepare(progress=progress)
 
     def prefetch(self) -> Iterator[None]:
@@ -108,14 +108,14 @@ class LearnedSession:
         return self.prepared.prefetch()
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[Found]:
-        """As the model gives them: the frame clicked last, the other clicked ones, then outwards both ways."""
+        """Masks in the model's order: the frame clicked last, the other clicked ones, then outwards both ways."""
         if prompt.front is not None:
             return self.prepared.stream(prompt)
         return (found for found in self._seen(prompt) if found[1].area_px >= self.config.least_area_px)
 
     def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
-        """The object in every frame that sees it, after all frames had their say; raises ObjectNotSeen."""
-        if prompt.front is not None:  # as it was drawn: there is nothing to find
+        """Mask track of the object over all frames that see it, after fusion of all frames; raises ObjectNotSeen."""
+        if prompt.front is not None:  # a drawn front needs no search
             return self.prepared.track(prompt, progress=progress)
         total = len(self.capture.frames)
         masks: dict[int, PackedMask] = {}
@@ -138,27 +138,27 @@ class LearnedSession:
         return self._track(prompt, fused, measure(self.prepared, prompt, fused.masks, body))
 
     def elevations(self) -> Iterator[Elevation]:
-        """Those of the weight-free segmenter."""
+        """Elevations of the weight-free segmenter."""
         return self.prepared.elevations()
 
     def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
-        """What was drawn; what is found is measured when all frames had their say."""
+        """Front panel if it was drawn; else None, since it is measured after all frames."""
         return self.prepared.panel(prompt) if prompt.front is not None else None
 
     def thing_box(self, prompt: ObjectPrompt) -> ThingBox | None:
-        """None: it is measured when all frames had their say."""
+        """None: the box is measured after all frames."""
         return None
 
     def motions(self, prompt: ObjectPrompt) -> tuple[JointMotion, ...]:
-        """What was drawn; what is found is measured when all frames had their say."""
+        """Motions of a drawn front; else none, since they are measured after all frames."""
         return self.prepared.motions(prompt) if prompt.front is not None else ()
 
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
-        """None: the model follows each object's own clicks."""
+        """No disputes: the model tracks each object's own clicks."""
         return {}
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
-        """What the weight-free segmenter sees; the model follows what is confirmed."""
+        """Proposals of the weight-free segmenter; the model tracks confirmed ones."""
         return self.prepared.propose()
 
     def _track(self, prompt: ObjectPrompt, fused: Fused, measured: Measured) -> MaskTrack:
@@ -177,7 +177,7 @@ class LearnedSession:
         )
 
     def _seen(self, prompt: ObjectPrompt) -> Iterator[Found]:
-        """The model's masks, and of a thing in a crop box what lies in it."""
+        """Masks of the model, restricted to the prompt's crop box where there is one."""
         if prompt.crop is None:
             yield from self._of(prompt).all()
             return
@@ -188,8 +188,8 @@ class LearnedSession:
             yield index, pack_mask(mask), trust
 
     def _of(self, prompt: ObjectPrompt) -> "_Followed":
-        """The object as far as it was followed: what was computed before is not computed again."""
-        prompt = replace(prompt, crop=None)  # the model is not asked anew for a box that is moved
+        """Tracking state of the object, reused from earlier requests."""
+        prompt = replace(prompt, crop=None)  # moving the crop box does not rerun the model
         if prompt not in self._followed:
             check_prompt(self.capture, prompt)
             while len(self._followed) >= _KEPT_OBJECTS:
@@ -198,7 +198,7 @@ class LearnedSession:
         return self._followed[prompt]
 
     def _follow(self, prompt: ObjectPrompt) -> Iterator[tuple[int, Seen, bool]]:
-        """Frame number, what was seen there, and whether the depth mask (where there is one) agreed."""
+        """Frame number, prediction there, and whether the depth mask (where there is one) agreed."""
         frames = self.capture.frames
         position_of = {frame.index: position for position, frame in enumerate(frames)}
         clicks: dict[int, list[Click]] = {}
@@ -224,22 +224,22 @@ class LearnedSession:
 
 
 class _Followed:
-    """One object as far as it was followed; goes on when more is asked for."""
+    """One object as far as it was tracked; tracking resumes on demand."""
 
     def __init__(self, rest: Iterator[tuple[int, Seen, bool]]) -> None:
         self._rest = rest
         self._found: list[Found] = []
-        self._apart = 0  # frames whose depth mask was too different to count
+        self._apart = 0  # frames whose depth mask differed too much to count
 
     def all(self) -> Iterator[Found]:
-        """What was found, and then what is found next."""
+        """Results so far, then further ones as they are tracked."""
         position = 0
         while position < len(self._found) or self._advance():
             yield self._found[position]
             position += 1
 
     def warnings(self) -> tuple[str, ...]:
-        """What a person should know about it."""
+        """Warnings to the user about the object's masks."""
         if not self._apart:
             return ()
         return (f"colour and depth masks disagreed in {self._apart} of {len(self._found)} frames: colour was taken there",)

@@ -15,41 +15,45 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How masks vote for the surface."""
+    """Tuned parameters of the vote."""
 
-    frames: int = param(48, "count", "that vote", source="more change nothing and cost 30 ms each", ge=1)
-    least_votes: int = param(2, "count", "of a vertex")
-    near_m: float = param(0.03, "m", "behind what a frame measured: a point is hidden there")
+    frames: int = param(
+        48, "count", "Maximum number of frames that vote", source="more change nothing and cost 30 ms each", ge=1
+    )
+    least_votes: int = param(2, "count", "Minimum number of votes on a vertex")
+    near_m: float = param(0.03, "m", "Minimum distance of a point behind the measured depth for it to be hidden")
     behind_m: float = param(
         0.06,
         "m",
-        "before what a frame measured: it was seen through",
-        source="as much as a handle and an error of pose together",
+        "Minimum distance of a point in front of the measured depth for it to be seen through",
+        source="a handle and a pose error together",
     )
-    small_part: float = param(0.1, "ratio", "to the largest: parts an occluder cuts off stay, crumbs go")
+    small_part: float = param(
+        0.1, "ratio", "Minimum area of a part relative to the largest: parts that an occluder separates stay, fragments go"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """The part of the fused surface that is the object, in the world; empty where the scan has no surface for it."""
+    """Part of the fused surface that is the object, in the world; empty where the scan has no surface for it."""
 
     vertices: Points
     faces: Faces
 
     @property
     def exists(self) -> bool:
-        """Whether there is enough of it to say anything."""
+        """Whether there is enough surface to be evidence."""
         return len(self.faces) >= 8
 
     @property
     def area_m2(self) -> float:
-        """Of its surface."""
+        """Area of the surface."""
         corners = self.vertices[self.faces]
         return float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2)
 
 
 def agreed_body(scene: Scene, masks: Mapping[int, PackedMask]) -> Body:
-    """The faces that more than half of the frames that see them put inside the mask, without crumbs."""
+    """Faces that more than half of the frames observing them put inside the mask, without small fragments."""
     surface = scene.capture.surface
     inside, seen = vote(scene, masks, surface.vertices_world)
     kept = (seen >= min(tuned(Params).least_votes, len(masks))) & (inside > 0.5 * seen)
@@ -60,9 +64,9 @@ def agreed_body(scene: Scene, masks: Mapping[int, PackedMask]) -> Body:
 
 
 def vote(scene: Scene, masks: Mapping[int, PackedMask], points_world: Points) -> tuple[np.ndarray, np.ndarray]:
-    """For each point, in how many of the voting frames the mask covers it, and in how many it is in view.
+    """Number of voting frames per point whose mask covers it, and number in which it is in view.
 
-    A point the sensor sees through is in the air, whatever is masked behind it: the side of a box beside its front.
+    A point that the sensor sees through is empty space, even where the mask covers it, as at the side of a box's front.
     """
     params = tuned(Params)
     inside, seen = np.zeros(len(points_world), np.int32), np.zeros(len(points_world), np.int32)
@@ -76,13 +80,13 @@ def vote(scene: Scene, masks: Mapping[int, PackedMask], points_world: Points) ->
 
 
 def voting_frames(masks: Mapping[int, PackedMask], most: int) -> list[int]:
-    """Up to `most` frames, spread over those with a mask."""
+    """Up to `most` frames, evenly spread over those with a mask."""
     known = sorted(masks)
     return [known[round(k)] for k in np.linspace(0, len(known) - 1, min(most, len(known)))]
 
 
 def in_view(scene: Scene, frame: Frame, points_world: Points) -> tuple[np.ndarray, Mask, Mask]:
-    """Pixels (n, 2) of world points in a colour image, which have nothing in front, and which the sensor sees through."""
+    """Pixels (n, 2) of world points in a colour image, mask of the unoccluded ones, and mask of those seen through."""
     params = tuned(Params)
     local = frame.world_from_camera.inverse.apply(points_world)
     depth = local[:, 2]
@@ -92,7 +96,7 @@ def in_view(scene: Scene, frame: Frame, points_world: Points) -> tuple[np.ndarra
     scale = np.array([measured.shape[1] / frame.rgb_camera.width, measured.shape[0] / frame.rgb_camera.height])
     known, within = sample_nearest(measured, uv * scale)
     hidden = scene.noise.occluded(known, depth, params.near_m)
-    sensed, _ = sample_nearest(scene.depth(frame.index), uv * scale)  # only the sensor: holes in glass show what is behind
+    sensed, _ = sample_nearest(scene.depth(frame.index), uv * scale)  # sensor depth only: holes in glass show the background
     through = scene.noise.seen_through(sensed, depth, params.behind_m)
     return uv, ahead & within & ~hidden, through
 
