@@ -1,1 +1,1 @@
-"""Proposals: panels that pass as fronts and free-standing clusters, each named and with the click that confirms it."""
+"""Proposals: panels that pass as fronts, and free-standing clusters, each with a category and the click that confirms it."""

@@ -19,13 +19,13 @@ _SPREAD = (0.5, 0.35, 0.65, 0.2, 0.8)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where a proposal is clicked."""
+    """Tuned parameters of the click selection."""
 
-    views: int = param(5, "count", "frames looked at for the one that shows an object best", ge=1)
+    views: int = param(5, "count", "Maximum number of frames compared for the best view of an object", ge=1)
 
 
 def best_views(scene: Scene, corners: Points, outward: Vector3) -> list[Frame]:
-    """The frames that should show a rectangle largest, whole and sharp, best first."""
+    """Frames expected to show a rectangle large, whole and sharp, best first."""
     params = tuned(Params)
     rated = []
     centre = corners.mean(axis=0)
@@ -50,7 +50,7 @@ def best_views(scene: Scene, corners: Points, outward: Vector3) -> list[Frame]:
 
 
 def panel_clicks(scene: Scene, panel: Panel, frame: Frame, mask: Mask) -> Iterator[PromptPoint]:
-    """Clicks in a frame that hit the panel's plane where nothing hides it, its handle avoided, from the middle outwards."""
+    """Clicks in a frame on unoccluded parts of the panel's plane, off its handle, from the centre outwards."""
     cell, handle, grid = panel.front.cell, panel.front.handle, panel.run.grid
     steps = sorted(((u, v) for u in _SPREAD for v in _SPREAD), key=lambda at: abs(at[0] - 0.5) + abs(at[1] - 0.5))
     slide = np.array(panel.run.slide_of(frame.index, scene))
@@ -64,7 +64,7 @@ def panel_clicks(scene: Scene, panel: Panel, frame: Frame, mask: Mask) -> Iterat
 
 
 def click_on(scene: Scene, point: Vector3, outward: Vector3) -> PromptPoint | None:
-    """A click on a point of a plane, in the frame that shows its surroundings best."""
+    """Click on a point of a plane, in the frame that shows its surroundings best."""
     up = np.array([0.0, 0.0, 1.0])
     right = np.cross(outward, up)
     corners = point + 0.1 * np.array([right + up, up - right, -right - up, right - up])
@@ -73,7 +73,7 @@ def click_on(scene: Scene, point: Vector3, outward: Vector3) -> PromptPoint | No
 
 
 def clump_clicks(scene: Scene, clump: Clump) -> Iterator[PromptPoint]:
-    """Clicks on a clump's seen surface in the three frames that show most of it."""
+    """Clicks on a cluster's observed surface in the three frames that show most of it."""
     rated = []
     for frame in scene.frames:
         local = frame.world_from_camera.inverse.apply(clump.points)
@@ -94,7 +94,7 @@ def clump_clicks(scene: Scene, clump: Clump) -> Iterator[PromptPoint]:
 
 
 def _click_in(scene: Scene, point: Vector3, frame: Frame) -> PromptPoint | None:
-    """The pixel of a world point, when the frame sees it there."""
+    """Pixel of a world point, when the frame observes it there."""
     local = frame.world_from_camera.inverse.apply(point[None])
     camera = frame.rgb_camera
     if local[0, 2] < 0.1:

@@ -1,4 +1,4 @@
-"""Free-standing clusters of the fused surface: what stands on a level support and belongs to no vertical plane."""
+"""Free-standing clusters of the fused surface, which stand on a level support and belong to no vertical plane."""
 
 from dataclasses import dataclass
 
@@ -13,32 +13,40 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What stands free."""
+    """Tuned parameters of free-standing clusters."""
 
-    voxel_m: float = param(0.02, "m", "side of the voxels that connect a thing", gt=0)
-    map_m: float = param(0.04, "m", "side of the cells of the map of level surfaces", gt=0)
-    level_cos: float = param(0.85, "cosine", "with up, of a level surface")
-    least_level_m2: float = param(0.05, "m²", "of a support", source="glossy worktops lose most of their depth")
-    beside_m: float = param(0.20, "m", "to where its support was seen: a thing hides the rest")
-    clearance_m: float = param(0.012, "m", "above its support, from where surface is a thing's")
-    stands_m: float = param(0.06, "m", "above its support, within which the seen part of a thing starts")
-    off_plane_m: float = param(0.03, "m", "from an upright plane, beyond which surface is free of it")
-    structure_m2: float = param(0.12, "m²", "of an upright plane: smaller ones may be the face of a box")
-    beside_plane_m: float = param(0.04, "m", "from the seen part of an upright plane, within which surface is its")
-    bin_m: float = param(0.01, "m", "of heights that are counted together", gt=0)
-    level_m: float = param(0.02, "m", "off a level surface's height, within which surface is its")
-    reach_m: float = param(1.3, "m", "above its support, up to which a thing is looked for")
-    apart_m: float = param(0.05, "m", "between the middles of two things")
-    shown: float = param(0.5, "ratio", "of seen surface to half a thing's box, from where it is as sure as it gets")
-    sure_height_m: float = param(0.08, "m", "of a thing, from where it is as sure as it gets")
-    surest: float = param(0.9, "score", "of a thing that is")
-    on_floor_m: float = param(0.15, "m", "up to which a support is the floor")
-    floor_most_m: tuple[float, float] = param(
-        (1.2, 1.3), "m", "across, and high, of a thing on the floor: larger ones are built in"
+    voxel_m: float = param(0.02, "m", "Side of the voxels that connect a cluster", gt=0)
+    map_m: float = param(0.04, "m", "Cell size of the map of level surfaces", gt=0)
+    level_cos: float = param(0.85, "cosine", "Minimum cosine between a normal and up for a level surface")
+    least_level_m2: float = param(0.05, "m²", "Minimum area of a support", source="glossy worktops lose most of their depth")
+    beside_m: float = param(
+        0.20, "m", "Maximum distance of an object from the observed part of its support: the object hides the rest"
     )
-    table_most_m: tuple[float, float] = param((0.6, 0.6), "m", "across, and high, of a thing on a worktop, likewise")
-    least_m: tuple[float, float] = param((0.15, 0.04), "m", "height of a thing on the floor, and elsewhere: less is noise")
-    least_across_m: float = param(0.04, "m", "across a thing")
+    clearance_m: float = param(0.012, "m", "Minimum height above the support for surface to belong to an object")
+    stands_m: float = param(0.06, "m", "Maximum height above its support of the lowest observed part of an object")
+    off_plane_m: float = param(0.03, "m", "Maximum distance from a vertical plane of surface that belongs to it")
+    structure_m2: float = param(0.12, "m²", "Minimum area of a vertical plane: smaller ones may be the face of a box")
+    beside_plane_m: float = param(
+        0.04, "m", "Maximum distance in the plane from a vertical plane's observed part of surface that belongs to it"
+    )
+    bin_m: float = param(0.01, "m", "Bin size of the height histogram", gt=0)
+    level_m: float = param(0.02, "m", "Maximum height difference of surface from the level surface that it belongs to")
+    reach_m: float = param(1.3, "m", "Maximum height above its support at which an object is searched")
+    apart_m: float = param(0.05, "m", "Minimum distance between the centres of two objects")
+    shown: float = param(0.5, "ratio", "Observed surface relative to half an object's box at which the confidence saturates")
+    sure_height_m: float = param(0.08, "m", "Height of an object at which the confidence saturates")
+    surest: float = param(0.9, "score", "Maximum confidence of an object")
+    on_floor_m: float = param(0.15, "m", "Height below which a support is the floor")
+    floor_most_m: tuple[float, float] = param(
+        (1.2, 1.3), "m", "Maximum width and height of an object on the floor: larger ones are built in"
+    )
+    table_most_m: tuple[float, float] = param(
+        (0.6, 0.6), "m", "Maximum width and height of an object on a worktop: larger ones are built in"
+    )
+    least_m: tuple[float, float] = param(
+        (0.15, 0.04), "m", "Minimum height of an object on the floor, and elsewhere: less is noise"
+    )
+    least_across_m: float = param(0.04, "m", "Minimum width of an object")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,12 +55,12 @@ class Clump:
 
     points: Points
     extent_m: np.ndarray  # along the room's axes and up
-    base_m: float  # world height of what it stands on
+    base_m: float  # world height of its support
     confidence: float
 
 
 def find_clumps(capture: Capture, planes: tuple[PlaneRegion, ...]) -> list[Clump]:
-    """Things on level surfaces, surest first."""
+    """Clusters on level surfaces, the most confident first."""
     params = tuned(Params)
     surface = capture.surface
     corners = surface.vertices_world[surface.faces]
@@ -83,7 +91,7 @@ def find_clumps(capture: Capture, planes: tuple[PlaneRegion, ...]) -> list[Clump
 
 
 def _levels(points: Points, areas: np.ndarray, up: np.ndarray) -> list[tuple[float, np.ndarray, np.ndarray]]:
-    """Level surfaces as (height, map of where they are, map origin); overlapping heights are one."""
+    """Level surfaces as (height, map of their extent, map origin); overlapping heights are merged."""
     params = tuned(Params)
     level = up > params.level_cos
     if not level.any():
@@ -133,7 +141,7 @@ def _standing_on(
         extent[2] = top[2] - height
         if bottom[2] > height + params.stands_m or not _thing_sized(extent, height):
             continue
-        # Half of a thing is seen at best: its surface compared with half that of its box.
+        # At best half of an object is observed: its surface is compared with half that of its box.
         shown = float(area[member].sum() / max(extent[0] * extent[1] / 2 + extent[2] * (extent[0] + extent[1]), 1e-4))
         tall = np.clip(extent[2] / params.sure_height_m, 0.3, 1)
         confidence = float(np.clip(shown / params.shown, 0.1, 1) * tall * params.surest)
@@ -142,7 +150,7 @@ def _standing_on(
 
 
 def _thing_sized(extent: np.ndarray, height: float) -> bool:
-    """Larger than a lump of noise, smaller than furniture that is built in."""
+    """Whether a size is larger than noise and smaller than built-in furniture."""
     params = tuned(Params)
     on_floor, across = height < params.on_floor_m, float(extent[:2].max())
     most_across, most_high = params.floor_most_m if on_floor else params.table_most_m

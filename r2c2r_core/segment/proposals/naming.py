@@ -1,4 +1,4 @@
-"""Category suggestion from size, place, handle and glass: the likeliest of the category table; a person may change it."""
+"""Category suggestion from size, place, handle and glass: the most probable of the table; a person may change it."""
 
 from dataclasses import dataclass
 
@@ -13,47 +13,47 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How much a front's look says of what it is."""
+    """Tuned parameters (likelihoods) of a front's appearance."""
 
-    long: float = param(1.8, "ratio", "of the sides of a bar handle")
+    long: float = param(1.8, "ratio", "Minimum aspect ratio of a bar handle")
     as_usual: float = param(
         0.85,
         "share",
-        "of bars that lie as on most fronts of their kind",
+        "Fraction of bars oriented as on most fronts of their category",
         source="own estimate: doors with level bars are sold",
     )
-    dark_share: float = param(0.45, "share", "of a front that is dark, from where it is dark glass")
+    dark_share: float = param(0.45, "share", "Fraction of dark area above which a front is dark glass")
     glass: float = param(
-        0.8, "share", "of ovens' fronts that are darker than that, and of others that are not", source="own estimate"
+        0.8, "share", "Fraction of ovens' fronts that are darker than that, and of others that are not", source="own estimate"
     )
     bare: float = param(
         0.3,
         "ratio",
-        "of ovens and dishwashers on which no handle is seen, to other fronts on which none is",
+        "Ratio of ovens and dishwashers without a visible handle to other fronts without one",
         source="own estimate: kitchens without handles have machines with them",
     )
-    plinth_m: float = param(0.1, "m", "from the floor to a front where no floor was found", source="plinths of 6-20 cm")
-    worktop_m: float = param(0.9, "m", "from the floor to a thing where no floor was found", source="EN 1116")
+    plinth_m: float = param(0.1, "m", "Height of a front above the floor where no floor was found", source="plinths of 6-20 cm")
+    worktop_m: float = param(0.9, "m", "Height of an object above the floor where no floor was found", source="EN 1116")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrontLook:
-    """A panel as it looks. Heights are above the floor, None where no floor was found."""
+    """Appearance of a panel. Heights are above the floor, None where no floor was found."""
 
     width_m: float
     height_m: float
     bottom_m: float | None
     handle: GridHandle | None
-    dark: float = 0.0  # share of it that is dark and without texture, as glass is
+    dark: float = 0.0  # fraction of it that is dark and without texture, as glass is
     pair: bool = False  # two doors that open away from each other
 
 
 def name_front(look: FrontLook, *, machines: bool = True) -> tuple[str, float]:
-    """The likeliest category, of machines or without them, and how usual its size is (0..1) where it is."""
+    """Most probable category, with or without machines, and how usual its size is there (0..1)."""
     fronts = [
         kind
         for kind, place in _proposed()
-        if (kind.kind == "front" or (kind.kind == "appliance" and place.holds(0.0)))  # what stands on a worktop is in no run
+        if (kind.kind == "front" or (kind.kind == "appliance" and place.holds(0.0)))  # appliances on a worktop are in no run
         if (kind.opens == "pair") == look.pair
     ]
     kinds = [kind for kind in fronts if machines or not kind.one_front]
@@ -62,7 +62,7 @@ def name_front(look: FrontLook, *, machines: bool = True) -> tuple[str, float]:
 
 
 def name_thing(extent_m: np.ndarray, base_m: float | None) -> str:
-    """Category of a free-standing thing of this width, depth and height, standing at this height above the floor."""
+    """Category of a free-standing object with this width, depth and height, at this height above the floor."""
     across, height = float(extent_m[:2].max()), float(extent_m[2])
     base_m = tuned(Params).worktop_m if base_m is None else base_m
     fitting = [
@@ -81,9 +81,9 @@ def _proposed() -> list[tuple[Category, Place]]:
 
 
 def _log_posterior(kind: Category, look: FrontLook) -> float:
-    """Log of how often a kitchen has such a front, times the likelihoods of its sizes, place, handle and glass."""
+    """Log posterior: frequency of such a front in a kitchen times the likelihoods of its sizes, place, handle and glass."""
     params = tuned(Params)
-    assert kind.place is not None  # of what is proposed
+    assert kind.place is not None  # holds for all proposed categories
     known = np.log(kind.place.per_kitchen) + kind.width.log_likelihood(look.width_m) + kind.height.log_likelihood(look.height_m)
     bar = look.handle is not None and max(look.handle.width, look.handle.height) > params.long * min(
         look.handle.width, look.handle.height

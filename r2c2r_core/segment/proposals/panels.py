@@ -20,35 +20,42 @@ _NO_POINTS = np.zeros((0, 3))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which panels pass as fronts."""
+    """Tuned parameters of panels as fronts."""
 
-    shallowest_m: float = param(0.15, "m", "nearer to a wall is the wall, what hangs flat on it, or the back of a sink")
-    dark_lightness: float = param(60.0, "grey", "below it a cell is dark")
-    smallest_m: float = param(0.09, "m", "side of a front")
-    small_m2: float = param(0.15, "m²", "of a panel that is small")
-    alone_worth: float = param(
-        0.4, "ratio", "of a lone small panel's confidence", source="drawers come in stacks: it is part of a chair, or a book"
+    shallowest_m: float = param(
+        0.15, "m", "Minimum distance from a wall: nearer is the wall, something flat on it, or the back of a sink"
     )
-    corner_m: float = param(0.06, "m", "how exactly a side starts where a front ends")
-    deepest_m: float = param(0.8, "m", "of a carcass")
-    row_m: float = param(0.03, "m", "how exactly the fronts of a row line up")
-    mate_worth: float = param(0.5, "share", "how much a sure front beside it says for a panel")
-    surest: float = param(0.99, "score", "confidence, 0 to 1, at most")
-    least_mate: float = param(0.1, "score", "confidence, 0 to 1, below which a panel is no company")
+    dark_lightness: float = param(60.0, "grey", "Maximum lightness of a dark cell")
+    smallest_m: float = param(0.09, "m", "Minimum side of a front")
+    small_m2: float = param(0.15, "m²", "Maximum area of a small panel")
+    alone_worth: float = param(
+        0.4,
+        "ratio",
+        "Factor of a lone small panel's confidence",
+        source="drawers come in stacks: a lone one is part of a chair, or a book",
+    )
+    corner_m: float = param(0.06, "m", "Tolerance of where a carcass side starts at a front's end")
+    deepest_m: float = param(0.8, "m", "Maximum depth of a carcass")
+    row_m: float = param(0.03, "m", "Maximum misalignment of the fronts of a row")
+    mate_worth: float = param(0.5, "share", "Fraction of a panel's doubt that a certain front aligned with it removes")
+    surest: float = param(0.99, "score", "Maximum confidence, 0 to 1")
+    least_mate: float = param(0.1, "score", "Minimum confidence, 0 to 1, of an aligned panel for it to count")
     equal_doors_m: float = param(
         0.012,
         "m",
-        "by which the doors of one cabinet may differ",
+        "Maximum difference in width of the doors of one cabinet",
         source="they are cut alike; two cabinets beside each other seldom are",
     )
-    without_handle: float = param(0.6, "share", "of its confidence that a panel without a handle keeps")
-    unseen: float = param(0.3, "share", "of a panel that depth saw, that says nothing for it")
-    seen: float = param(0.8, "share", "of a panel that depth saw, that says all for it")
-    on_wall: float = param(0.3, "share", "of its confidence that a panel on a wall keeps")
-    mates_m: float = param(0.02, "m", "by which the doors of a pair may differ in height and stand apart")
-    at_seam: float = param(0.3, "share", "of a door's width from the seam, within which its handle is beside it", ge=0, le=0.5)
-    upright: float = param(1.8, "ratio", "of height to width of an upright handle")
-    widest_cabinet_m: float = param(0.95, "m", "of two doors that are one cabinet")
+    without_handle: float = param(0.6, "share", "Fraction of its confidence that a panel without a handle keeps")
+    unseen: float = param(0.3, "share", "Fraction of a panel with depth at which flatness contributes no confidence")
+    seen: float = param(0.8, "share", "Fraction of a panel with depth at which flatness contributes full confidence")
+    on_wall: float = param(0.3, "share", "Fraction of its confidence that a panel on a wall keeps")
+    mates_m: float = param(0.02, "m", "Maximum difference in height, and maximum gap, of the doors of a pair")
+    at_seam: float = param(
+        0.3, "share", "Maximum distance of a handle beside the seam from it, as a fraction of the door's width", ge=0, le=0.5
+    )
+    upright: float = param(1.8, "ratio", "Minimum ratio of height to width of an upright handle")
+    widest_cabinet_m: float = param(0.95, "m", "Maximum width of two doors that are one cabinet")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,12 +65,12 @@ class Panel:
     front: Front
     category: str
     confidence: float
-    usual: float = 1.0  # 0..1: how usual its size is where it is; part of the confidence
-    plain: str | None = None  # of a machine that only its handle tells: what it is among fronts that carry the same
+    usual: float = 1.0  # 0..1: how usual its size is at its place; part of the confidence
+    plain: str | None = None  # for a machine identified by its handle alone: its category among fronts with the same handle
 
     @property
     def run(self) -> Run:
-        """The run it is part of."""
+        """The run that contains the panel."""
         return self.front.run
 
     @property
@@ -74,18 +81,18 @@ class Panel:
 
     @property
     def centre(self) -> Vector3:
-        """Its middle, in the world."""
+        """Centre of the panel, in the world."""
         cell = self.front.cell
         return self.run.grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
 
     @property
     def corners(self) -> Points:
-        """Its corners in the world: top left, then clockwise."""
+        """Corners of the panel in the world: top left, then clockwise."""
         return front_corners(self.front.cell, self.run.grid, (0.0, 0.0))
 
 
 def find_panels(run: Run, room: Room) -> list[Panel]:
-    """The run's panels that could be fronts, the doors of a pair joined."""
+    """Panels of the run that could be fronts, with the doors of a pair joined."""
     params = tuned(Params)
     found: list[Panel] = []
     mates: list[Cell] = []
@@ -107,7 +114,7 @@ def _is_door(category: Category) -> bool:
 
 
 def without_sides(panels: list[Panel]) -> list[Panel]:
-    """The panels without those on the sides of carcasses: of two faces that meet at an outer corner, the better front stays."""
+    """Panels without those on carcass sides: of two faces that meet at an outer corner, the better front stays."""
     strength: dict[int, float] = {}
     for panel in panels:
         strength[id(panel.run)] = strength.get(id(panel.run), 0.0) + panel.confidence * _area(panel)
@@ -119,7 +126,7 @@ def without_sides(panels: list[Panel]) -> list[Panel]:
 
 
 def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | None:
-    """A front with its name and the evidence for it; None when it is too small for one."""
+    """Front with its category and evidence; None when it is too small for one."""
     if front is None:
         return None
     run, cell, cell_m = front.run, front.cell, front.run.grid.cell_m
@@ -142,7 +149,7 @@ def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | No
 
 
 def _beside(panel: Panel, others: list[Panel]) -> Panel:
-    """The panel in the light of its run: fronts stand in rows and stacks, and small flat things stand alone."""
+    """Panel with confidence updated by its run: fronts stand in rows and stacks, small flat objects stand alone."""
     params = tuned(Params)
     slack = params.row_m / panel.run.grid.cell_m
     mates = [
@@ -160,29 +167,29 @@ def _beside(panel: Panel, others: list[Panel]) -> Panel:
 
 
 def _aligned(a: Cell, b: Cell, slack: float) -> bool:
-    """Whether two panels stand in one row, or above each other."""
+    """Whether two panels are in one row, or above each other."""
     in_row = abs(a.top - b.top) < slack and abs(a.bottom - b.bottom) < slack
     return in_row or (abs(a.left - b.left) < slack and abs(a.right - b.right) < slack)
 
 
 def _odd_one_out(mates: list[Panel]) -> bool:
-    """Whether the doors beside a lying handle carry upright ones: a machine among cupboards."""
+    """Whether the doors beside a horizontal handle have upright ones: a machine among cupboards."""
     handles = [mate.front.handle for mate in mates if category_of(mate.category).opens in ("side", "bottom")]
     upright = tuned(Params).upright
     return bool(handles) and all(handle is not None and handle.height > upright * handle.width for handle in handles)
 
 
 def outlined(front: Front, *, stands: bool = False) -> float:
-    """The probability that its sides are edges of a front: the faintest one's, as one light and one colour err on all alike.
+    """Probability that all sides are edges of a front: that of the faintest, since light and colour errors are common to all.
 
-    The foot of what stands lies in shadow, and depth saw what it stands on.
+    The bottom edge of a standing object (`stands`) lies in shadow, and depth shows its support.
     """
     left, right, top, bottom = edge_strengths(front)
     return min(left, right, top) if stands else min(left, right, top, bottom)
 
 
 def _evidence(front: Front, area: tuple[slice, slice], room: Room) -> float:
-    """0..1: outlined, with a handle, flat where depth saw it, and no wall."""
+    """Confidence (0..1) from edges, handle, flatness by depth, and distance from walls."""
     params = tuned(Params)
     handle = front.handle.confidence if front.handle is not None else 0.0
     handled = params.without_handle + (1 - params.without_handle) * handle
@@ -202,7 +209,7 @@ def _middle(run: Run, cell: Cell) -> Points:
 
 
 def _mate(run: Run, cell: Cell) -> Cell | None:
-    """The right door of a pair whose left one this is: as high, exactly as wide, both handles beside the seam."""
+    """Right door of a pair with this left door: equally high, exactly as wide, both handles beside the seam."""
     params = tuned(Params)
     slack = params.mates_m / run.grid.cell_m
     for other in run.cells:
@@ -220,7 +227,7 @@ def _mate(run: Run, cell: Cell) -> Cell | None:
 
 
 def _handle_at(front: Front) -> float:
-    """Where across a front its handle is, 0 at the left edge and 1 at the right."""
+    """Position of the handle across a front, 0 at the left edge and 1 at the right."""
     assert front.handle is not None
     return ((front.handle.left + front.handle.right) / 2 - front.cell.left) / front.cell.width
 
@@ -237,7 +244,7 @@ def _area(panel: Panel) -> float:
 
 
 def _is_side_of(side: Panel, front: Panel) -> bool:
-    """Whether a panel lies on the face that starts at a front's left or right edge and runs backwards."""
+    """Whether a panel lies on the face that starts at a front's left or right edge and extends backwards."""
     params = tuned(Params)
     normal = front.run.grid.outward
     if abs(float(normal @ side.run.grid.outward)) > 0.3:
@@ -247,7 +254,7 @@ def _is_side_of(side: Panel, front: Panel) -> bool:
     x, behind, z = local
     outward = float(front.run.region.world_from_plane.rotation[:, 0] @ side.run.grid.outward)
     at_edge = abs(abs(float(x.mean())) - width / 2) < params.corner_m and float(x.mean()) * outward > 0
-    # The side may end short of the front: a door stands before its carcass, or the cut took a piece of it.
+    # The side may end short of the front: a door is in front of its carcass, or the cut removed a piece of it.
     is_behind = behind.min() > -params.corner_m and behind.min() < 0.35 and behind.max() < params.deepest_m
     overlap = min(float(z.max()), height / 2) - max(float(z.min()), -height / 2)
     return at_edge and bool(is_behind) and overlap > 0.5 * min(height, float(np.ptp(z)))

@@ -1,4 +1,4 @@
-"""Object proposals before any click: fronts, appliances and free-standing things, each with the click that confirms it."""
+"""Object proposals before any click: fronts, appliances and free-standing objects, each with the click that confirms it."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -32,36 +32,38 @@ Steps = Iterator[tuple[float, tuple[Proposal, ...]]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which proposals are shown."""
+    """Tuned parameters of the proposals."""
 
-    most_things: int = param(24, "count", "that are looked at")
-    least_confidence: float = param(0.3, "score", "0 to 1, of a front")
-    least_of_boxes: float = param(0.5, "score", "confidence, 0 to 1, of an appliance")
-    least_of_things: float = param(0.4, "score", "confidence, 0 to 1, of a thing")
-    least_plane_m2: float = param(0.02, "m²", "of a plane that is cut")
-    least_side_m: float = param(0.09, "m", "of a plane that is cut")
+    most_things: int = param(24, "count", "Maximum number of free-standing clusters considered")
+    least_confidence: float = param(0.3, "score", "Minimum confidence, 0 to 1, of a front")
+    least_of_boxes: float = param(0.5, "score", "Minimum confidence, 0 to 1, of an appliance")
+    least_of_things: float = param(0.4, "score", "Minimum confidence, 0 to 1, of a free-standing object")
+    least_plane_m2: float = param(0.02, "m²", "Minimum area of a plane that is cut")
+    least_side_m: float = param(0.09, "m", "Minimum side of a plane that is cut")
     shallowest_box_m: float = param(
-        0.25, "m", "of an appliance", source="microwaves are 0.3 m deep and more; what stands on a shelf is not"
+        0.25, "m", "Minimum depth of an appliance", source="microwaves are at least 0.3 m deep; objects on a shelf are not"
     )
-    same_plane_m: float = param(0.12, "m", "between two fronts of one place")
-    box_slack_m: float = param(0.03, "m", "about a box, within which a point is its own")
-    same_front: float = param(0.7, "score", "IoU from which a click gives the panel that was meant")
-    larger: float = param(1.8, "ratio", "to a thing's side as it stands there, of what a click gives, at most")
-    larger_m: float = param(0.05, "m", "by which what a click gives may be larger besides")
-    odd_size: float = param(8.0, "ratio", "of squared deviations from the usual size by which confidence falls to 1/e", gt=0)
-    taken_share: float = param(0.4, "share", "of an outline that other proposals may cover")
+    same_plane_m: float = param(0.12, "m", "Maximum distance between the planes of two fronts at one place")
+    box_slack_m: float = param(0.03, "m", "Margin around a box within which points belong to it")
+    same_front: float = param(0.7, "score", "Minimum IoU of a click's result with the proposed panel")
+    larger: float = param(1.8, "ratio", "Maximum size of a click's result relative to the cluster")
+    larger_m: float = param(0.05, "m", "Additional tolerance of that size")
+    odd_size: float = param(
+        8.0, "ratio", "Sum of squared deviations from the usual size at which the confidence falls to 1/e", gt=0
+    )
+    taken_share: float = param(0.4, "share", "Maximum fraction of an outline that other proposals may cover")
     clash_m: float = param(
         0.01,
         "m",
-        "by which two fronts overlap, both ways, from which one is doubted",
-        source="edges of right ones are 2 mm off",
+        "Overlap of two fronts in both directions above which one is doubted",
+        source="edges of correct fronts are 2 mm off",
     )
-    tall_m: float = param(1.25, "m", "height of a refrigerator's front, at least")
-    least_seen_m: float = param(0.12, "m", "side of a microwave's front, of which glass may leave little")
+    tall_m: float = param(1.25, "m", "Minimum height of a refrigerator's front")
+    least_seen_m: float = param(0.12, "m", "Minimum observed side of a microwave's front, of which glass may leave little")
 
 
 def propose_steps(prepared: PreparedCapture) -> Steps:
-    """Proposals so far, surest first, after each bit of work, with the share of the work done. The last step has them all."""
+    """Proposals so far, the most confident first, with the fraction of the work done. The last step has them all."""
     params = tuned(Params)
     panels: list[Panel] = []
     planes = [plane for plane in prepared.planes if _worth_cutting(plane)]
@@ -91,12 +93,12 @@ def propose_steps(prepared: PreparedCapture) -> Steps:
 
 
 def is_taken(share: float) -> bool:
-    """Whether a mask that covers so much of a proposal's outline is of the same object."""
+    """Whether a mask that covers this fraction of a proposal's outline is of the same object."""
     return share > tuned(Params).taken_share
 
 
 def covered_share(outline: Mask, mask: Mask) -> float:
-    """Share 0..1 of a proposal's outline that is in a mask of the same frame and size."""
+    """Fraction 0..1 of a proposal's outline that is in a mask of the same frame and size."""
     size = int(np.count_nonzero(outline))
     return int(np.count_nonzero(outline & mask)) / size if size else 0.0
 
@@ -120,7 +122,7 @@ def _worth_cutting(plane: PlaneRegion) -> bool:
 
 
 def _apart(panels: list[Panel]) -> list[Panel]:
-    """No panel inside another on the same plane: boxes before their doors, then the surer one."""
+    """Non-maximum suppression of overlapping panels on one plane: boxes before their doors, then by confidence."""
     kept: list[Panel] = []
     for panel in sorted(panels, key=lambda panel: (not _is_box(panel.category), -panel.confidence)):
         if not any(_covers(other, panel.centre) or _covers(panel, other.centre) or _same_box(panel, other) for other in kept):
@@ -129,7 +131,7 @@ def _apart(panels: list[Panel]) -> list[Panel]:
 
 
 def _same_box(panel: Panel, other: Panel) -> bool:
-    """Whether two faces belong to one appliance: no two of a kind stand corner to corner."""
+    """Whether two faces belong to one appliance: two of one category never stand corner to corner."""
     if panel.category != other.category or not _is_box(panel.category):
         return False
     return bool(np.linalg.norm(panel.centre - other.centre) < max(panel.size_m[0], other.size_m[0]))
@@ -142,7 +144,7 @@ def _covers(panel: Panel, point: Vector3) -> bool:
 
 
 def clashes(panel: Panel, others: Iterable[tuple[Proposal, Panel]]) -> tuple[str, ...]:
-    """In which fronts that were proposed before it a panel lies in part: no two fronts share a place."""
+    """Doubts about a panel that overlaps fronts proposed before it: no two fronts share a place."""
     params = tuned(Params)
     width, height = panel.size_m
     doubts = []
@@ -156,7 +158,7 @@ def clashes(panel: Panel, others: Iterable[tuple[Proposal, Panel]]) -> tuple[str
 
 
 def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:
-    """Whether a clump is part of the box behind a front."""
+    """Whether a cluster is part of the box behind a front."""
     params = tuned(Params)
     x, behind, z = panel.run.region.world_from_plane.rotation.T @ (clump.points.mean(axis=0) - panel.centre)
     width, depth, height = np.array(proposal.size_m) / [2, 1, 2] + params.box_slack_m
@@ -167,7 +169,7 @@ def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:
 
 
 def _machine(width_m: float, height_m: float, bottom_m: float) -> Category | None:
-    """The kind of appliance that a plane could be the front of: all of one from the floor up, what glass left of another."""
+    """Appliance category whose front a plane could be: the whole front of one from the floor up, or part of a glass front."""
     params = tuned(Params)
     for kind in every_category():
         if kind.kind != "appliance" or kind.place is None or not kind.place.holds(bottom_m):
@@ -180,7 +182,7 @@ def _machine(width_m: float, height_m: float, bottom_m: float) -> Category | Non
 
 
 def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
-    """The appliance whose front a whole plane could be."""
+    """Appliance whose front a whole plane could be."""
     params = tuned(Params)
     room = prepared.scene.capture.room
     if not room.floor_found:
@@ -198,7 +200,7 @@ def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
     return [Panel(front, kind.name, outlined(front, stands=True) * float(np.exp(-(off @ off) / params.odd_size)))]
 
 
-# Presenting: the frame that shows it best, and a click there that means it
+# Presentation: the frame that shows a proposal best, and a click there that selects it
 
 
 def _present_panel(prepared: PreparedCapture, panel: Panel) -> Proposal | None:
@@ -264,7 +266,7 @@ def _present_clump(prepared: PreparedCapture, clump: Clump, others: list[Proposa
 
 
 def _agreement(clump: Clump, dimensions_m: np.ndarray) -> float:
-    """0..1: how well what a click would give fits what stands there; the depth of a thing is seen worst."""
+    """Agreement (0..1) of a click's result with the cluster; depth is left out, as it is observed worst."""
     seen = np.array([clump.extent_m[:2].max(), clump.extent_m[2]])
     given = np.array([dimensions_m[:2].max(), dimensions_m[2]])
     return float(np.exp(-np.abs(np.log(given / seen)).sum()))
@@ -285,7 +287,7 @@ def _inside(mask: Mask, frame: Frame, point: Vector3) -> bool:
 
 
 def _confirmed(prepared: PreparedCapture, category: str, click: PromptPoint | None) -> Found | None:
-    """What a person would get from this click."""
+    """Result that a person would get from this click."""
     if click is None:
         return None
     try:
