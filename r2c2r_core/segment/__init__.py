@@ -1,18 +1,18 @@
 """Segmentation (paper 4.1): clicks on a capture become an object's mask in every frame, and its measured front or box.
 
-| room       | method                                                                                                      |
+| package    | method                                                                                                      |
 |------------|-------------------------------------------------------------------------------------------------------------|
-| mosaics    | a vertical plane as an orthomosaic: line evidence, relief, the odds of networks, edges, handles            |
+| mosaics    | orthomosaic of a vertical plane: line evidence, relief, network log-odds, edges, handles                    |
 | runs       | its partition into panels by a recursive XY-cut; face frames, stiles                                        |
-| motion     | a leaf against its unit: the joint it hangs on and its state in every frame, from depth                     |
-| fronts     | the panel under the clicks as a rectangle on its plane; drawers and doors that stand open                   |
-| things     | free-standing things: min-cut of the fused surface; small ones by visual hull                               |
+| motion     | a leaf relative to its unit: its joint and its state in every frame, from depth                             |
+| fronts     | the clicked panel as a rectangle on its plane; open drawers and doors                                       |
+| things     | free-standing objects: min-cut of the fused surface; small ones by visual hull                              |
 | appliances | an upright box behind a front                                                                               |
-| proposals  | what is there before anyone clicks                                                                          |
-| geometric  | the weight-free segmenter: a session that sends clicks to the rooms above                                   |
+| proposals  | objects proposed before any click                                                                           |
+| geometric  | the weight-free segmenter: a session that routes clicks to the packages above                               |
 | learned    | the same with masks of a video model (SAM 2, SAM 3, EdgeTAM), fused with depth                              |
 
-A room imports from the rooms above it in this table only; the modules beside the rooms are what all of them stand on: the
-prepared capture (scene, surface, planes), visibility, view selection, and the protocol. No room has more than five import
+A package imports only from packages above it in this table. The modules beside the packages are their common base: the
+prepared capture (scene, surface, planes), visibility, view selection, and the protocol. No package has more than five import
 levels (tests/test_architecture.py).
 """

@@ -1,7 +1,7 @@
-"""Contradictions among the objects' masks, clicks, sizes and places: found in a second, before minutes of computing.
+"""Consistency checks of the objects' masks, clicks, sizes and places: a second's work before minutes of computing.
 
-Masks are of what is visible, so a pixel belongs to one object: two that share many claim the same surface.
-Each finding names the clicks and what would mend it; nothing is changed here.
+Masks show visible pixels only, so each pixel belongs to one object: two objects that share many claim the same surface.
+Each finding names the clicks and the correction; nothing is changed here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,57 +27,68 @@ _SIDES = ("left", "right", "upper", "lower")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What counts as a contradiction."""
+    """Tuned parameters of the consistency checks."""
 
     frames: int = param(
-        12, "count", "of those both are seen in, spread over the recording, in which two objects' masks are compared", ge=1
+        12,
+        "count",
+        "Maximum number of frames, spread over those that show both objects, in which their masks are compared",
+        ge=1,
     )
     overlap: float = param(
         0.1,
         "share",
-        "of the smaller mask that two objects may share",
-        source="of the sample kitchens' right masks neighbours share at most 0.02",
+        "Maximum fraction of the smaller mask that two objects may share",
+        source="neighbours share at most 0.02 of the sample kitchens' correct masks",
     )
-    same: float = param(0.5, "share", "of the smaller mask, from which two objects are one")
+    same: float = param(0.5, "share", "Minimum shared fraction of the smaller mask for two objects to be the same")
     near_click: float = param(
-        0.01, "share", "of the image's width: a click this near to a mask is on it", source="as fingers and borders go"
+        0.01,
+        "share",
+        "Maximum distance of a click on a mask from it, as a fraction of the image's width",
+        source="imprecision of fingers and borders",
     )
     unlikely: float = param(
         0.37,
         "score",
-        "Size.fit, 0 to 1, below which a size is none of its category's",
-        source="a tenth beyond what is sold",
+        "Size fit, 0 to 1, below which a size is implausible for its category",
+        source="a tenth beyond the range of products sold",
     )
     floor_m: float = param(
         0.15,
         "m",
-        "above the floor, that what stands on it may seem to be",
-        source="0.03 m is the worst seen on the sample kitchens",
+        "Maximum apparent height above the floor of an object that stands on it",
+        source="0.03 m is the maximum on the sample kitchens",
     )
-    unsure_edge: float = param(0.3, "share", "of certainty of an edge, below which it is asked about", ge=0, le=1)
+    unsure_edge: float = param(0.3, "share", "Probability of an edge below which it is questioned", ge=0, le=1)
     unsure_seam: float = param(
         0.25,
         "share",
-        "of certainty of a seam inside a front, from which it is asked about",
+        "Probability of a seam inside a front above which it is questioned",
         ge=0,
         le=1,
-        source="development kitchens: of fronts between 0.25 and 0.3 none was right",
+        source="development kitchens: of fronts between 0.25 and 0.3 none was correct",
     )
     unsure_front: float = param(
         0.7,
         "share",
-        "of certainty that a front's edges are right and no seam is inside, below which it is asked about",
-        source="development kitchens: below it are 3 of 4 wrong fronts and 1 of 20 right ones",
+        "Probability that a front's edges are right and no seam is inside, below which it is questioned",
+        source="development kitchens: below it are 3 of 4 wrong fronts and 1 of 20 correct ones",
     )
-    in_wall_m: float = param(0.04, "m", "of a front from a wall's plane", source="the shallowest wall unit sold is 0.2 m deep")
+    in_wall_m: float = param(
+        0.04,
+        "m",
+        "Maximum distance from a wall's plane of a front in that plane",
+        source="the shallowest wall unit sold is 0.2 m deep",
+    )
 
 
 def find_contradictions(
     tracks: Mapping[str, MaskTrack], prompts: Sequence[ObjectPrompt], walls: Sequence[Wall]
 ) -> tuple[Contradiction, ...]:
-    """All of them, those between two objects first; objects without a track are left out.
+    """All contradictions, those between two objects first; objects without a track are left out.
 
-    What cannot be told of one object, or of two, is in the log, and the rest is told.
+    A check that fails for one object or pair is logged, and the others still run.
     """
     params = tuned(Params)
     known = [prompt for prompt in prompts if prompt.name in tracks]
@@ -93,7 +104,7 @@ def find_contradictions(
 
 
 def find_implausible(track: MaskTrack, walls: Sequence[Wall]) -> tuple[Contradiction, ...]:
-    """What contradicts the category of one object in its size, its place and its edges; its masks are not looked at."""
+    """Contradictions of one object's size, place and edges with its category; its masks are not considered."""
     params, category = tuned(Params), category_of(track.category)
     sizes, place = _unlikely_sizes(track, category, params), _misplaced(track, category, walls, params)
     return (*sizes, *place, *_unsure_edges(track, category, params))
@@ -123,9 +134,9 @@ def _between(
 
 
 def _overlap(first: MaskTrack, second: MaskTrack, most: int) -> tuple[float, int]:
-    """The share of the smaller mask that is in both, over frames that see both, and the frame with the most of it.
+    """Fraction of the smaller mask that is in both, over frames that see both, and the frame with the largest overlap.
 
-    Frames in which a front is open are left out: what is behind it is seen then.
+    Frames in which a front is open are left out: they show the surface behind it.
     """
     shared = sorted((set(first.masks) & set(second.masks)) - first.opened_frames - second.opened_frames)
     frames = [shared[i] for i in np.unique(np.linspace(0, len(shared) - 1, most).round().astype(int))] if shared else []
@@ -135,15 +146,15 @@ def _overlap(first: MaskTrack, second: MaskTrack, most: int) -> tuple[float, int
 
 
 def _shared_px(a: PackedMask, b: PackedMask) -> int:
-    """Pixels in both; masks whose boxes do not meet are not unpacked."""
+    """Number of pixels in both masks; masks with disjoint boxes are not unpacked."""
     apart_x = a.left >= b.left + b.box_width or b.left >= a.left + a.box_width
     apart_y = a.top >= b.top + b.box_height or b.top >= a.top + a.box_height
     return 0 if apart_x or apart_y else int(np.count_nonzero(unpack_mask(a) & unpack_mask(b)))
 
 
 def _disobeyed(track: MaskTrack, prompt: ObjectPrompt, params: Params) -> Iterator[Contradiction]:
-    """Clicks on it that its mask leaves out, and clicks off it that its mask takes in."""
-    corrected = {frame.frame for frame in prompt.frames}  # a person says what is seen of it there
+    """Positive clicks outside the object's mask, and negative clicks inside it."""
+    corrected = {frame.frame for frame in prompt.frames}  # a person corrected the object's visibility there
     for point in prompt.points:
         packed = track.masks.get(point.frame)
         if packed is None and (point.label == 0 or point.frame in corrected):
@@ -171,7 +182,7 @@ def _within(mask: Mask, point: PromptPoint) -> bool:
 
 
 def _unlikely_sizes(track: MaskTrack, category: Category, params: Params) -> Iterator[Contradiction]:
-    """Measured sizes that nothing of its category has; depths are left out, for they are seldom seen."""
+    """Measured sizes implausible for the category; depths are left out, because they are seldom observed."""
     if track.front is not None:
         sizes = {"wide": (track.front.width_m, category.width), "high": (track.front.height_m, category.height)}
     elif track.box is not None:
@@ -179,7 +190,7 @@ def _unlikely_sizes(track: MaskTrack, category: Category, params: Params) -> Ite
         sizes = {"wide": (max(width, depth), category.width), "high": (height, category.height)}
     else:
         return
-    if category.name == "object":  # a name the table does not know
+    if category.name == "object":  # a name missing from the table
         return
     for word, (size_m, usual) in sizes.items():
         if usual.fit(float(size_m)) >= params.unlikely:
@@ -201,7 +212,7 @@ def _size_mend(too_large: bool, category: Category) -> str:
 
 
 def _misplaced(track: MaskTrack, category: Category, walls: Sequence[Wall], params: Params) -> Iterator[Contradiction]:
-    """What stands on the floor and is in the air, and fronts in the plane of a wall."""
+    """Floor-standing objects in the air, and fronts in the plane of a wall."""
     if category.on_floor and track.box is not None and track.box.support_z_m > params.floor_m:
         yield Contradiction(
             rule="in-the-air",
@@ -223,7 +234,7 @@ def _misplaced(track: MaskTrack, category: Category, walls: Sequence[Wall], para
 
 
 def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Iterator[Contradiction]:
-    """Fronts that may end elsewhere: edges that hardly show, rivals beside them, and seams inside what should have none."""
+    """Fronts that may end elsewhere: faint edges, rivals beside them, and seams inside fronts that should have none."""
     front = track.front
     if front is None or not front.edges:
         return
@@ -245,7 +256,7 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
 
 
 def has_seams(category: Category, width_m: float) -> bool:
-    """Whether lines across such a front are nothing to ask about: two doors, a stack, a machine's window, keypad or drawer."""
+    """Whether seams across a front are expected: two doors, a stack, or an appliance's window, keypad or drawer."""
     pair = category.opens == "pair" or (category.wider is not None and width_m >= category.wider[0])
     return pair or category.one_front or category.several_fronts or category.kind == "appliance"
 
@@ -255,7 +266,7 @@ def _range(size: Size) -> str:
 
 
 def _clicks(prompt: ObjectPrompt) -> str:
-    """The object and where it was clicked first."""
+    """Name of the object and its first click."""
     first = next((point for point in prompt.points if point.label == 1), None)
     return f"{prompt.name} ({f'clicked {_at(first)}' if first is not None else 'drawn'})"
 

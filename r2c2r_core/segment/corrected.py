@@ -1,4 +1,4 @@
-"""What a person said of an object in single frames stands, whichever segmenter found the rest."""
+"""A person's corrections of single frames, which override the masks of any segmenter."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,12 +14,12 @@ from r2c2r_core.segment.protocol import Glimpse
 
 
 def as_found(prompt: ObjectPrompt) -> ObjectPrompt:
-    """What a segmenter is asked: single frames teach it nothing, and setting one right finds nothing anew."""
+    """Prompt without single-frame corrections: they do not affect segmentation, and changing them must not rerun it."""
     return replace(prompt, frames=())
 
 
 def corrected_track(track: MaskTrack, said: tuple[FrameSaid, ...]) -> MaskTrack:
-    """The track with those frames as a person set them right; raises ObjectNotSeen where none is left."""
+    """Track with a person's corrections applied to those frames; raises ObjectNotSeen where no frame is left."""
     if not said:
         return track
     size = next(iter(track.masks.values()))
@@ -40,7 +40,7 @@ def corrected_track(track: MaskTrack, said: tuple[FrameSaid, ...]) -> MaskTrack:
 
 
 def corrected_stream(found: Iterator[Glimpse], said: tuple[FrameSaid, ...]) -> Iterator[Glimpse]:
-    """The same, one frame after the other: those that were painted first."""
+    """Corrected masks as a stream, the painted frames first."""
     numbers = {one.frame for one in said}
     for one in said:
         if one.mask is not None:
@@ -51,7 +51,7 @@ def corrected_stream(found: Iterator[Glimpse], said: tuple[FrameSaid, ...]) -> I
 
 
 def _at_size(mask: PackedMask, size: PackedMask) -> PackedMask:
-    """The mask at the frames' own size."""
+    """Mask resized to the frames' size."""
     if (mask.width, mask.height) == (size.width, size.height):
         return mask
     pixels = unpack_mask(mask).astype(np.uint8)

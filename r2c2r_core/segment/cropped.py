@@ -1,4 +1,4 @@
-"""What lies outside a box that a person drew around a thing is none of it, whichever segmenter found it."""
+"""Restriction of an object to a crop box drawn by a person, for any segmenter."""
 
 from dataclasses import dataclass, replace
 
@@ -23,10 +23,10 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What counts as outside."""
+    """Tuned parameters of the crop box."""
 
-    slack_m: float = param(0.02, "m", "beyond the box, within which depth is still that of what is in it")
-    least_points: int = param(20, "count", "of a thing's points that must lie in its box", ge=4)
+    slack_m: float = param(0.02, "m", "Maximum distance outside the box of depth that still counts as inside")
+    least_points: int = param(20, "count", "Minimum number of an object's points in its box", ge=4)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,20 +34,20 @@ class Crop:
     """The box in the world; its own coordinates run from 0 to 1 along each edge."""
 
     corner: Vector3
-    edges: Matrix3  # one a row
+    edges: Matrix3  # one per row
 
     @property
     def bottom_m(self) -> float:
-        """Height of its lowest corner."""
+        """Height of the lowest corner."""
         return float(self.corner[2] + np.minimum(self.edges[:, 2], 0.0).sum())
 
     def holds(self, points: Points) -> np.ndarray:
-        """Which points (n, 3) lie in it."""
+        """Mask of the points (n, 3) that lie in the box."""
         local = self._turned(points - self.corner)
         return np.asarray(((local >= 0) & (local <= 1)).all(axis=-1))
 
     def span(self, origin: Vector3, rays: PointField) -> tuple[np.ndarray, np.ndarray]:
-        """How far along each ray it begins and ends, in lengths of the ray; where it is missed it ends first."""
+        """Entry and exit of each ray, in ray lengths; a ray that misses the box exits before it enters."""
         start, way = self._turned(origin - self.corner), self._turned(rays)
         with np.errstate(divide="ignore", invalid="ignore"):
             low, high = -start / way, (1 - start) / way
@@ -58,13 +58,13 @@ class Crop:
 
 
 def world_crop(crop: CropBox, world_from_capture: Rigid3) -> Crop:
-    """The box in the world."""
+    """Crop box in world coordinates."""
     corner = world_from_capture.apply(np.array([crop.corner_capture]))[0]
     return Crop(corner, world_from_capture.turn(np.array(crop.edges_capture)))
 
 
 def cropped(found: Found, crop: Crop, scene: Scene, name: str) -> Found:
-    """The part of a thing that lies in the box; raises ObjectNotSeen where hardly any does."""
+    """Part of an object that lies in the box; raises ObjectNotSeen where hardly any does."""
     assert isinstance(found, FoundThing | FoundStanding), found  # check_prompt refuses others
     thing = found.thing if isinstance(found, FoundThing) else found.standing.thing
     within, least = crop.holds(thing.points), tuned(Params).least_points
@@ -77,7 +77,7 @@ def cropped(found: Found, crop: Crop, scene: Scene, name: str) -> Found:
 
 
 def cropped_mask(mask: Mask, frame: Frame, depth: DepthMetres, crop: Crop) -> Mask:
-    """Of a mask, the pixels whose rays meet the box, and whose depth, where there is one, lies in it."""
+    """Pixels of a mask whose rays meet the box, and whose depth, where known, lies in it."""
     rows, columns = np.nonzero(mask)
     if not len(rows):
         return mask
@@ -93,38 +93,38 @@ def cropped_mask(mask: Mask, frame: Frame, depth: DepthMetres, crop: Crop) -> Ma
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundCropped:
-    """A thing of which only what lies in a box counts."""
+    """An object restricted to a crop box."""
 
     found: FoundThing | FoundStanding
-    thing: Thing  # all of it
+    thing: Thing  # the whole object
     crop: Crop
     scene: Scene
 
     @property
     def kind(self) -> Kind:
-        """As it was found."""
+        """Kind of the uncropped object."""
         return self.found.kind
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """As it was found."""
+        """Warnings of the uncropped object."""
         return self.found.warnings
 
     def see(self, frame: Frame) -> View:
-        """Its pixels in the box."""
+        """Visible pixels of the object within the box."""
         view = self.found.see(frame)
         return replace(view, mask=cropped_mask(view.mask, frame, self.scene.depth(frame.index), self.crop))
 
     def panel(self) -> FrontPanel | None:
-        """None: things have no front panel."""
+        """None: free-standing objects have no front panel."""
         return None
 
     def motions(self) -> tuple[JointMotion, ...]:
-        """None: things are moved whole."""
+        """No motions: free-standing objects move as a whole."""
         return ()
 
     def box(self) -> ThingBox | None:
-        """The box of its part; it stands where the crop box begins where that is above its support."""
+        """Box of the part in the crop box; its base is the crop box's, where that is above the support."""
         support = self.thing.support_z_m
         part = replace(
             self.thing,

@@ -1,6 +1,6 @@
-"""Each plane of a prepared capture drawn to scale, with its lines and the panels cut on it, for a person to correct.
+"""Elevations of a prepared capture: each plane drawn to scale, with its lines and cut panels, for a person to correct.
 
-The one place where the editor of fronts asks the runs; what it needs of them is named in `Elevation`.
+The only interface between the front editor and the runs; `Elevation` lists the data it needs.
 """
 
 from collections.abc import Iterator
@@ -15,14 +15,14 @@ from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
 
-_LEAST_SIDE_M = 0.3  # of a plane that is shown: a single front is as large
-_WALL_M = 0.04  # of a plane from a wall's, to be the wall
-_SEEN_SHARE = 0.5  # of a panel that has depth
-_CLEAR_Z = 6.0  # of a line that is drawn as the clearest
+_LEAST_SIDE_M = 0.3  # minimum side of a plane that is shown: a single front is as large
+_WALL_M = 0.04  # maximum distance of a plane from a wall's to be the wall
+_SEEN_SHARE = 0.5  # minimum fraction of a panel with depth
+_CLEAR_Z = 6.0  # z-score of a line that is drawn as the clearest
 
 
 def elevations(prepared: PreparedCapture) -> Iterator[Elevation]:
-    """Those of planes large enough, the largest first; walls come last and show no panels, for tiles are no fronts."""
+    """Elevations of large enough planes, the largest first; walls come last, without panels, since tiles are no fronts."""
     walls = prepared.scene.capture.room.walls
     large = [plane for plane in prepared.planes if min(plane.width_m, plane.height_m) >= _LEAST_SIDE_M]
     runs = [run for plane in large if (run := prepared.run_of(plane)) is not None]
@@ -37,7 +37,7 @@ def _is_wall(run: Run, walls: tuple[Wall, ...]) -> bool:
 
 
 def _is_seen(cell: Cell, run: Run) -> bool:
-    """Whether the scan has depth on most of it."""
+    """Whether the scan has depth on most of a panel."""
     inside = run.seen[round(cell.top) : round(cell.bottom), round(cell.left) : round(cell.right)]
     return inside.size > 0 and bool(inside.mean() > _SEEN_SHARE)
 

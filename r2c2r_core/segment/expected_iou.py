@@ -1,4 +1,4 @@
-"""The expected IoU of a mask with the truth, from how far its border is usually off: the confidence of a mask."""
+"""Expected IoU of a mask with the truth, from the usual error of its border: the confidence of a mask."""
 
 from dataclasses import dataclass
 
@@ -13,26 +13,28 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How sure a mask is."""
+    """Tuned parameters of the expected IoU."""
 
-    least_px: float = param(0.7, "px", "no border is better than that")
-    slope: float = param(0.68, "ratio", "of log-odds to what they are worth", source=FITTED, gt=0)
-    offset: float = param(1.19, "log", "that log-odds are worth more", source=FITTED, ge=-10, le=10)
+    least_px: float = param(0.7, "px", "Minimum border error")
+    slope: float = param(0.68, "ratio", "Slope of the calibration of log-odds", source=FITTED, gt=0)
+    offset: float = param(1.19, "log", "Offset of the calibration of log-odds", source=FITTED, ge=-10, le=10)
     unlikely_left: float = param(
         0.33,
         "share",
-        "of the expected IoU that is left where nothing of its category is of such a size",
+        "Fraction of the expected IoU that is left where the size is implausible for the category",
         source="fronts cut together with their neighbours overlapped them by 0.30 to 0.47 (second generator, seed 0)",
     )
-    hidden_cost: float = param(0.25, "share", "of the expected IoU: of a thing nearly all hidden, what shows is a guess")
+    hidden_cost: float = param(
+        0.25, "share", "Fraction of the expected IoU lost by a nearly fully hidden object, whose visible part is a guess"
+    )
 
 
 def expected_iou(mask: Mask, share: float, frame: Frame, points_world: Points, border_m: float, fit: float = 1.0) -> float:
-    """Expected IoU (0..1) of a mask that shows a `share` of a thing at these points, whose border is off by `border_m`.
+    """Expected IoU (0..1) of a mask that shows a `share` of an object at these points, with a border error of `border_m`.
 
-    `fit` (0..1) is how well its size fits its category: what was cut together with its neighbours fits none.
+    `fit` (0..1) is the fit of its size to its category: an object merged with its neighbours fits none.
 
-    A border off by s pixels on one side changes about s times its length of the area; borders of the image are exact.
+    A border error of s pixels on one side changes the area by about s times its length; borders of the image are exact.
     """
     params = tuned(Params)
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))

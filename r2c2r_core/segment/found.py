@@ -1,4 +1,4 @@
-"""What a segmenter found under the clicks: its kind, its measures, and its pixels in any frame."""
+"""Interface of a segmented object: its kind, its measurements, and its pixels in any frame."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -19,24 +19,24 @@ class View:
 
 
 class Found(Protocol):
-    """An object found from its clicks: what it is, and its pixels in any frame."""
+    """A segmented object: its kind, measurements and pixels in any frame."""
 
     @property
     def kind(self) -> Kind:
-        """What it turned out to be."""
+        """Kind of the object as found, which may differ from its category's."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One line each, for a person."""
+        """Warnings to the user, one line each."""
 
     def see(self, frame: Frame) -> View:
-        """Its pixels in a frame, where it stands there."""
+        """Visible pixels in a frame, at the object's pose there."""
 
     def panel(self) -> FrontPanel | None:
-        """Its flat front, measured."""
+        """Measured flat front."""
 
     def motions(self) -> tuple[JointMotion, ...]:
-        """How its leaves were filmed to move."""
+        """Joint motions of its leaves in the recording."""
 
     def box(self) -> ThingBox | None:
-        """Its box, measured."""
+        """Measured box."""

@@ -1,4 +1,4 @@
-"""Holes in a depth image, where nothing returned light, and the measured rim round them."""
+"""Holes in a depth image, where no light returned, and the measured rim around them."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,30 +14,30 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What counts as a hole, and as its rim."""
+    """Tuned parameters of holes and rims."""
 
-    thin_px: int = param(5, "px", "width of what is only an outline between two depths, and no hole", ge=1)
-    about_px: int = param(7, "px", "across a hole's border, where what is round it is measured", ge=3)
+    thin_px: int = param(5, "px", "Minimum width of a hole: narrower ones are outlines between two depths", ge=1)
+    about_px: int = param(7, "px", "Size of the dilation of a hole whose ring is its rim", ge=3)
 
 
 class Rim(NamedTuple):
-    """Where depth was measured just outside a hole."""
+    """Depth measured just outside a hole."""
 
-    at: tuple[int, int]  # (column, row) of the depth image that was asked about
+    at: tuple[int, int]  # (column, row) in the depth image of the queried pixel
     pixels: np.ndarray  # (n, 2) columns and rows of the depth image
     points: Points  # (n, 3) world
 
     def encloses(self, chosen: Mask) -> bool:
-        """Whether the asked pixel is in the convex hull of a part of the rim (n,).
+        """Whether the queried pixel is in the convex hull of a part of the rim (n,).
 
-        At a picture's border a hole goes on unseen, and nothing encloses it there.
+        A hole at the image border continues out of view, and is not enclosed there.
         """
         hull = self.pixels[chosen].astype(np.int32)
         return len(hull) > 0 and cv2.pointPolygonTest(cv2.convexHull(hull), self.at, measureDist=False) >= 0
 
 
 def find_rim(frame: Frame, depth_m: DepthMetres, x_px: float, y_px: float) -> Rim | None:
-    """The rim of the hole at a pixel of a frame's colour image; None where depth was measured, or only an outline has none."""
+    """Rim of the hole at a pixel of a frame's colour image; None where depth was measured, or only an outline lacks it."""
     params, (height, width) = tuned(Params), depth_m.shape
     column, row = int(x_px * width / frame.rgb_camera.width), int(y_px * height / frame.rgb_camera.height)
     if depth_m[row, column] > 0:

@@ -1,4 +1,4 @@
-"""Visibility of a projected surface in one frame: depth decides per pixel, a watershed on colour draws an occluder's border."""
+"""Visibility of a projected surface in one frame: per-pixel depth test, with a colour watershed at an occluder's border."""
 
 from dataclasses import dataclass
 
@@ -14,19 +14,19 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which occluders are near."""
+    """Tuned parameters of the visibility test."""
 
-    near_m: float = param(0.08, "m", "before the object, from where an occluder is near")
-    confirm_m: float = param(0.03, "m", "off a side of a carcass beyond the noise, within which depth confirms it")
+    near_m: float = param(0.08, "m", "Distance of the near plane at which polygons are clipped")
+    confirm_m: float = param(0.03, "m", "Maximum distance of depth from a side of a carcass, beyond the noise, to confirm it")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerance:
-    """How far depth may lie from the model beyond its noise, metres."""
+    """Maximum distance of depth from the model beyond its noise, metres."""
 
-    front_m: float = 0.06  # handles stand out by up to 5 cm
+    front_m: float = 0.06  # handles protrude by up to 5 cm
     behind_m: float = 0.06
-    fused: bool = True  # whether the fused surface stands in where the sensor tells nothing: not for what moved
+    fused: bool = True  # whether the fused surface replaces missing sensor depth: not for moved objects
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +44,7 @@ class Facet:
 
 
 def visible_mask(facets: list[Facet], scene: Scene, frame: Frame, tolerance: Tolerance | None = None) -> tuple[Mask, float]:
-    """The facets' pixels that nothing hides, at RGB resolution, and the share of their projection that is visible."""
+    """Unoccluded pixels of the facets, at RGB resolution, and the visible fraction of their projection."""
     tolerance = tolerance or Tolerance()
     camera = frame.rgb_camera
     total = np.zeros((camera.height, camera.width), bool)
@@ -74,7 +74,7 @@ def _shown(
     sensor, seen = _crop_depths(scene, frame, box)
     if facet.confirm:
         return inside & _smoothed(scene.noise.agrees(seen, model, tuned(Params).confirm_m), scene, frame)
-    # Glass and gloss leave holes through which the fused surface shows what is behind: only the sensor may say "behind".
+    # The fused surface shows the background through holes from glass and gloss: only the sensor may say "behind".
     behind = scene.noise.seen_through(sensor, model, tolerance.behind_m)
     hidden = scene.noise.occluded(seen if tolerance.fused else sensor, model, tolerance.front_m) | behind
     hidden = _smoothed(hidden, scene, frame)
@@ -89,11 +89,11 @@ def _shown(
 
 
 def refine_border(rgb: Image, mask: Mask, band_px: int, *, within: Mask | None = None) -> Mask:
-    """Move a mask's border onto the strongest colour edge within `band_px`; outside `within` nothing is added."""
+    """Mask with its border moved to the strongest colour edge within `band_px`; nothing is added outside `within`."""
     solid = mask.astype(np.uint8)
     element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * band_px + 1, 2 * band_px + 1))
     outer = np.ones_like(mask) if within is None else within
-    # Beyond the outline belongs to neither side: it must not erode the mask there.
+    # Pixels beyond the outline belong to neither side: they must not erode the mask there.
     padded = np.where(outer, solid, 1).astype(np.uint8) if within is not None else solid
     sure = cv2.erode(padded, element, borderType=cv2.BORDER_REPLICATE) > 0
     sure &= mask
@@ -109,8 +109,8 @@ def refine_border(rgb: Image, mask: Mask, band_px: int, *, within: Mask | None =
 def flood(ridges: np.ndarray, markers: np.ndarray, within: Mask | None = None) -> np.ndarray:
     """Watershed labels: marked regions grow over the unmarked (0) pixels of `within` until they meet on the ridges.
 
-    The same as skimage's, in the time of the unmarked pixels alone: it queues every marked one, though only those at the
-    rim have anything to grow into.
+    Equals skimage's watershed, at the cost of the unmarked pixels alone: skimage queues all marked pixels, though only those at
+    the rim can grow.
     """
     from skimage.segmentation import watershed
 
@@ -129,7 +129,7 @@ def flood(ridges: np.ndarray, markers: np.ndarray, within: Mask | None = None) -
 
 
 def colour_gradient(rgb: Image) -> np.ndarray:
-    """The largest Sobel magnitude over the Lab channels."""
+    """Maximum Sobel magnitude over the Lab channels."""
     lab = cv2.GaussianBlur(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB), (0, 0), 1.0).astype(np.float32)
     dx, dy = cv2.Sobel(lab, cv2.CV_32F, 1, 0), cv2.Sobel(lab, cv2.CV_32F, 0, 1)
     return np.asarray(np.sqrt(dx**2 + dy**2).max(axis=2))
@@ -152,7 +152,7 @@ def project_polygon(corners_world: Points, frame: Frame, camera: Intrinsics) -> 
 
 
 def fill_polygon(outline_px: Pixels, box: tuple[int, int, int, int]) -> Mask:
-    """Pixels of the box (left, top, right, bottom) inside an outline given in continuous coordinates."""
+    """Mask of the pixels of a box (left, top, right, bottom) inside an outline given in continuous coordinates."""
     left, top, right, bottom = box
     canvas = np.zeros((bottom - top, right - left), np.uint8)
     points = np.clip((outline_px - [left + 0.5, top + 0.5]) * 16, -(2**20), 2**20)
@@ -194,6 +194,6 @@ def _crop_depths(scene: Scene, frame: Frame, box: tuple[int, int, int, int]) -> 
 
 
 def _smoothed(flags: Mask, scene: Scene, frame: Frame) -> Mask:
-    """Round off the stairs of coarse depth pixels, and drop single ones."""
+    """Flags with the steps of coarse depth pixels smoothed, and single pixels removed."""
     size = max(3, 2 * round(frame.rgb_camera.width / scene.depth(frame.index).shape[1]) + 1)
     return np.asarray(cv2.blur(flags.astype(np.float32), (size, size)) > 0.5)

@@ -1,4 +1,4 @@
-"""Vertical planes of the fused surface by Hough voting on yaw and offset: fronts of furniture runs, once, before any click."""
+"""Vertical planes of the fused surface by Hough voting over yaw and offset: fronts of furniture runs, before any click."""
 
 from dataclasses import dataclass, field, replace
 
@@ -15,62 +15,72 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a front's plane is."""
+    """Tuned parameters of the plane search."""
 
-    cell_m: float = param(0.02, "m", "side of the support map's cells", gt=0)
+    cell_m: float = param(0.02, "m", "Cell size of the support map", gt=0)
     normal_cos: float = param(
         float(np.cos(np.radians(22))),
         "cosine",
-        "with a plane's direction: 22 degrees",
+        "Minimum cosine between a face's normal and its plane's: 22 degrees",
         source="TSDF normals of noisy scans scatter",
     )
-    yaw_bins: int = param(360, "count", "of a full turn", ge=36)
-    offset_bin_m: float = param(0.005, "m", "of offsets that are counted together", gt=0)
-    thickness_m: float = param(0.025, "m", "points this near a plane belong to it")
-    bridge_m: float = param(0.10, "m", "holes a thing in front leaves in a run")
-    adjoins_m: float = param(
-        0.04, "m", "of a gap in a plane, beyond which what lies on it is something else, where it was not one"
-    )
-    vertical_cos: float = param(0.3, "cosine", "with up, of faces that may be part of a vertical plane")
+    yaw_bins: int = param(360, "count", "Number of yaw bins in a full turn", ge=36)
+    offset_bin_m: float = param(0.005, "m", "Bin size of the offset histogram", gt=0)
+    thickness_m: float = param(0.025, "m", "Maximum distance from a plane of points that belong to it")
+    bridge_m: float = param(0.10, "m", "Maximum width of holes, left by occluders, that are bridged in a run")
+    adjoins_m: float = param(0.04, "m", "Maximum gap across which adjoining surface on the fitted plane joins a region")
+    vertical_cos: float = param(0.3, "cosine", "Maximum absolute cosine between a normal and up for a face of a vertical plane")
     smooth_bins: tuple[float, float] = param(
-        (3.0, 2.0), "count", "of bins of yaw, and of offset, that histograms are smoothed by"
+        (3.0, 2.0), "count", "Standard deviation, in bins, of the smoothing of the yaw and offset histograms"
     )
-    yaw_share: float = param(0.02, "share", "of the strongest yaw, for another one")
-    scatter_deg: float = param(6.0, "deg", "off a peak of yaw, from where a face counts half in its mean", gt=0)
-    yaws: int = param(12, "count", "that planes are looked for in", ge=1)
-    apart_m: float = param(0.03, "m", "between parallel planes")
-    peak_m2: float = param(0.004, "m²", "at one offset, for a plane")
-    fit_m: float = param(0.004, "m", "off a plane, from where a face counts half in its fit")
-    fit_deg: float = param(12.0, "deg", "from its peak, that a fit may turn: a narrow sliver does not tell its yaw")
-    face_bin_m: float = param(0.0025, "m", "of offsets that are counted together for one face", gt=0)
-    face_line_m: float = param(0.1, "m", "of a row or column that a face goes through", gt=0)
+    yaw_share: float = param(0.02, "share", "Minimum area at a yaw peak as a fraction of the strongest peak's")
+    scatter_deg: float = param(6.0, "deg", "Angle from a yaw peak at which a face's weight in its mean halves", gt=0)
+    yaws: int = param(12, "count", "Maximum number of yaws searched", ge=1)
+    apart_m: float = param(0.03, "m", "Minimum distance between parallel planes")
+    peak_m2: float = param(0.004, "m²", "Minimum smoothed area in an offset bin for a plane")
+    fit_m: float = param(0.004, "m", "Distance from a plane at which a face's weight in its fit halves")
+    fit_deg: float = param(
+        12.0, "deg", "Maximum rotation of a fit from its yaw peak: a narrow sliver does not determine its yaw"
+    )
+    face_bin_m: float = param(0.0025, "m", "Bin size of offsets in the search for the outermost face", gt=0)
+    face_line_m: float = param(0.1, "m", "Width of the rows and columns in that search", gt=0)
     face_share: float = param(
-        0.01, "share", "of a row's or column's area that is at a face's offset, in a bin, for it to go through"
+        0.01, "share", "Minimum fraction of a row's or column's area in a face's offset bin for the face to go through it"
     )
-    face_through: float = param(0.8, "share", "of rows, and of columns, that a face goes through", gt=0, le=1)
-    left_m: float = param(0.015, "m", "off a plane, within which a face is that plane's: what is left is looked at once more")
-    beside_m: float = param(0.02, "m", "from the seen part, within which it is")
-    twin_deg: float = param(25.0, "deg", "between planes that may be one: neighbouring yaws find the same run")
-    twin_share: float = param(0.6, "share", "of a plane that a larger one has, from where it is the same")
+    face_through: float = param(
+        0.8, "share", "Minimum fraction of rows, and of columns, that a face must go through", gt=0, le=1
+    )
+    left_m: float = param(
+        0.015, "m", "Maximum distance from a plane of faces that belong to it: the others are searched once more"
+    )
+    beside_m: float = param(0.02, "m", "Maximum distance, in the plane, from the observed part of faces that belong to it")
+    twin_deg: float = param(25.0, "deg", "Maximum angle between duplicate planes: neighbouring yaws find the same run")
+    twin_share: float = param(0.6, "share", "Minimum fraction of a plane covered by a larger one for it to be a duplicate")
     sunk_m: float = param(
-        0.035, "m", "behind a plane, of the panel of a frame", gt=0, source="boards of 16-22 mm with 10 mm of panel behind"
+        0.035,
+        "m",
+        "Maximum distance of a panel behind its frame's plane",
+        gt=0,
+        source="boards of 16-22 mm with 10 mm of panel behind",
     )
     rim_m: tuple[float, float] = param(
         (0.02, 0.045),
         "m",
-        "around a panel, from where and up to where its frame is asked for: depth blurs, stiles are 5 cm wide and more",
+        "Inner and outer distance from a panel of the rim tested for its frame: depth blurs, stiles are 5 cm wide and more",
     )
-    rim_share: float = param(0.85, "share", "of that rim, and of each side of it, that is in the frame's plane", gt=0, le=1)
-    grazing_cos: float = param(0.15, "cosine", "of a ray with a plane, at least, for it to meet it")
+    rim_share: float = param(0.85, "share", "Minimum fraction of that rim, on each side, in the frame's plane", gt=0, le=1)
+    grazing_cos: float = param(0.15, "cosine", "Minimum cosine between a ray and a plane's inward normal for an intersection")
     large_m: float = param(
-        0.01, "m", "by which a plane may lie farther from a click for each square metre: noise must prefer no sliver"
+        0.01, "m", "Reduction of a plane's distance from a click per square metre: noise must prefer no sliver"
     )
-    smallest_m2: float = param(0.015, "m²", "of a plane", source="the keypad of a microwave whose glass gives no depth")
+    smallest_m2: float = param(
+        0.015, "m²", "Minimum area of a plane", source="the keypad of a microwave whose glass gives no depth"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneRegion:
-    """One connected flat vertical part of the scan; `world_from_plane` is a `front` frame at its middle."""
+    """One connected flat vertical part of the scan; `world_from_plane` is a `front` frame at its centre."""
 
     world_from_plane: Rigid3
     width_m: float
@@ -78,9 +88,7 @@ class PlaneRegion:
     support: np.ndarray  # bool, row 0 at the top, cells of `cell_m`
     cell_m: float
     area_m2: float
-    _grown: dict[float, np.ndarray] = field(
-        default_factory=dict, init=False, repr=False
-    )  # by reach: clicks ask for the same few
+    _grown: dict[float, np.ndarray] = field(default_factory=dict, init=False, repr=False)  # by reach: clicks use the same few
 
     @property
     def outward(self) -> Vector3:
@@ -89,14 +97,14 @@ class PlaneRegion:
 
     @property
     def points(self) -> Points:
-        """World points (n, 3) of the cells that were seen."""
+        """World points (n, 3) of the observed cells."""
         row, column = np.nonzero(self.support)
         x = (column + 0.5) * self.cell_m - self.width_m / 2
         z = self.height_m / 2 - (row + 0.5) * self.cell_m
         return self.world_from_plane.apply(np.stack([x, np.zeros(len(x)), z], axis=1))
 
     def supports(self, points_world: Points, reach_m: float) -> np.ndarray:
-        """Which points (n, 3) lie within `reach_m` of the seen part, measured in the plane."""
+        """Mask of the points (n, 3) within `reach_m` of the observed part, measured in the plane."""
         local = self.world_from_plane.inverse.apply(points_world)
         margin = int(np.ceil(reach_m / self.cell_m)) + 1
         grown = self._grown.get(reach_m)
@@ -119,7 +127,7 @@ def find_planes(surface: SceneSurface, camera_centres_world: Points) -> tuple[Pl
     if len(centres) < 50:
         return ()
     regions = _regions(centres, normals, areas)
-    # A small plane a few centimetres off a large one shares its peak and is cut off: look once more at what is left.
+    # A small plane a few centimetres off a large one shares its peak and is cut off: search the remaining faces once more.
     rest = np.ones(len(centres), bool)
     for region in regions:
         off = np.abs((centres - region.world_from_plane.translation) @ region.outward)
@@ -150,7 +158,7 @@ def _regions(centres: Points, normals: Points, areas: np.ndarray) -> list[PlaneR
 
 
 def _regrown(region: PlaneRegion, centres: Points, normals: Points, areas: np.ndarray) -> PlaneRegion:
-    """A region with what adjoins it on its plane as fitted: half a bin of yaw is more than a plane is thick over a long run."""
+    """Region extended by adjoining surface on its fitted plane: over a long run, half a yaw bin exceeds its thickness."""
     params, seen = tuned(Params), region.points
     off = np.abs((centres - region.world_from_plane.translation) @ region.outward)
     near = np.flatnonzero((off < params.thickness_m) & (normals @ region.outward > params.normal_cos))
@@ -164,16 +172,16 @@ def _regrown(region: PlaneRegion, centres: Points, normals: Points, areas: np.nd
 
 
 def region_at(regions: tuple[PlaneRegion, ...], point_world: Vector3, reach_m: float = 0.06) -> PlaneRegion | None:
-    """The region that a world point lies on; of several, the nearest plane, larger ones first by a small margin."""
+    """Region that a world point lies on; of several, the nearest plane, larger ones first by a small margin."""
     return next(iter(regions_at(regions, point_world, reach_m)), None)
 
 
 def regions_at(
     regions: tuple[PlaneRegion, ...], point_world: Vector3, reach_m: float = 0.06, beside_m: float | None = None
 ) -> list[PlaneRegion]:
-    """The regions that a world point may lie on, the likeliest first.
+    """Regions that a world point may lie on, the likeliest first.
 
-    It lies within `reach_m` of the plane, and within `beside_m` (as much, where not given) of what was seen of it.
+    The point lies within `reach_m` of the plane, and within `beside_m` (by default as much) of its observed part.
     """
     beside_m = reach_m if beside_m is None else beside_m
     found: list[tuple[float, PlaneRegion]] = []
@@ -189,9 +197,9 @@ def regions_at(
 def region_along(
     regions: tuple[PlaneRegion, ...], origin_world: Vector3, ray_world: Vector3, farthest_m: float, reach_m: float
 ) -> tuple[PlaneRegion, Vector3] | None:
-    """The region whose plane a ray meets nearest to the region's seen part, and where: for surfaces without depth.
+    """Region whose plane a ray meets nearest to the region's observed part, and the intersection: for surfaces without depth.
 
-    `farthest_m` bounds the distance along the ray, `reach_m` how far from the seen part it may pass.
+    `farthest_m` bounds the distance along the ray, `reach_m` that from the observed part.
     """
     best: tuple[float, PlaneRegion, Vector3] | None = None
     for region in regions:
@@ -222,7 +230,7 @@ def _vertical_faces(surface: SceneSurface) -> tuple[Points, Points, np.ndarray]:
 
 
 def _dominant_yaws(normals: Points, areas: np.ndarray) -> list[float]:
-    """Peaks of the area histogram over yaw, each as the mean of the faces about it."""
+    """Peaks of the area histogram over yaw, each as the mean of the faces around it."""
     params = tuned(Params)
     yaw = np.arctan2(normals[:, 1], normals[:, 0]) % (2 * np.pi)
     bins = np.bincount((yaw / (2 * np.pi) * params.yaw_bins).astype(int) % params.yaw_bins, areas, params.yaw_bins)
@@ -234,7 +242,7 @@ def _dominant_yaws(normals: Points, areas: np.ndarray) -> list[float]:
 
 
 def _mean_yaw(yaw: float, yaws: np.ndarray, areas: np.ndarray) -> float:
-    """The mean yaw of the faces about a peak, by Welsch weights: half a degree smears planes 2 cm apart into one."""
+    """Mean yaw of the faces around a peak, with Welsch weights: half a degree smears planes 2 cm apart into one."""
     width = np.radians(tuned(Params).scatter_deg)
     for _ in range(4):
         off = (yaws - yaw + np.pi) % (2 * np.pi) - np.pi
@@ -244,7 +252,7 @@ def _mean_yaw(yaw: float, yaws: np.ndarray, areas: np.ndarray) -> float:
 
 
 def _peaks(offsets: np.ndarray, areas: np.ndarray) -> list[float]:
-    """Offsets along a normal where area piles up, far enough apart."""
+    """Offsets along a normal at which area accumulates, far enough from each other."""
     params = tuned(Params)
     if len(offsets) == 0:
         return []
@@ -258,7 +266,7 @@ def _peaks(offsets: np.ndarray, areas: np.ndarray) -> list[float]:
 
 
 def _split(centres: Points, areas: np.ndarray, outward: Vector3, offset: float, bridge_m: float) -> list[PlaneRegion]:
-    """Connected parts of one plane, holes so wide bridged."""
+    """Connected parts of one plane, with holes up to `bridge_m` bridged."""
     params = tuned(Params)
     rotation = front_rotation(outward)
     u, z = centres @ rotation[:, 0], centres[:, 2]
@@ -299,8 +307,8 @@ def _region(centres: Points, areas: np.ndarray, outward: Vector3, offset: float)
 def _fit(centres: Points, areas: np.ndarray, outward: Vector3, offset: float) -> tuple[Vector3, Vector3]:
     """M-estimate in plan, with Welsch weights: a vertical plane's normal and a point on it.
 
-    Begun at the mean of all that is near, it would lie between a face frame and its panels, or tilt between a run and what
-    stands 2 cm before a part of it.
+    Started at the mean of all nearby faces, it would lie between a face frame and its panels, or tilt between a run and surface
+    2 cm in front of a part of it.
     """
     params, plan = tuned(Params), centres[:, :2]
     normal, off = outward[:2], centres @ outward - _outer_face(centres, areas, outward, offset)
@@ -317,10 +325,10 @@ def _fit(centres: Points, areas: np.ndarray, outward: Vector3, offset: float) ->
 
 
 def _outer_face(centres: Points, areas: np.ndarray, outward: Vector3, offset: float) -> float:
-    """The offset of the outermost of the parallel faces near a plane that go through most of its rows and columns.
+    """Offset of the outermost of the parallel faces near a plane that go through most of its rows and columns.
 
-    Stiles and rails of a frame do; a worktop's edge is in few rows, a refrigerator in few columns. Of faces that lie beside
-    each other, the largest counts.
+    Stiles and rails of a frame do; a worktop's edge is in few rows, a refrigerator in few columns. Of adjacent faces, the
+    largest counts.
     """
     params = tuned(Params)
     off = centres @ outward - offset
@@ -346,7 +354,7 @@ def _faces_cameras(region: PlaneRegion, camera_centres_world: Points) -> bool:
 
 
 def _without_twins(regions: list[PlaneRegion]) -> list[PlaneRegion]:
-    """Drop regions that a larger one already covers (neighbouring yaw peaks find the same run)."""
+    """Regions without those that a larger one already covers (neighbouring yaw peaks find the same run)."""
     params = tuned(Params)
     kept: list[PlaneRegion] = []
     for region in regions:
@@ -364,7 +372,7 @@ def _without_twins(regions: list[PlaneRegion]) -> list[PlaneRegion]:
 
 
 def _with_panels(regions: list[PlaneRegion]) -> list[PlaneRegion]:
-    """The regions, those that are a panel sunk in a frame made a part of the frame's: a click on either means the front."""
+    """Regions with the panels sunk in a frame merged into the frame's region: a click on either selects the front."""
     found = list(regions)
     for panel in reversed(regions):  # small ones first
         frame = next((other for other in found if other is not panel and _is_sunk_in(panel, other)), None)
@@ -374,7 +382,7 @@ def _with_panels(regions: list[PlaneRegion]) -> list[PlaneRegion]:
 
 
 def _is_sunk_in(panel: PlaneRegion, frame: PlaneRegion) -> bool:
-    """Whether most of a region lies a little behind another one that goes on at all four sides of each of its parts."""
+    """Whether most of a region lies a little behind another one that continues at all four sides of each of its parts."""
     params = tuned(Params)
     points, alone = panel.points, panel.support.astype(np.uint8)
     behind = frame.world_from_plane.inverse.apply(points)[:, 1]
@@ -394,7 +402,7 @@ def _is_sunk_in(panel: PlaneRegion, frame: PlaneRegion) -> bool:
 
 
 def _is_framed(part: np.ndarray, box: tuple[slice, slice], margin: int, panel: PlaneRegion, frame: PlaneRegion) -> bool:
-    """Whether a frame's plane was seen at all four sides of a part of a panel: `part` (bool) is padded by `margin` cells."""
+    """Whether the frame's plane was observed on all four sides of a panel's part (`part` is padded by `margin` cells)."""
     params = tuned(Params)
     area = cv2.morphologyEx(part.astype(np.uint8), cv2.MORPH_CLOSE, _disk(margin))
     near, far = (cv2.dilate(area, _disk(reach / panel.cell_m)) for reach in params.rim_m)
@@ -408,7 +416,7 @@ def _is_framed(part: np.ndarray, box: tuple[slice, slice], margin: int, panel: P
 
 
 def _filled(region: PlaneRegion, panel: PlaneRegion) -> PlaneRegion:
-    """A region that was seen where a panel was, too."""
+    """Region whose support includes that of a panel."""
     local, support = region.world_from_plane.inverse.apply(panel.points), region.support.copy()
     row = ((region.height_m / 2 - local[:, 2]) / region.cell_m).astype(int).clip(0, support.shape[0] - 1)
     column = ((local[:, 0] + region.width_m / 2) / region.cell_m).astype(int).clip(0, support.shape[1] - 1)

@@ -1,4 +1,4 @@
-"""What the finders ask of a session: a prepared capture, its planes, its runs, and what other clicks found."""
+"""Interface of a session to the finders: a prepared capture, its planes, its runs, and the objects of other clicks."""
 
 from typing import NamedTuple, Protocol
 
@@ -19,14 +19,14 @@ class Hits(NamedTuple):
 
 
 class PreparedCapture(Protocol):
-    """A prepared capture: its planes, their furniture runs, and what was found on them."""
+    """A prepared capture: its planes, their furniture runs, and the objects found on them."""
 
     scene: Scene
     planes: tuple[PlaneRegion, ...]
     config: SegmentConfig
 
     def find(self, prompt: ObjectPrompt) -> Found:
-        """What the clicks mean; raises ObjectNotSeen, PromptError."""
+        """Object under the clicks; raises ObjectNotSeen, PromptError."""
 
     def run_of(self, region: PlaneRegion, margin_m: float = 0.0) -> Run | None:
-        """The furniture run on a plane, and this far around it."""
+        """Furniture run on a plane with a margin."""

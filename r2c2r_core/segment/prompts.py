@@ -1,4 +1,4 @@
-"""prompts.json, and what must hold before anything is computed from clicks."""
+"""Reading of prompts.json, and checks of prompts before any computation."""
 
 import re
 from dataclasses import replace
@@ -20,17 +20,17 @@ _HINT = "see `r2c2r sample` for one"
 
 
 def read_prompts(path: Path) -> Prompts:
-    """prompts.json, strictly (`r2c2r schema prompts` describes it): what is wrong is refused in one line."""
+    """Prompts from prompts.json, strictly (`r2c2r schema prompts` describes it): errors are reported in one line."""
     return parse_prompts(read_json(path, PromptError, hint=_HINT), str(path))
 
 
 def parse_prompts(document: Any, where: str = "prompts") -> Prompts:
-    """The same, from a decoded JSON document that `where` names."""
+    """Prompts from a decoded JSON document that `where` names."""
     return checked_prompts(document, where).prompts()
 
 
 def checked_prompts(document: Any, where: str = "prompts") -> PromptsFile:
-    """The same as it is written: nothing is unpacked."""
+    """Validated document in its file form, with nothing unpacked."""
     return checked(PromptsFile, document, where, PromptError, hint=_HINT)
 
 
@@ -101,7 +101,7 @@ def check_mask_size(where: str, mask: PackedMask | PromptsFileMask, frame_px: tu
 
 
 def without_hinge(prompt: ObjectPrompt) -> ObjectPrompt:
-    """What masks depend on: a hinge moves none, and turned around it computes none anew."""
+    """Prompt without its hinge, which no mask depends on: turning it must not recompute any."""
     return prompt if prompt.front is None else replace(prompt, front=replace(prompt.front, hinge=None))
 
 
@@ -109,7 +109,7 @@ def _check_names(objects: tuple[ObjectPrompt, ...]) -> None:
     seen: set[str] = set()
     for prompt in objects:
         _check_name(prompt.name)
-        if fault := name_fault(prompt.name):  # clicks on it are drawn all the same: it may have been named long ago
+        if fault := name_fault(prompt.name):  # clicks on it are drawn all the same: it may have been named before this check
             raise PromptError(
                 f"name '{prompt.name}' found, which {fault}", hint=f"rename it, such as {identifier(prompt.name)}"
             )

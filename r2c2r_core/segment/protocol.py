@@ -23,7 +23,7 @@ Fusion = Literal["none", "depth-mask", "evidence"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentConfig:
-    """Lengths in metres, so that they hold for any camera."""
+    """Settings of segmentation. Lengths are in metres, so that they hold for any camera."""
 
     cell_m: float = setting(0.0025, "side of the mosaic's cells, in m: about a pixel of a phone at 2 m", ge=0.0005, le=0.1)
     # more add smear, not evidence (real kitchen: 24 and 48 cut alike)
@@ -41,51 +41,51 @@ Glimpse = tuple[int, PackedMask, float]
 
 
 class SegmentSession(Protocol):
-    """A capture made ready for clicks. The track of one object depends on another's prompt by `ObjectPrompt.others` alone."""
+    """A capture prepared for clicks. The track of one object depends on another's prompt only through `ObjectPrompt.others`."""
 
     def disputed(self, prompts: Sequence[ObjectPrompt]) -> dict[str, tuple[PromptPoint, ...]]:
-        """By object, the clicks on other objects that fall on what its own clicks mean; objects without any are left out."""
+        """Clicks of other objects that hit an object, by its name; objects without any are left out."""
 
     def mask_at(self, prompt: ObjectPrompt, frame_index: int) -> Mask:
-        """The object's mask in one frame, at RGB resolution; empty when that frame does not show it."""
+        """Mask of the object in one frame, at RGB resolution; empty when that frame does not show it."""
 
     def glimpse(self, prompt: ObjectPrompt) -> Glimpse | None:
-        """A first, perhaps coarser, mask in the frame clicked last, while another thread may be streaming.
+        """Preview mask, perhaps coarser, in the frame clicked last, while another thread may be streaming.
 
-        None when `stream` brings its first mask as soon, or that frame does not show the object.
+        None when `stream` yields its first mask as soon, or that frame does not show the object.
         """
 
     def prepare(self, *, progress: Progress = SILENT) -> None:
-        """Compute and keep in the cache what a click anywhere may need: for whoever will wait at every click."""
+        """Compute and cache everything that a click may need, so that clicks do not wait."""
 
     def prefetch(self) -> Iterator[None]:
-        """Load what clicks will need, bit by bit, as far as memory allows; for while nobody waits."""
+        """Load the data that clicks will need, bit by bit, as far as memory allows; for idle time."""
 
     def track(self, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
-        """The object in every frame that sees it, and what was measured; raises ObjectNotSeen."""
+        """Mask track of the object over all frames that see it, with its measurements; raises ObjectNotSeen."""
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[Glimpse]:
         """Frame, mask and confidence: the frame clicked last, then outwards both ways; only frames that see the object."""
 
     def elevations(self) -> Iterator[Elevation]:
-        """The planes of the capture as a person draws fronts on them."""
+        """Elevations of the capture's planes, on which a person draws fronts."""
 
     def panel(self, prompt: ObjectPrompt) -> FrontPanel | None:
-        """The flat front of an object that was streamed; None where it has none, or it is not measured yet."""
+        """Flat front of a streamed object; None where it has none, or is not measured yet."""
 
     def thing_box(self, prompt: ObjectPrompt) -> ThingBox | None:
-        """The box of a free-standing thing that was streamed; None for what is none, or is not measured yet."""
+        """Box of a streamed free-standing object; None for other objects, or where it is not measured yet."""
 
     def motions(self, prompt: ObjectPrompt) -> tuple[JointMotion, ...]:
-        """How the leaves of an object that was streamed were filmed to move; none where that is not measured yet."""
+        """Joint motions of the leaves of a streamed object; none where they are not measured yet."""
 
     def propose(self) -> Iterator[tuple[float, tuple[Proposal, ...]]]:
-        """Objects to confirm, surest first, found so far with the share of the work done; the last step has them all."""
+        """Proposals so far, the most confident first, with the fraction of the work done; the last step has them all."""
 
 
 class Segmenter(Protocol):
-    """A backend; one names this class as its base, so that the type checker compares them."""
+    """A backend; each names this class as its base, so that the type checker compares them."""
 
     @abstractmethod
     def open(self, capture: Capture, cache: Path, config: SegmentConfig, *, progress: Progress = SILENT) -> SegmentSession:
-        """Prepare a capture; heavy results are kept in `cache` and found again there."""
+        """Prepare a capture; heavy results are stored in `cache` and reused."""

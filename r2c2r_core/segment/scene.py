@@ -28,26 +28,32 @@ _IMAGE_CACHE_BYTES = 500_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What sensors mistrust beside a step of the depth, and what lies in a hole of it."""
+    """Tuned parameters of depth at steps and in holes."""
 
     step_px: float = param(
         6.0,
         "px",
-        "of the depth image to the nearest that has depth: farther off is what returns no light",
+        "Maximum distance to a pixel with depth beside a step: farther off is surface that returns no light",
         gt=0,
         source="phones drop 2-5 pixels at either side of a step",
     )
-    step_m: float = param(0.08, "m", "between the depths of its two sides", gt=0, source="handles stand out by up to 5 cm")
-    level_m: float = param(0.02, "m", "off a level surface, within which what is round a hole in the depth is on it", gt=0)
-    level_share: float = param(
-        0.5, "share", "of what is round such a hole, above which that is in a level surface, such as a glass hob's worktop"
+    step_m: float = param(
+        0.08, "m", "Minimum difference between the depths of a step's sides", gt=0, source="handles protrude by up to 5 cm"
     )
-    asked_frames: int = param(24, "count", "of frames, spread over the recording, that may have looked through a hole", ge=1)
+    level_m: float = param(0.02, "m", "Maximum distance from a level surface of depth around a hole that lies on it", gt=0)
+    level_share: float = param(
+        0.5,
+        "share",
+        "Minimum fraction of a hole's rim in a level surface, such as a glass hob's worktop, for the hole to lie in it",
+    )
+    asked_frames: int = param(
+        24, "count", "Maximum number of frames, spread over the recording, tested for seeing through a hole", ge=1
+    )
 
 
 @dataclass(slots=True, eq=False)
 class Scene:
-    """Images, sensor depth and rendered surface depth by frame number. Everything it returns is shared: do not write to it."""
+    """Images, sensor depth and rendered surface depth by frame number. All returned arrays are shared: do not write to them."""
 
     capture: Capture
     rendered_mm: dict[int, np.ndarray]  # uint16 millimetres, 0 = nothing
@@ -60,7 +66,7 @@ class Scene:
 
     @property
     def noise(self) -> DepthNoise:
-        """How much the recording's depth errs."""
+        """Depth noise model of the recording."""
         return self.capture.depth_noise
 
     @property
@@ -74,7 +80,7 @@ class Scene:
         return self.capture.frames
 
     def frame(self, frame_index: int) -> Frame:
-        """The frame with that number."""
+        """Frame with a given index."""
         if not self._frames:
             self._frames = {frame.index: frame for frame in self.capture.frames}
         return self._frames[frame_index]
@@ -86,7 +92,7 @@ class Scene:
         return np.asarray(self._camera_from_world @ np.append(point_world, 1.0))
 
     def rgb(self, frame_index: int) -> Image:
-        """The colour image; the latest few hundred megabytes stay in memory."""
+        """Colour image; the most recent few hundred megabytes stay in memory."""
         return self._rgb.get(frame_index, self.capture.images.rgb)
 
     def depth(self, frame_index: int) -> DepthMetres:
@@ -104,20 +110,20 @@ class Scene:
             yield
 
     def surface_depth(self, frame_index: int, size: tuple[int, int]) -> DepthMetres:
-        """Depth of the fused surface seen from a frame, at (width, height); 0 where the scan has nothing."""
+        """Depth of the fused surface seen from a frame, at (width, height); 0 where the scan has no surface."""
         rendered = self.rendered_mm[frame_index]
         if (rendered.shape[1], rendered.shape[0]) != size:
             rendered = cv2.resize(rendered, size, interpolation=cv2.INTER_NEAREST)
         return rendered.astype(np.float32) / 1000
 
     def filled_depth(self, frame_index: int) -> DepthMetres:
-        """Sensor depth, and the fused surface where the sensor has none; 0 where neither knows."""
+        """Sensor depth, filled with the fused surface where the sensor has none; 0 where both lack it."""
         return self._filled.get(frame_index, self._fill_depth)
 
     def pick(self, frame_index: int, x_px: float, y_px: float) -> Vector3 | None:
         """World point under a pixel of the colour image; None where nothing is known.
 
-        Sensor depth; in a hole of it the level surface round it (a glass hob), else the fused surface.
+        Sensor depth; in a hole of it the surrounding level surface (a glass hob), else the fused surface.
         """
         frame = self.frame(frame_index)
         depth = self._depth_near(frame_index, x_px, y_px)
@@ -138,9 +144,9 @@ class Scene:
         return bool((depth[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] > 0).any())
 
     def depth_at_step(self, frame_index: int, x_px: float, y_px: float) -> float | None:
-        """Depth at a pixel of the colour image that the sensor mistrusts beside a step: that of the nearer side; else None.
+        """Depth of the nearer side at a pixel of the colour image without depth beside a step; None elsewhere.
 
-        The surface fused from other frames ends short of such edges.
+        Sensors drop pixels beside a step, and the surface fused from other frames ends short of such edges.
         """
         params, depth, camera = tuned(Params), self.depth(frame_index), self.frame(frame_index).rgb_camera
         x, y = x_px * depth.shape[1] / camera.width, y_px * depth.shape[0] / camera.height
@@ -178,10 +184,10 @@ class Scene:
         return level if fused is None or (level is not None and level < fused) else fused
 
     def _level_depth(self, frame_index: int, x_px: float, y_px: float) -> float | None:
-        """Depth at a pixel without any of the level surface that most of the hole's rim lies in, on all sides of the pixel.
+        """Depth, at a pixel without any, of the level surface that contains most of the hole's rim, on all sides of the pixel.
 
-        None where there is no such surface, or other frames look through it. Through a glass hob, which returns no light
-        to any frame, the fused surface shows what is behind the worktop.
+        None where there is no such surface, or where other frames look through it. No frame has depth on a glass hob, and the
+        fused surface shows the space below the worktop through it.
         """
         params, frame = tuned(Params), self.frame(frame_index)
         rim = find_rim(frame, self.depth(frame_index), x_px, y_px)
@@ -200,7 +206,7 @@ class Scene:
         return None if self._seen_through(place) else float(depth)
 
     def _seen_through(self, point_world: Vector3) -> bool:
-        """Whether most frames that measured anything at or behind a world point measured it behind."""
+        """Whether most frames that measured depth at or behind a world point measured it behind."""
         margin_m, before = tuned(Params).step_m, self.seen_from_all(point_world)[:, 2] > 0
         ahead = [frame for frame, is_before in zip(self.frames, before, strict=True) if is_before]
         chosen = np.linspace(0, len(ahead) - 1, min(len(ahead), tuned(Params).asked_frames)).round().astype(int)
@@ -213,7 +219,7 @@ class Scene:
 
 
 def _value_near(depth_m: DepthMetres, camera: Intrinsics, x_px: float, y_px: float) -> float | None:
-    """Depth at a pixel of the colour image, else the median of those next to it; None where none of them is known."""
+    """Depth at a pixel of the colour image, else the median of its neighbours; None where none of them is known."""
     height, width = depth_m.shape
     column = min(int(x_px * width / camera.width), width - 1)
     row = min(int(y_px * height / camera.height), height - 1)
@@ -224,7 +230,7 @@ def _value_near(depth_m: DepthMetres, camera: Intrinsics, x_px: float, y_px: flo
 
 
 def prepare_scene(capture: Capture, cache: Path, *, progress: Progress = SILENT) -> Scene:
-    """Draw the fused surface into every frame, or take it from `cache`."""
+    """Scene with the fused surface rendered into every frame, or loaded from `cache`."""
     path = cache / "surface_depth.npz"
     indices = np.array([frame.index for frame in capture.frames])
     parts = parts_of(capture.surface)
@@ -246,7 +252,7 @@ def prepare_scene(capture: Capture, cache: Path, *, progress: Progress = SILENT)
 
 
 class _Recent(Generic[T]):
-    """The latest arrays by frame number, up to a number of bytes. Safe to share between threads."""
+    """Most recent arrays by frame number, up to a number of bytes. Thread-safe."""
 
     def __init__(self, most_bytes: int) -> None:
         self._most_bytes, self._bytes = most_bytes, 0

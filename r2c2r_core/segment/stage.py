@@ -63,7 +63,7 @@ def open_session(
     *,
     progress: Progress = SILENT,
 ) -> SegmentSession:
-    """A capture made ready for clicks; heavy results live in `cache`."""
+    """Session of a capture prepared for clicks; heavy results live in `cache`."""
     config = config or SegmentConfig()
     return SEGMENTERS.load(segmenter, weights=config.weights).open(capture, cache, config, progress=progress)
 
@@ -71,10 +71,10 @@ def open_session(
 def find_disputed(
     session: SegmentSession, prompts: Sequence[ObjectPrompt], *, progress: Progress = SILENT
 ) -> dict[str, tuple[PromptPoint, ...]]:
-    """By object, the clicks on other objects that fall on it: between two names there is a seam."""
+    """Clicks of other objects that hit an object, by its name: between two names there is a seam."""
     return session.disputed([as_found(prompt) for prompt in prompts])
 
 
 def track_object(session: SegmentSession, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
-    """The object in every frame that sees it, as a person set it right; raises ObjectNotSeen, PromptError."""
+    """Mask track of the object over all frames that see it, with a person's corrections; raises ObjectNotSeen, PromptError."""
     return corrected_track(session.track(as_found(prompt), progress=progress), prompt.frames)

@@ -1,4 +1,4 @@
-"""Spatial index of the fused surface: triangles near a point, and the depth image that each frame would have of it."""
+"""Spatial index of the fused surface: triangles near a point, and its depth image from each frame."""
 
 from dataclasses import dataclass
 
@@ -16,36 +16,36 @@ _NONE = np.zeros(0, np.int64)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How coarse the surface is drawn."""
+    """Tuned parameters of the rendered surface."""
 
-    width_px: int = param(256, "px", "of the drawn surface: the occluders that sensors miss are broad", ge=16)
+    width_px: int = param(256, "px", "Width of the rendered depth image: the occluders that sensors miss are broad", ge=16)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceParts:
-    """A surface cut into parts, each with a ball around it, so that a frame draws only those it may see."""
+    """A surface cut into parts, each with a bounding sphere, so that a frame draws only those it may see."""
 
     vertices: Points  # float32
     faces: Faces  # sorted by part
-    numbers: np.ndarray  # of each of them in the surface
-    starts: np.ndarray  # of each part in `faces`, and the end
+    numbers: np.ndarray  # index in the surface of each of these faces
+    starts: np.ndarray  # start of each part in `faces`, and the end
     centres: Points
     radii_m: np.ndarray
-    # By a face's number in the surface:
-    upward: np.ndarray  # cosine between its own normal and up
+    # By face index in the surface:
+    upward: np.ndarray  # cosine between the face's own normal and up
     middles: Points
     normals: Points  # smoothed
     areas_m2: np.ndarray
 
     def faces_near(self, point_world: Vector3, reach_m: float, *, any_height: bool = False) -> np.ndarray:
-        """Numbers, in order, of the surface's faces that may have a corner within reach; farther ones may be among them."""
+        """Sorted indices of the surface's faces that may have a corner within reach; farther ones may be included."""
         away = (self.centres - point_world)[:, : 2 if any_height else 3]
         near = np.flatnonzero(np.linalg.norm(away, axis=1) < reach_m + self.radii_m)
         return np.sort(np.concatenate([self.numbers[self.starts[i] : self.starts[i + 1]] for i in near] or [_NONE]))
 
 
 def parts_of(surface: SceneSurface) -> SurfaceParts:
-    """Cut a surface at a coarse grid."""
+    """Surface cut at a coarse grid."""
     if len(surface.faces) == 0:
         empty = surface.faces.astype(np.int32)
         nothing = np.zeros(0)
@@ -102,7 +102,7 @@ def _upward(corners: np.ndarray) -> np.ndarray:
 
 
 def draw(parts: SurfaceParts, frame: Frame) -> np.ndarray:
-    """Depth of the surface from a frame, uint16 millimetres, 0 where the scan has nothing."""
+    """Depth image of the surface from a frame, uint16 millimetres, 0 where the scan has no surface."""
     width, height = drawn_size(frame.rgb_camera)
     camera = frame.rgb_camera.resized(width, height)
     shown = np.flatnonzero(_may_be_seen(parts, frame))
@@ -115,13 +115,13 @@ def draw(parts: SurfaceParts, frame: Frame) -> np.ndarray:
 
 
 def drawn_size(camera: Intrinsics) -> tuple[int, int]:
-    """Width and height of the drawn surface."""
+    """Width and height of the rendered depth image."""
     params = tuned(Params)
     return params.width_px, max(1, round(params.width_px * camera.height / camera.width))
 
 
 def _may_be_seen(parts: SurfaceParts, frame: Frame) -> np.ndarray:
-    """Which balls reach into the frame's viewing pyramid."""
+    """Mask of the parts whose bounding spheres reach into the frame's viewing frustum."""
     camera = frame.rgb_camera
     local = frame.world_from_camera.inverse.apply(parts.centres)
     sides = np.array(

@@ -1,4 +1,4 @@
-"""View selection: sharp, near frames in which nothing hides a point, spread over directions."""
+"""View selection: sharp, near frames in which a point is unoccluded, spread over directions."""
 
 from dataclasses import dataclass
 
@@ -13,13 +13,13 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which frames show a click."""
+    """Tuned parameters of the view selection."""
 
-    hidden_m: float = param(0.08, "m", "behind the surface that the frame shows, within which a click may lie: handles, glass")
+    hidden_m: float = param(0.08, "m", "Maximum distance of a visible click behind the frame's depth: handles, glass")
 
 
 def best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
-    """Frames in which nothing hides the point, spread over the directions they look from."""
+    """Frames in which the point is unoccluded, spread over viewing directions."""
     params = tuned(Params)
     rated: list[tuple[float, Frame, float]] = []
     for frame, local in zip(scene.frames, scene.seen_from_all(point), strict=True):
