@@ -1,1 +1,1 @@
-"""Fronts: `front` is the method (the panel under the clicks), `units` its size prior, `articulation` its open states."""
+"""Fronts: `front` finds the panel under the clicks, `units` adds a size prior, `clicked_open` maps clicks on open fronts."""

@@ -1,7 +1,7 @@
 """SAM 2, EdgeTAM and SAM 3's tracker via transformers: one object is tracked in both directions from clicks.
 
 No processor is used: those need torchvision, and only resize and normalise. The model's memory of an object is bounded (its
-clicked frames and the latest `_REACH` frames of each direction), so memory use is constant for any video length.
+clicked frames and the latest `reach` frames of each direction), so memory use is constant for any video length.
 """
 
 import importlib
