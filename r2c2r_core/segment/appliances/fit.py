@@ -293,7 +293,7 @@ def _residuals(box: np.ndarray, evidence: Evidence, edges: Sequence[_Edges]) -> 
 
 
 def _possible(box: np.ndarray, start: np.ndarray) -> bool:
-    """Whether the fit kept at least half the rectangle and a positive depth."""
+    """Whether the fit kept at least half the rectangle and a depth of more than 5 cm."""
     width, height = box[RIGHT] - box[LEFT], box[TOP] - box[BOTTOM]
     return bool(width > start[RIGHT] and height > start[TOP] and box[BACK] - box[FRONT] > 0.05 and np.isfinite(box).all())
 

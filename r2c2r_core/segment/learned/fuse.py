@@ -62,7 +62,7 @@ class DepthPictures:
 
     @classmethod
     def over(cls, scene: Scene) -> "DepthPictures":
-        """Range from the 2nd to the 98th percentile of the recording's depth."""
+        """Depth images scaled from the 2nd to the 98th percentile of the recording's depth."""
         step = max(1, len(scene.frames) // 16)
         seen = [depth[depth > 0][::7] for frame in scene.frames[::step] if (depth := scene.depth(frame.index)).any()]
         near, far = np.percentile(np.concatenate(seen), [2, 98]) if seen else (0.0, 1.0)

@@ -48,7 +48,9 @@ class Params:
         "Minimum fraction of a plane that is the object, for a click without depth to select it: not the wall behind",
     )
     same_panel: float = param(
-        0.8, "share", "Minimum IoU of the voted rectangle with the panel cut by lines, whose edges are finer, to replace it"
+        0.8,
+        "share",
+        "Minimum IoU of the voted rectangle with a panel cut by lines for that panel, whose edges are finer, to replace it",
     )
     point_frames: int = param(20, "count", "Maximum number of frames that contribute points", ge=1)
     widest_frames: int = param(7, "count", "Number of largest masks that determine the extent beyond the plane", ge=1)

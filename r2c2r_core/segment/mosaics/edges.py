@@ -398,7 +398,7 @@ def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> 
 
 
 def _half_way(shade: np.ndarray) -> float | None:
-    """Distance before the last, darkest position of half the light beyond, which is uneven; None where that is dark too."""
+    """Distance before the last, darkest position with light half way to the uneven light beyond; None where that is dark."""
     usual = float(np.median(shade[:-3])) if len(shade) > 3 else 0.0
     if usual <= shade[-1] / tuned(Params).least_shade:
         return None

@@ -87,7 +87,7 @@ class Relief:
             _end_scores(*_behind_handles(density, raised, handle, shadow, reach), self.cell_m) for density in (whole, flat)
         )
         flat, _ = _behind_handles(flat, raised, handle, shadow, reach)
-        # The surface continues farther back than the panel of a frame is mostly sunk: a door that slides behind another.
+        # The surface continues farther back than the panel of a frame is mostly sunk: a door that slides in front of another.
         seen = [np.maximum(window, 1e-6) for window in _windows(flat, reach)]
         before, after = (window / n for window, n in zip(_windows(flat * level, reach), seen, strict=True))
         back = np.where(np.minimum(*seen) > 0.4 * _usual(flat), np.abs(after - before), 0)

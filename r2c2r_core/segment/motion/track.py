@@ -42,7 +42,7 @@ class Params:
         3, "count", "Minimum number of frames that must show the closed place vacated, and the leaf elsewhere", ge=1
     )
     free_share: float = param(
-        0.5, "share", "Fraction of readings towards the open leaf's place that must look past it while the leaf is closed"
+        0.5, "share", "Minimum fraction of readings towards the open leaf's place that look past it while the leaf is closed"
     )
     closed_cost: float = param(60.0, "log", "Cost of every open state in a frame that shows the leaf closed")
     gain: float = param(40.0, "log", "Minimum log-likelihood gain of a sequence over a leaf that never moved")

@@ -37,7 +37,7 @@ class Params:
     height_spread: float = param(0.9, "log", "Standard deviation of the logarithm of fronts' heights", gt=0)
     odd_share: float = param(0.05, "share", "Fraction of parts of any size: fillers, end panels, wide fronts", gt=0, lt=1)
     odd_handle: float = param(
-        0.2, "share", "Relative frequency of those among parts with a handle: pull-outs, wide fronts", gt=0, lt=1
+        0.2, "share", "Factor of that fraction among parts with a handle: pull-outs, wide fronts", gt=0, lt=1
     )
     size_weight: float = param(
         0.5, "ratio", "Weight of the size prior: the network has learned part of it from its training data"

@@ -48,8 +48,8 @@ class Crop:
     """Photo crop around a hull at the resolution of outline extraction; masks (h, w) of that size."""
 
     area: tuple[slice, slice]  # rows and columns of the photo
-    camera: Intrinsics  # pixels per metre, at the object
-    scale: float  # pixels a metre, at the thing
+    camera: Intrinsics  # of the crop
+    scale: float  # pixels per metre, at the object
     hull: Mask  # its projection
     hidden: Mask  # where an occluder lies in front of it
 
@@ -235,7 +235,7 @@ def _outline_odds(hull: Mask, band_px: float, attached_px: float) -> np.ndarray:
 
 
 def _held_by(mask: Mask, hull: Mask) -> Mask:
-    """Connected parts of a mask that lie to a substantial part (more than 30 %) on the hull."""
+    """Connected parts of a mask with more than 30 % of their pixels on the hull."""
     count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
     total = np.bincount(labels.ravel(), minlength=count)
     within = np.bincount(labels[hull], minlength=count)

@@ -195,7 +195,7 @@ def _level_cells(scene: Scene, low: np.ndarray, high: np.ndarray, size: float) -
 
 
 def _slab_at(levels: np.ndarray, positives: Points, low: np.ndarray, size: float) -> tuple[np.ndarray, float] | None:
-    """Plan (x, y) of the level part under the clicks, closed under objects on it, and its height; None without one."""
+    """Plan (x, y) of the level part under the clicks, filled under objects on it, and its height; None without one."""
     from scipy import ndimage
 
     params = tuned(Params)

@@ -66,7 +66,7 @@ class Site(NamedTuple):
     """Search area of a body."""
 
     scene: Scene
-    structure: tuple[PlaneRegion, ...]  # walls, whose depth is not the thing's
+    structure: tuple[PlaneRegion, ...]  # walls, whose depth is not the object's
     near: Vector3  # a place on the object, at the height of its support
     reach_m: float  # of the axis, from that place
     radius_m: float  # approximate
