@@ -1,4 +1,4 @@
-"""From a shape to an asset: about a unit cube, with its place where that is known, and its measures."""
+"""Normalisation of shapes into assets: unit size, pose where it is known, and scale-free shape metrics."""
 
 import numpy as np
 
@@ -11,9 +11,10 @@ from r2c2r_core.model.mesh import TexturedMesh
 def centred(
     vertices: Points, source: np.ndarray, faces: Faces, uv: TextureCoords, texture: Image
 ) -> tuple[TexturedMesh, Similarity3]:
-    """The mesh about its middle, its largest side 1, and the similarity that takes it back to where `vertices` are.
+    """The mesh centred with its longest side 1, and the similarity from that frame back to the frame of `vertices`.
 
-    `source` names the vertex behind each skin vertex; they are moved before they are copied, so seams stay exactly shut.
+    `source` gives the original vertex of each skin vertex; vertices are moved before they are copied, so seams stay exactly
+    closed.
     """
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle, longest = (low + high) / 2, float((high - low).max())
@@ -22,13 +23,13 @@ def centred(
 
 
 def unposed(mesh: TexturedMesh, rng: np.random.Generator) -> TexturedMesh:
-    """The mesh in a frame of its own: randomly turned about any axis, centred, its largest side 1 (as TRELLIS returns)."""
+    """The mesh in an arbitrary frame: randomly rotated about any axis, centred, its longest side 1 (as TRELLIS returns)."""
     places, source = np.unique(mesh.vertices, axis=0, return_inverse=True)
     return centred(places @ random_rotation(rng).T, source.reshape(-1), mesh.faces, mesh.uv, mesh.texture)[0]
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:
-    """A rotation drawn evenly from all rotations (a random unit quaternion)."""
+    """A uniformly distributed random rotation (a random unit quaternion)."""
     quat_wxyz = rng.normal(size=4)
     w, x, y, z = quat_wxyz / np.linalg.norm(quat_wxyz)
     return np.array(
@@ -41,7 +42,7 @@ def random_rotation(rng: np.random.Generator) -> np.ndarray:
 
 
 def shape_metrics(vertices: Points, faces: Faces) -> dict[str, float]:
-    """Scale-free measures: sides of the smallest box over its longest, and the share of that box that is filled."""
+    """Scale-free shape metrics: sides of the smallest box over its longest side, and the filled fraction of that box."""
     extents = oriented_extents(vertices)
     longest = max(float(extents[0]), 1e-12)
     return {

@@ -1,4 +1,4 @@
-"""Photographs onto a mesh: each texel is a robust blend of the sharp, frontal, unhidden frames that see it."""
+"""Texture baking: each texel is a robust blend of the sharp, frontal, unoccluded frames that see it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,33 +20,46 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How photographs are blended on a mesh."""
+    """Tuned parameters of texture baking."""
 
-    least_cosine: float = param(0.2, "cosine", "of the angle from which a texel may be seen")
-    grazing_cosine: float = param(0.5, "cosine", "below it a look is grazing, and depth beyond the surface speaks against it")
-    hidden_m: float = param(0.015, "m", "behind the mesh's own surface, from where a texel is hidden")
-    sensor_gap_m: float = param(0.03, "m", "beyond the depth's noise, before the texel, from where something hides it")
-    views_per_side: int = param(9, "count", "frames that paint one side", ge=1)
+    least_cosine: float = param(
+        0.2, "cosine", "Minimum cosine between a texel's normal and the viewing direction for a view to colour it"
+    )
+    grazing_cosine: float = param(
+        0.5, "cosine", "Cosine of the viewing angle below which depth measured beyond the surface rejects the sample"
+    )
+    hidden_m: float = param(
+        0.015, "m", "Minimum distance of a texel behind the mesh's rendered depth for it to count as self-occluded"
+    )
+    sensor_gap_m: float = param(
+        0.03, "m", "Minimum distance, beyond the depth noise, between texel and measured depth for an occlusion"
+    )
+    views_per_side: int = param(9, "count", "Maximum number of frames that texture one side", ge=1)
     power: float = param(
         4.0,
         "ratio",
-        "exponent of a frame's weight cos²·sharpness/z²",
-        source="backends.md 2.6: 4 nearly picks the best frame and still hides seams",
+        "Exponent of a frame's weight cos²·sharpness/z²",
+        source="backends.md 2.6: 4 nearly selects the best frame and still hides seams",
     )
     next_view: float = param(
         0.05,
         "ratio",
-        "of its weight that a flat side's next-best frame keeps",
-        source="poses differ by millimetres, a blend ghosts",
+        "Factor by which the weight of each next-best frame of a flat side is reduced",
+        source="poses differ by millimetres, so an even blend shows ghosting",
     )
     outlier_levels: float = param(
-        40.0, "grey", "from the median of the frames, where a highlight or an occluder's fringe stands", gt=0
+        40.0,
+        "grey",
+        "Scale of the robust weight on a sample's deviation from the frames' median (highlights, occluder fringes)",
+        gt=0,
     )
-    edge_share: float = param(0.006, "share", "of the mask's size: the dark gap and the blurred outline that its edge may hold")
+    edge_share: float = param(
+        0.006, "share", "Mask erosion relative to the mask's size, which removes the dark gap and the blur along its outline"
+    )
 
 
 class Baked(NamedTuple):
-    """A texture, and how much of it was seen."""
+    """A texture and the fraction of it that was observed."""
 
     texture: Image
     seen_fraction: float  # of the covered texels
@@ -60,9 +73,9 @@ def bake(
     views: Sequence[View],
     front_y_m: float | None = None,
 ) -> Baked:
-    """The texture of an atlas whose points are in the local frame; unseen texels get plausible colours.
+    """Texture of an atlas whose points are in the local frame; unobserved texels get plausible colours.
 
-    `front_y_m` is where furniture has its front face: the other sides then go by their own material, or the plain tint.
+    `front_y_m` is the front face of furniture: its other sides are then filled from their own material, or from the plain tint.
     """
     eyes = world_from_local.inverse.apply(np.array([view.eye_world for view in views]))
     wanted = np.ones((len(views), 6), dtype=bool) if front_y_m is None else _best_views(atlas, eyes, views)
@@ -78,26 +91,26 @@ def bake(
 
 
 class _Side(NamedTuple):
-    """What the views that show one chart show of its texels."""
+    """Colour samples and weights of one chart's texels in the views that show it."""
 
-    views: np.ndarray  # (k,) which of them
-    texels: np.ndarray  # (t,) those that a view shows
+    views: np.ndarray  # (k,) indices of the views
+    texels: np.ndarray  # (t,) texels that at least one view shows
     samples: np.ndarray  # (3, k, t) uint8, a channel at a time: numpy is slow along an axis of three
     weights: np.ndarray  # (k, t) float32, 0 where a view does not show the texel
 
 
 class _Photo(NamedTuple):
-    """A view, as far as it does not depend on the texel asked for."""
+    """The parts of a view that do not depend on the texel."""
 
     view: View
     camera_from_local: Rigid3
     mask: Mask  # well inside the object
-    surface_m: DepthMetres  # depth of the mesh, small
+    surface_m: DepthMetres  # rendered depth of the mesh, reduced size
     sensor_m: DepthMetres  # measured depth, at the same pixels
 
 
 def _best_views(atlas: Atlas, eyes_local: Points, views: Sequence[View]) -> np.ndarray:
-    """(view, chart): whether the view is among the most useful for that side: frontal, near, sharp."""
+    """(view, chart) booleans: whether the view is among the most useful for that side (frontal, near, sharp)."""
     params = tuned(Params)
     wanted = np.zeros((len(views), 6), dtype=bool)
     sharp = np.array([0.3 + 0.7 * view.sharpness for view in views])
@@ -112,7 +125,7 @@ def _best_views(atlas: Atlas, eyes_local: Points, views: Sequence[View]) -> np.n
 
 
 def _prefer_best(weights: np.ndarray) -> None:
-    """Scale a side's weights (k, t), in place, so that the frame that shows most of it best carries it."""
+    """Scale a side's weights (k, t) in place, so that the view with the largest total weight dominates."""
     params = tuned(Params)
     for rank, view in enumerate(np.argsort(-weights.sum(axis=1), kind="stable")):
         weights[view] *= max(params.next_view**rank, 1e-9)
@@ -126,7 +139,7 @@ def _gather(
     views: Sequence[View],
     wanted: np.ndarray,
 ) -> list[_Side]:
-    """Colours and weights of each chart's texels in the views wanted for it."""
+    """Colours and weights of each chart's texels in its chosen views."""
     photos = {k: _photo(views[k], vertices_world, faces, world_from_local) for k in np.flatnonzero(wanted.any(axis=1)).tolist()}
     sides = []
     for chart in np.flatnonzero(np.bincount(atlas.chart, minlength=6)):
@@ -155,7 +168,7 @@ def _well_inside(view: View, edge_share: float) -> Mask:
 
 
 def _look(photo: _Photo, points: np.ndarray, normals: np.ndarray, samples: np.ndarray, weights: np.ndarray) -> None:
-    """Fill in one view's colours (3, t) and weights (t,) of texels at points (3, t) with normals (3, t)."""
+    """Write one view's colours (3, t) and weights (t,) of texels at points (3, t) with normals (3, t)."""
     params = tuned(Params)
     dx, dy, dz = photo.camera_from_local.inverse.translation.astype(np.float32)[:, None] - points
     distance = np.sqrt(dx * dx + dy * dy + dz * dz)
@@ -175,8 +188,9 @@ def _look(photo: _Photo, points: np.ndarray, normals: np.ndarray, samples: np.nd
 def _look_up(photo: _Photo, in_camera: np.ndarray, grazing: np.ndarray) -> tuple[Colours, np.ndarray]:
     """The view's colour at each camera-frame point, and whether it shows the point.
 
-    It must lie in the mask, behind nothing of the mesh, and where the sensor measured, not behind anything else. On grazing
-    sides, where a mask that is a pixel too wide smears the neighbour over a hand's breadth, depth must confirm the surface.
+    A shown point lies in the mask and is occluded neither by the mesh nor, where the sensor measured, by anything else. On
+    grazing sides, where a mask that is a pixel too wide smears the neighbouring surface over a hand's breadth, depth must
+    confirm the surface.
     """
     params = tuned(Params)
     z, (height, width) = in_camera[:, 2], photo.surface_m.shape
@@ -192,14 +206,16 @@ def _look_up(photo: _Photo, in_camera: np.ndarray, grazing: np.ndarray) -> tuple
 
 
 def _moved(points: np.ndarray, transform: Rigid3) -> np.ndarray:
-    """Points given as columns (3, n) through the transform, in single precision, as rows (n, 3)."""
+    """Points given as columns (3, n), transformed in single precision, as rows (n, 3)."""
     r, t = transform.rotation.astype(np.float32), transform.translation.astype(np.float32)
     x, y, z = points
     return np.stack([x * r[k, 0] + y * r[k, 1] + z * r[k, 2] + t[k] for k in range(3)]).T
 
 
 def _blend(sides: Sequence[_Side], views: int, count: int) -> tuple[Colours, np.ndarray]:
-    """Each texel's weighted mean of the samples that agree with the median brightness, after levelling the views' exposures."""
+    """Robust weighted mean of each texel's samples, down-weighted by their deviation from the median grey after exposure
+    correction.
+    """
     params = tuned(Params)
     greys = [_grey(side.samples) for side in sides]
     gains = _gains(sides, greys, views)
@@ -221,7 +237,7 @@ def _blend(sides: Sequence[_Side], views: int, count: int) -> tuple[Colours, np.
 
 
 def _gains(sides: Sequence[_Side], greys: Sequence[np.ndarray], views: int) -> np.ndarray:
-    """The factor that brings each view to the common exposure."""
+    """Gain that brings each view to the common exposure."""
     ratios: list[list[np.ndarray]] = [[] for _ in range(views)]
     for side, grey in zip(sides, greys, strict=True):
         shown = side.weights > 0
@@ -237,16 +253,16 @@ def _gain(ratios: np.ndarray) -> float:
 
 
 def _grey(samples: np.ndarray) -> np.ndarray:
-    """The mean of the channels, (k, t)."""
+    """Mean of the colour channels, (k, t)."""
     red, green, blue = samples
     return np.asarray((red.astype(np.float32) + green + blue) / np.float32(3.0))
 
 
 def _median_shown(grey: np.ndarray, shown: np.ndarray) -> np.ndarray:
-    """Lower median over the views that show each texel (highlights are bright)."""
+    """Lower median over the views that show each texel (lower, because highlights are bright)."""
     if len(grey) == 0:
         return np.zeros(grey.shape[1], np.float32)
-    ordered = np.where(shown, grey, np.float32(np.inf)).T.copy()  # numpy sorts rows that lie together faster
+    ordered = np.where(shown, grey, np.float32(np.inf)).T.copy()  # numpy sorts contiguous rows faster
     ordered.sort(axis=1)
     middle = np.maximum(shown.sum(axis=0) - 1, 0) // 2
     return np.asarray(ordered[np.arange(len(middle)), middle])

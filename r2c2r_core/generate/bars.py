@@ -1,6 +1,7 @@
-"""Open frames, as garden chairs: what depth saw, as thick as a bar, and nothing where nobody saw anything.
+"""Reconstruction of open frames (such as garden chairs): observed depth points thickened to bars, free space elsewhere.
 
-Carving needs every mask to hold every bar: what a few of them lost is carved off. Depth points vote for what is there.
+Carving needs every mask to contain every bar: a bar missed by a few masks is carved away. Here depth points vote for occupied
+cells instead.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,38 +20,48 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a bar is."""
+    """Tuned parameters of the reconstruction of open frames."""
 
-    cell_m: float = param(0.01, "m", "side of the cells in which depth points are counted", gt=0)
+    cell_m: float = param(0.01, "m", "Side of the cells in which depth points are counted", gt=0)
     half_m: float = param(
-        0.011, "m", "half a bar's thickness: of what was seen from one side alone", source="noise of a phone's LiDAR"
+        0.011, "m", "Half the thickness of a bar, for surfaces seen from one side only", source="noise of a phone's LiDAR"
     )
-    least_views: int = param(2, "count", "that see a cell filled", ge=1)
-    agreed: float = param(0.25, "share", "of the views that look at a cell, which must see it filled")
-    through_m: float = param(0.03, "m", "behind a cell beyond the noise, from where a view looked through it")
-    least_cells: int = param(12, "count", "of a piece that is kept", ge=1)
-    gap_m: float = param(0.10, "m", "between two pieces of one thing, that is bridged: sensors lose dark and thin parts")
-    symmetric: float = param(0.7, "share", "of the cells that have a twin, from where a leg that depth lost has one too")
-    twin_m: float = param(0.04, "m", "between a cell and the mirror image of its twin, at most")
-    apart_m: float = param(0.09, "m", "between two legs, at least: nearer, a mirror image is the same leg, seen twice")
-    lower: float = param(0.45, "share", "of the height, below which a leg is")
-    foot_m: float = param(0.15, "m", "above the floor, from where a bar goes on down to it")
-    off_floor_m: float = param(0.03, "m", "above the floor, from where depth beside the masks is no floor")
-    leg_cell_m: float = param(0.02, "m", "side of the cells in which legs that masks left out are counted", gt=0)
-    level_m: float = param(0.03, "m", "between heights at which such a leg has a middle", gt=0)
-    slender_m: float = param(0.10, "m", "across, at every height, of such a leg")
-    tall: float = param(0.5, "share", "of the height below which a leg is, that one has which masks or depth left out")
+    least_views: int = param(2, "count", "Minimum number of views that see a cell occupied", ge=1)
+    agreed: float = param(0.25, "share", "Minimum fraction of the views that observe a cell which must see it occupied")
+    through_m: float = param(
+        0.03, "m", "Distance behind a cell, beyond the depth noise, at which a view's depth shows the cell to be free"
+    )
+    least_cells: int = param(12, "count", "Minimum number of cells of a connected piece for it to be kept", ge=1)
+    gap_m: float = param(
+        0.10, "m", "Maximum gap between two pieces of one object that is bridged: sensors miss dark and thin parts"
+    )
+    symmetric: float = param(
+        0.7, "share", "Minimum fraction of cells with a mirror twin for missing legs to be completed by symmetry"
+    )
+    twin_m: float = param(0.04, "m", "Maximum distance between a cell's mirror image and its twin")
+    apart_m: float = param(0.09, "m", "Minimum distance between two legs: a nearer mirror image is the same leg seen twice")
+    lower: float = param(0.45, "share", "Fraction of the height below which legs are expected")
+    foot_m: float = param(0.15, "m", "Height above the floor below which a bar is extended down to the floor")
+    off_floor_m: float = param(0.03, "m", "Height above the floor above which depth outside the masks is not the floor")
+    leg_cell_m: float = param(0.02, "m", "Side of the cells in which depth points of unmasked legs are counted", gt=0)
+    level_m: float = param(0.03, "m", "Height interval over which the width of an unmasked leg is measured", gt=0)
+    slender_m: float = param(0.10, "m", "Maximum width of an unmasked leg, at every height")
+    tall: float = param(
+        0.5,
+        "share",
+        "Minimum height of a leg that masks or depth missed, relative to the height below which legs are expected",
+    )
 
 
 class Bars(NamedTuple):
-    """Distance outside of what depth saw, thickened, on a carving's grid, and how much of it is a mirror image."""
+    """Distance to the thickened depth points on a carving's grid (positive outside), and the fraction that mirroring added."""
 
     field: np.ndarray
-    mirrored: float  # share
+    mirrored: float  # fraction
 
 
 def find_bars(carving: Carving, views: Sequence[View]) -> Bars | None:
-    """What depth saw, thickened, with the legs that it lost; None where it saw too little."""
+    """Thickened depth points with missing legs completed; None with too few points."""
     params = tuned(Params)
     cells = _in_one_piece(_seen_cells(carving, views, _in_mask, params.cell_m), params.cell_m)
     if len(cells) < params.least_cells:
@@ -74,7 +85,7 @@ def find_bars(carving: Carving, views: Sequence[View]) -> Bars | None:
 
 
 def _lost_legs(cells: Points, floor: float, top: float) -> Points:
-    """Mirror images of the lower cells where there is nothing, about the upright plane that the thing is symmetric to."""
+    """Mirror images of the lower cells in empty space, about the best upright plane of symmetry."""
     from scipy.spatial import cKDTree
 
     params = tuned(Params)
@@ -93,7 +104,7 @@ def _lost_legs(cells: Points, floor: float, top: float) -> Points:
 
 
 def _unmasked_legs(carving: Carving, views: Sequence[View], floor: float) -> Points:
-    """Middle lines of the tall and slender pieces that depth shows between floor and seat, and masks left out: dark legs."""
+    """Centre lines of tall, slender pieces that depth shows between floor and seat outside the masks (dark legs)."""
     params = tuned(Params)
     lowest = floor + params.off_floor_m
     tall_m = params.lower * (float(carving.seen.high[2]) - floor)
@@ -109,12 +120,12 @@ def _unmasked_legs(carving: Carving, views: Sequence[View], floor: float) -> Poi
 
 
 def _tall(cells: Points, cell_m: float, tall_m: float) -> list[Points]:
-    """The pieces of the cells that reach over enough of a leg's height."""
+    """Connected pieces of the cells that cover enough of a leg's height."""
     return [piece for piece in _pieces(cells, cell_m) if np.ptp(piece[:, 2]) > tuned(Params).tall * tall_m]
 
 
 def _middle_line(piece: Points) -> Points | None:
-    """Points up the middle of a piece, which may bend; None for one that is no leg: too wide at some height."""
+    """Points along the centre line of a piece, which may be curved; None if it is too wide for a leg at some height."""
     params = tuned(Params)
     z = piece[:, 2]
     level = np.floor(z / params.level_m)
@@ -125,12 +136,12 @@ def _middle_line(piece: Points) -> Points | None:
 
 
 def _in_mask(view: View, _: Points) -> np.ndarray:
-    """Which of a view's depth points lie in the thing's mask."""
+    """Mask of the view's valid depth points that lie in the object's mask."""
     return depth_mask(view)[view.depth_m > 0]
 
 
 def _seen_cells(carving: Carving, views: Sequence[View], choose: Callable[[View, Points], np.ndarray], cell_m: float) -> Points:
-    """Middles (local) of the depth points that `choose` takes of each view's, in the cells that enough views see filled."""
+    """Mean positions (local) of the depth points selected by `choose`, in cells that enough views see occupied."""
     params = tuned(Params)
     local_from_world = carving.seen.world_from_local.inverse
     low, high = carving.seen.low - cell_m, carving.seen.high + cell_m
@@ -158,7 +169,7 @@ def _seen_cells(carving: Carving, views: Sequence[View], choose: Callable[[View,
 
 
 def _in_one_piece(cells: Points, cell_m: float) -> Points:
-    """The cells of the largest piece and of those near it, each joined to it by the shortest bar."""
+    """Cells of the largest piece and of the pieces near it, each connected by the shortest bridge."""
     from scipy.spatial import cKDTree
 
     params = tuned(Params)
@@ -182,7 +193,7 @@ def _in_one_piece(cells: Points, cell_m: float) -> Points:
 
 
 def _pieces(cells: Points, cell_m: float) -> list[Points]:
-    """The cells by connected piece, largest first, without crumbs."""
+    """Connected components of the cells, largest first, without those below the minimum size."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
@@ -197,7 +208,7 @@ def _pieces(cells: Points, cell_m: float) -> list[Points]:
 
 
 def _feet(cells: Points, floor: float) -> list[Points]:
-    """Points from the lower end of each leg straight down to the floor."""
+    """Points from the lower end of each leg vertically down to the floor."""
     params = tuned(Params)
     low, feet = cells[cells[:, 2] < floor + params.foot_m], []
     while len(low):

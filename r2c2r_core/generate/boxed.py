@@ -1,4 +1,4 @@
-"""Furniture fronts and appliances: a box with flat faces, its front on the measured plane, with handle and relief."""
+"""Shape hypotheses of fronts and appliances: boxes with the front on the measured plane, with handle and relief."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -37,18 +37,22 @@ _TOLD: dict[DepthSource, str] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a box's depth and front are believed measured."""
+    """Tuned parameters of box-shaped furniture: when depth and faces count as measured."""
 
-    front_zone_m: float = param(0.03, "m", "behind the outer face, within which faces belong to the front")
-    least_face_points: int = param(200, "count", "of a face that is measured")
-    most_hidden: float = param(0.6, "share", "of a category's depth: sides that end before it are seen in part only")
-    looked_at: float = param(0.3, "cosine", "of the angle from which a face must be seen to be measured")
-    wall_spread: float = param(0.2, "ratio", "of a draw's variation of depth, of one that ends at a wall")
-    block_error: float = param(0.25, "ratio", "to a handle's protrusion, of how odd a block is in its place")
+    front_zone_m: float = param(0.03, "m", "Distance behind the outer face within which mesh faces belong to the front")
+    least_face_points: int = param(200, "count", "Minimum number of depth points for a face to count as measured")
+    most_hidden: float = param(
+        0.6, "share", "Fraction of the category's usual depth below which visible sides count as seen in part only"
+    )
+    looked_at: float = param(0.3, "cosine", "Minimum cosine of the viewing angle for a view to measure a face")
+    wall_spread: float = param(
+        0.2, "ratio", "Fraction of the sampled depth variation that is applied to a box that ends at a wall"
+    )
+    block_error: float = param(0.25, "ratio", "Error assigned to a handle drawn as a solid block, relative to its protrusion")
 
 
 def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
-    """A front's panel extruded to each depth it may have, with its handle and without; frame `front`."""
+    """A front's panel extruded to each candidate depth, with its handle and without; frame `front`."""
     track, front = evidence.track, evidence.track.front
     if front is None:
         raise GenerationFailed(f"{track.name}: no front rectangle was measured", hint="add a click that faces it")
@@ -70,7 +74,7 @@ def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
 
 
 def appliance_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hypothesis, ...]:
-    """An appliance's box, its seen faces measured again, with each depth it may have; frame `object`."""
+    """An appliance's box with its visible faces refined, at each candidate depth; frame `object`."""
     track, box = evidence.track, evidence.track.box
     if box is None:
         raise GenerationFailed(f"{track.name}: no box was measured", hint="add a click on a frame that shows it whole")
@@ -95,7 +99,7 @@ def appliance_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hyp
 def _depths_and_handles(
     depths: Sequence[DepthBehind], front: FrontPanel | None, shape: Callable[[DepthBehind, HandleStyle, Variation], Shape]
 ) -> tuple[Hypothesis, ...]:
-    """The most trusted depth with each style of handle, and the other depths, by turns."""
+    """Hypotheses: the candidate depths interleaved with the alternative handle styles at the most trusted depth."""
     style: HandleStyle = "bar" if front is not None and front.handle is not None else "none"
     others = [Hypothesis("{depth_m:.2f} m deep, " + _TOLD[b.source], partial(shape, b, style)) for b in depths]
     if style == "none":
@@ -107,7 +111,7 @@ def _depths_and_handles(
 
 
 def _box_with_relief(box: BoxPart, world_from_local: Rigid3, at: Vector3, relief: Relief, handle: HandleStyle) -> Shape:
-    """The box, with the handle and the steps of a front whose middle is `at`; its frame must be parallel to the local one."""
+    """The box with the handle and the relief of a front centred at `at`; its frame must be parallel to the local one."""
     added = [
         *relief.raised,
         *(handle_parts(relief.handle, as_bar=handle == "bar") if relief.handle and handle != "none" else ()),
@@ -127,19 +131,19 @@ def _box_with_relief(box: BoxPart, world_from_local: Rigid3, at: Vector3, relief
 
 
 def _handle_error(relief: Relief, style: HandleStyle) -> float:
-    """How far a handle in that style is from a usual one of what was seen: hands reach behind it."""
+    """Prior error of a handle style relative to the usual bar, scaled by the observed protrusion: hands reach behind a bar."""
     errors: dict[HandleStyle, float] = {"bar": 0.0, "block": tuned(Params).block_error, "none": 1.0}
     return 0.0 if relief.handle is None else errors[style] * relief.handle.protrusion_m
 
 
 def _scale(behind: DepthBehind, variation: Variation) -> float:
-    """A depth that the scan shows is varied little, a usual one by its full spread, one that is sold not at all."""
+    """Depth factor of a draw: the full spread for a usual depth, less at a wall, none for an observed or catalogue depth."""
     spread = {"wall": tuned(Params).wall_spread, "worktop": 1.0, "category": 1.0}
     return 1.0 + spread.get(behind.source, 0.0) * (variation.depth_scale - 1.0)
 
 
 def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vector3) -> tuple[tuple[DepthBehind, ...], float]:
-    """The depth its sides show, where they were seen; else what furniture may have. And the least, which was seen."""
+    """Candidate depths, measured where the sides were seen and otherwise assumed, and the minimum depth that was observed."""
     category = category_of(evidence.track.category)
     width, thought, height = (float(v) for v in box.dimensions_m)
     end = rear_edge(low, high, evidence.pool, box.world_from_object)
@@ -153,7 +157,7 @@ def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vec
 
 
 def _measured_box(evidence: Evidence, box: ThingBox, variation: Variation) -> tuple[Vector3, Vector3]:
-    """Corners of the box in its own frame, each face that cameras look at moved to the median of its points."""
+    """Corners of the box in its own frame, each face that cameras observe moved to the median of its points."""
     params = tuned(Params)
     half = np.asarray(box.dimensions_m, dtype=np.float64) / 2
     low, high = -half, half.copy()
@@ -170,7 +174,7 @@ def _measured_box(evidence: Evidence, box: ThingBox, variation: Variation) -> tu
 
 
 def _face_points(view: View, box: ThingBox, half: Vector3, axis: int, sign: float, erosion_px: float) -> np.ndarray:
-    """Coordinates along `axis` of the view's points on one face, where the view looks at that face."""
+    """Coordinates along `axis` of the view's points on one face; only views that face it contribute."""
     eye = box.world_from_object.inverse.apply(view.eye_world)
     towards = eye - np.where(np.arange(3) == axis, sign * half, 0.0)
     if sign * towards[axis] < tuned(Params).looked_at * np.linalg.norm(towards):
@@ -183,7 +187,7 @@ def _face_points(view: View, box: ThingBox, half: Vector3, axis: int, sign: floa
 
 
 def _side_seen(box: ThingBox, views: tuple[View, ...]) -> bool:
-    """Whether a camera looks at the left, right or top face, which show the depth."""
+    """Whether a camera sees the left, right or top face, which show the depth."""
     half = np.asarray(box.dimensions_m) / 2
     eyes = box.world_from_object.inverse.apply(np.array([v.eye_world for v in views]))
     outside = np.abs(eyes[:, [0, 2]]) - half[[0, 2]]
@@ -193,7 +197,7 @@ def _side_seen(box: ThingBox, views: tuple[View, ...]) -> bool:
 
 
 def _local_front(front: FrontPanel | None, box: ThingBox) -> FrontPanel | None:
-    """The appliance's front, turned parallel to its box; None where it faces elsewhere."""
+    """The appliance's front in axes parallel to its box; None if the two differ in direction."""
     if front is None:
         return None
     turn = box.world_from_object.rotation.T @ front.world_from_front.rotation

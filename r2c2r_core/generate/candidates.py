@@ -1,4 +1,4 @@
-"""All candidates of one object, as planned: generated, joined by what is there and by a person's own, weighed, ranked."""
+"""Candidate set of one object: generated, merged with existing ones and uploads, placed, scored and ranked."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,37 +20,43 @@ from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.tuning import param, tuned
 
 Place = Callable[..., Placement]
-"""(capture, track, asset, progress=…) to a placement, or PlacementFailed: how align does it is its own matter."""
+"""(capture, track, asset, progress=…) to a placement; raises PlacementFailed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How many candidates are placed."""
+    """Tuned parameters of candidate evaluation."""
 
-    most_weighed: int = param(5, "count", "candidates placed for their evidence", source="about 4 s each on one core", ge=1)
+    most_weighed: int = param(
+        5,
+        "count",
+        "Maximum number of candidates that are placed for their evidence",
+        source="about 4 s each on one core",
+        ge=1,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """How one object's candidates are made."""
+    """Settings for generating one object's candidates."""
 
     generator: str
     config: GenerateConfig
     seed: int = 0
-    batch: int = 0  # how often a reviewer asked for further ones
-    excuse: str = ""  # why this generator stands in for the chosen one
+    batch: int = 0  # number of further batches that a reviewer requested
+    excuse: str = ""  # why this generator replaces the chosen one
 
     @property
     def places(self) -> bool:
-        """Whether its meshes have to be placed to be compared: a generator that knows where they stand measures itself."""
+        """Whether its meshes must be placed before they can be compared; the default generator measures its own."""
         return self.generator != GENERATORS.default
 
     def steps(self, uploads: bool) -> tuple["Plan", ...]:
-        """The plans whose candidates this one, perhaps with uploads, only adds to, the nearest first."""
+        """Plans whose candidates this one (perhaps with uploads) only extends, nearest first."""
         return (*([self] if uploads else []), *([replace(self, batch=self.batch - 1)] if self.batch else []))
 
     def stand_in(self, why: str) -> "Plan | None":
-        """The weight-free generator's plan, which says why; None of its own."""
+        """Plan of the weight-free default generator as fallback, with the reason; None if this is already it."""
         if self.generator == GENERATORS.default:
             return None
         excuse = f"{self.generator} made no mesh, {GENERATORS.default} stands in: {why}"
@@ -67,7 +73,7 @@ def make_candidates(
     *,
     progress: Progress = SILENT,
 ) -> CandidateSet:
-    """An object's candidates, ranked. What `earlier`, a step of the plan, gave is not generated anew."""
+    """An object's candidates, ranked; those of `earlier`, a step of the plan, are reused and not generated again."""
     step, found = earlier or (None, None)
     if found is not None and step == plan:
         found = with_uploads(found, uploads, plan.config.rule)
@@ -91,9 +97,9 @@ def make_candidates(
 def weighed(
     capture: Capture, track: MaskTrack, found: CandidateSet, place: Place, rule: Rule, progress: Progress = SILENT
 ) -> CandidateSet:
-    """The candidates of generators that do not know their place, placed and compared with masks and depth; ranked anew.
+    """The set with unplaced candidates placed, compared with masks and depth, and ranked again.
 
-    The most likely few: one that no pose fits, or that was not tried, is known by its shape alone.
+    Only the most likely few are placed; one that fails to place, or was not tried, is judged by its shape alone.
     """
     unknown = [c for c in found.candidates if "mask_iou" not in c.metrics]
     if not unknown or len(found.candidates) == 1:
@@ -112,7 +118,7 @@ def weighed(
 
 
 def select_candidate(found: CandidateSet, override: ObjectOverride, rule: Rule) -> CandidateSet:
-    """The candidate a person named, else the consensus among those nobody rejected; choosing makes no new candidates."""
+    """The candidate a person chose, else the consensus among those not rejected; generates no candidates."""
     if override.candidate is not None:
         uploaded = [c.candidate_id for c in found.candidates if c.candidate_id.startswith("upload")]
         return chosen_by_person(found, uploaded[0] if Path(override.candidate).is_file() else override.candidate)

@@ -1,4 +1,4 @@
-"""Flat-sided boxes in the depths that outlines, walls and what is usual let them have."""
+"""Cuboid hypotheses whose depth is constrained by silhouettes, walls and the usual proportions."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -17,16 +17,16 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What counts as a flat-sided box."""
+    """Tuned parameters of cuboid hypotheses."""
 
-    box_m: float = param(0.006, "m", "median distance of a box's points from it, at most")
-    far_share: float = param(0.1, "share", "of its points that may be far from it")
-    far_m: float = param(0.015, "m", "from the box, where a point is far")
-    open_m: float = param(0.004, "m", "that the scan leaves a depth open, from where it is guessed in several ways")
+    box_m: float = param(0.006, "m", "Maximum median distance of the depth points from the cuboid")
+    far_share: float = param(0.1, "share", "Maximum fraction of the points that may be outliers")
+    far_m: float = param(0.015, "m", "Distance from the cuboid above which a point is an outlier")
+    open_m: float = param(0.004, "m", "Standard deviation of the depth above which several depths are offered as hypotheses")
 
 
 def carton_family(evidence: Evidence, seen: Seen) -> tuple[Hypothesis, ...]:
-    """A flat-sided box where the points lie on one, as deep as outlines, walls and what is usual let it be."""
+    """Cuboid hypotheses where the points lie on one, at depths that silhouettes, walls and the usual proportions allow."""
     params = tuned(Params)
     walls = evidence.capture.room.walls
     found = fit_cuboid(seen.points, seen.low, seen.high, evidence.pool, seen.world_from_local, walls)
@@ -45,9 +45,9 @@ def carton_family(evidence: Evidence, seen: Seen) -> tuple[Hypothesis, ...]:
 
 
 def _cuboid_shape(found: Cuboid, room_m: float, sigmas: float, variation: Variation) -> Shape:
-    """The box with another depth, so many standard deviations off, but not in a wall.
+    """The cuboid at another depth, offset by `sigmas` standard deviations but not into a wall.
 
-    A draw takes the likeliest depth to either side, and others further to the side that they are named for.
+    A draw varies the most likely depth to either side; the other hypotheses vary only towards the side that they are named for.
     """
     size = np.array(found.size_m)
     low = -size / 2  # the front, which was seen, stays

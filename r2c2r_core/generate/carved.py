@@ -1,7 +1,7 @@
-"""Things of any shape: a prior solid, carved by free space and silhouettes, with the fused surface where it was seen.
+"""Shape from silhouettes and free space: a prior solid carved on a grid, with the fused surface where it was observed.
 
-Recipe of backends.md §2.6 and stack.md §8. Every field is a distance in metres, positive outside, on a grid in the thing's
-own gravity-aligned frame, so the zero level is a closed surface whatever was not seen.
+Recipe of backends.md §2.6 and stack.md §8. Every field is a distance in metres, positive outside, on a grid in the object's own
+gravity-aligned frame, so its zero level set is a closed surface even where nothing was observed.
 """
 
 from dataclasses import dataclass
@@ -20,33 +20,35 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a thing is carved."""
+    """Tuned parameters of carving."""
 
-    truncation_ratio: float = param(3.0, "ratio", "of the truncation distance to a voxel", gt=0)
-    least_truncation_m: float = param(0.012, "m", "truncation distance, at least", source="LiDAR noise and pose error together")
-    sure_frames: int = param(3, "count", "that see a surface, before something thinner than four voxels is believed")
+    truncation_ratio: float = param(3.0, "ratio", "Truncation distance in voxels", gt=0)
+    least_truncation_m: float = param(0.012, "m", "Minimum truncation distance", source="LiDAR noise and pose error together")
+    sure_frames: int = param(
+        3, "count", "Minimum number of frames that see a surface for parts thinner than four voxels to be kept"
+    )
     down_rad: float = param(
-        float(np.deg2rad(15.0)), "rad", "that a camera looks down on a thing, from where it shows where its top ends"
+        float(np.deg2rad(15.0)), "rad", "Minimum downward viewing angle from which views show where an object's top ends"
     )
     aside_m: float = param(
-        0.03, "m", "beside nearly all depth points, that a thing may reach to where its masks end: a spout or a grip shows few"
+        0.03, "m", "Sideways margin beyond the depth points, for parts such as a spout or a grip that show few points"
     )
-    sheet_m: float = param(0.04, "m", "how thick a thing is behind what was seen of it, where that is all there is")
+    sheet_m: float = param(0.04, "m", "Thickness behind the observed surface of an object that is modelled as a sheet")
 
 
 class Carving(NamedTuple):
-    """What the frames of one draw say of a grid round a thing; `votes` and `beyond_m` are flat."""
+    """Votes of one draw's frames on a grid around an object; `votes` and `beyond_m` are flat arrays."""
 
     seen: Seen
     grid: Grid
     votes: Votes
     truncation_m: float
-    beyond_m: np.ndarray  # distance outside the box that is carved
-    down_rad: float  # the steepest look down on it
+    beyond_m: np.ndarray  # distance outside the carved box
+    down_rad: float  # the steepest downward viewing angle
 
 
 def carve(evidence: Evidence, variation: Variation) -> Carving:
-    """The votes of one draw's frames; raises GenerationFailed where there is too little depth."""
+    """Votes of one draw's frames; raises GenerationFailed with too little depth."""
     params = tuned(Params)
     seen = observe_thing(evidence, variation)
     margin = max(0.006, 1.5 * variation.voxel_m)
@@ -61,9 +63,9 @@ def carve(evidence: Evidence, variation: Variation) -> Carving:
 
 
 def solid_field(carving: Carving, revolution: Revolution | None, *, mirror: bool) -> tuple[np.ndarray, bool]:
-    """The solid that masks and free space leave, with the seen surface, and whether a mirror completed it.
+    """Solid left by masks and free space, with the observed surface, and whether mirroring completed it.
 
-    What nobody saw is solid: about `revolution`'s axis where there is one, else all of the box.
+    Unobserved space is solid: around the axis of `revolution` if it is given, else within the whole box.
     """
     from scipy import ndimage
 
@@ -74,7 +76,7 @@ def solid_field(carving: Carving, revolution: Revolution | None, *, mirror: bool
         prior = np.clip(np.maximum(bounds, revolution.signed_distance(carving.grid.centres())), -truncation, truncation)
     seen = np.isfinite(votes.distance_m)
     free = votes.free_m > 0
-    # what lies in no mask, but behind another thing in every frame, is nobody's guess: leave it out
+    # points in no mask, yet occluded in every frame, carry no evidence: leave them empty
     field = np.where(seen, votes.distance_m, np.maximum(prior, votes.outside_m))
     field = np.where(free, np.maximum(field, np.minimum(votes.free_m, truncation)), field)
     field = np.maximum(field, bounds).reshape(shape)
@@ -87,21 +89,21 @@ def solid_field(carving: Carving, revolution: Revolution | None, *, mirror: bool
     mirrored = mirror and _mirror_unseen(field, (seen | free).reshape(shape), free.reshape(shape), hidden)
     solid = field < 0
     slivers = solid & ~ndimage.binary_opening(solid, iterations=2) & ~sure
-    field[slivers] = carving.grid.voxel_m  # what is left between two silhouettes and hardly seen as a surface
+    field[slivers] = carving.grid.voxel_m  # slivers left between two silhouettes, hardly observed as a surface
     return ndimage.gaussian_filter(field, 0.7), mirrored
 
 
 def _look_down(seen: Seen, variation: Variation) -> float:
-    """The steepest angle at which a view looks down on the top of a thing's middle."""
+    """Steepest angle at which a view looks down on the centre of an object's top."""
     top = np.append((seen.low + seen.high)[:2] / 2, seen.high[2])
     eyes = seen.world_from_local.inverse.apply(np.array([view.eye_world for view in variation.views])) - top
     return float(np.arctan2(eyes[:, 2], np.linalg.norm(eyes[:, :2], axis=1)).max())
 
 
 def _shadow(solid: np.ndarray, roof: np.ndarray, empty: np.ndarray) -> np.ndarray:
-    """Solid voxels with empty space above them and no seen surface between: what hides behind the thing, seen from above.
+    """Solid voxels below empty space with no observed surface between: space hidden behind an object seen from above.
 
-    A thing that reached there would show its top.
+    If the object reached there, its top would have been observed.
     """
     shadow, below = np.zeros_like(solid), np.zeros(solid.shape[:2], dtype=bool)
     for level in range(solid.shape[2] - 1, -1, -1):
@@ -111,7 +113,7 @@ def _shadow(solid: np.ndarray, roof: np.ndarray, empty: np.ndarray) -> np.ndarra
 
 
 def sheet_field(carving: Carving, solid: np.ndarray) -> np.ndarray:
-    """The solid, no thicker behind what was seen of it than a board: what nobody saw is empty."""
+    """The solid limited to a sheet behind the observed surface: unobserved space is empty."""
     from scipy import ndimage
 
     surface = np.abs(carving.votes.distance_m).reshape(carving.grid.shape) < carving.grid.voxel_m
@@ -122,26 +124,26 @@ def sheet_field(carving: Carving, solid: np.ndarray) -> np.ndarray:
 
 
 def above(carving: Carving, field: np.ndarray, height_m: float) -> np.ndarray:
-    """The field with all that is below a height (local) cut off."""
+    """The field with everything below a height (local) cut off."""
     return np.maximum(field, height_m - carving.grid.heights())
 
 
 def volume_below(carving: Carving, field: np.ndarray, height_m: float) -> float:
-    """How much of the solid lies below a height (local), cubic metres."""
+    """Volume of the solid below a height (local), cubic metres."""
     return float(np.count_nonzero(field[:, :, carving.grid.heights() < height_m] < 0)) * carving.grid.voxel_m**3
 
 
 def emptied_height(carving: Carving, solid: np.ndarray, left: np.ndarray) -> float:
-    """How much of `solid` is not in `left`: the mean height over the ground that the solid covers, metres."""
+    """Volume of `solid` missing in `left` as a mean height over the solid's ground area, metres."""
     inside = solid < 0
     columns = max(int(np.count_nonzero(inside.any(axis=2))), 1)
     return float(np.count_nonzero(inside & (left >= 0))) / columns * carving.grid.voxel_m
 
 
 def _mirror_unseen(field: np.ndarray, seen: np.ndarray, free: np.ndarray, hidden: np.ndarray) -> bool:
-    """Give voxels that nobody saw, in place, what their mirror twins were seen to be; the middle is the grid's own.
+    """Copy the state of observed mirror twins into unobserved voxels, in place; the plane is the grid's own centre.
 
-    Free twins carve; solid twins fill only what is `hidden` behind other things.
+    Free twins carve; solid twins fill only voxels that are `hidden` behind other objects.
     """
     from scipy import ndimage
 
@@ -149,7 +151,7 @@ def _mirror_unseen(field: np.ndarray, seen: np.ndarray, free: np.ndarray, hidden
     if axis is None:
         return False
     twin, twin_seen, twin_free = (np.flip(values, axis).copy() for values in (field, seen, free))
-    filled = ndimage.binary_opening(hidden & twin_seen & (twin < 0), iterations=2)  # slivers are masks that disagree
+    filled = ndimage.binary_opening(hidden & twin_seen & (twin < 0), iterations=2)  # slivers come from masks that disagree
     changed = (~seen & twin_free) | filled
     field[changed] = twin[changed]
     return bool(changed.any())

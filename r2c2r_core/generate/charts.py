@@ -1,4 +1,4 @@
-"""Texture atlases: six flat projections for furniture, xatlas charts for everything else; and the place of every texel."""
+"""Texture atlases with the 3D point of every texel: six planar projections for furniture, xatlas charts for the rest."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -19,28 +19,28 @@ _PADDING_PX = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How textures are laid out."""
+    """Tuned parameters of texture layout."""
 
-    largest_px: int = param(1536, "px", "longest side of a flat chart", ge=16)
+    largest_px: int = param(1536, "px", "Maximum long side of a planar chart", ge=16)
 
 
 class Atlas(NamedTuple):
-    """A mesh cut open, and what surface point each texel shows."""
+    """A UV-unwrapped mesh with the surface point of each texel."""
 
     source: np.ndarray  # (n,) the original vertex of each skin vertex
     faces: Faces  # of skin vertices
     uv: TextureCoords  # v = 0 is the bottom row
     size: tuple[int, int]  # texture rows, columns
     texel: np.ndarray  # (t,) flat pixel index of each covered texel
-    points: Points  # (t, 3) where the texel lies
+    points: Points  # (t, 3) surface point of each texel
     normals: Points  # (t, 3)
     chart: np.ndarray  # (t,) chart of each texel; for planar charts 2 * axis + (positive side), so FRONT is -Y
 
 
 def planar_atlas(vertices: Points, faces: Faces, longest_px: int, finest_m: float) -> Atlas:
-    """Six orthographic charts along ± the axes; the front (-Y) gets the pixels, the others 0.4 of its resolution.
+    """Six orthographic charts along ± the axes; the front (-Y) has full resolution, the others 0.4 of it.
 
-    Where faces of one direction lie behind one another (a door behind its handle) they share texels of the outermost.
+    Faces of one direction that lie behind one another (a door behind its handle) share the texels of the outermost.
     """
     direction = _main_direction(face_normals(vertices, faces))
     spans = vertices.max(axis=0) - vertices.min(axis=0)
@@ -76,7 +76,7 @@ def planar_atlas(vertices: Points, faces: Faces, longest_px: int, finest_m: floa
 
 
 def unwrapped_atlas(vertices: Points, faces: Faces, size_px: int) -> Atlas:
-    """Charts by xatlas on a square texture."""
+    """Atlas of xatlas charts on a square texture."""
     import xatlas
 
     source, skin_faces, uv = xatlas.parametrize(vertices.astype(np.float32), faces.astype(np.uint32))
@@ -95,8 +95,8 @@ def unwrapped_atlas(vertices: Points, faces: Faces, size_px: int) -> Atlas:
 
 class _Chart(NamedTuple):
     direction: int
-    axes: list[int]  # horizontal, vertical axis of the picture
-    corner: np.ndarray  # (2,) metres at the picture's left top corner, inside the padding; rows run downwards
+    axes: list[int]  # horizontal, vertical axis of the chart
+    corner: np.ndarray  # (2,) metres at the chart's top left corner, inside the padding; rows run downwards
     pitch_m: float
     face_image: np.ndarray  # outermost face per texel; the padding repeats the nearest
 
@@ -106,7 +106,7 @@ class _Chart(NamedTuple):
 
 
 def _main_direction(normals: Points) -> np.ndarray:
-    """2 * axis + (positive side) of each face's largest normal component."""
+    """Dominant axis direction of each face normal as 2 * axis + (positive side)."""
     axis = np.argmax(np.abs(normals), axis=1)
     return np.asarray(2 * axis + (normals[np.arange(len(normals)), axis] > 0))
 
@@ -133,7 +133,7 @@ def _draw_chart(vertices: Points, faces: Faces, direction: np.ndarray, k: int, p
 
 
 def _texel_points(chart: _Chart, vertices: Points, faces: Faces) -> Points:
-    """The point of each texel on the plane of its face."""
+    """Point of each texel on the plane of its face."""
     rows, columns = np.indices(chart.face_image.shape)
     flat = np.stack([columns, rows], axis=-1).reshape(-1, 2) + 0.5
     face = chart.face_image.ravel()
@@ -147,7 +147,7 @@ def _texel_points(chart: _Chart, vertices: Points, faces: Faces) -> Points:
 
 
 def _shelves(shapes: list[tuple[int, ...]]) -> tuple[list[tuple[int, int]], tuple[int, int]]:
-    """Row and column of each picture on shelves, tallest first, in an atlas about as wide as the widest needs."""
+    """Shelf packing: row and column of each chart, tallest first, and the size of the roughly square atlas."""
     width = max(max(shape[1] for shape in shapes), int(np.sqrt(sum(shape[0] * shape[1] for shape in shapes)) * 1.15))
     offsets: dict[int, tuple[int, int]] = {}
     row = column = shelf = 0
@@ -161,7 +161,7 @@ def _shelves(shapes: list[tuple[int, ...]]) -> tuple[list[tuple[int, int]], tupl
 
 
 def _uv_raster(uv: TextureCoords, faces: Faces, attributes: np.ndarray, size_px: int) -> np.ndarray:
-    """Vertex attributes (n, 3) interpolated over the texture (row 0 on top): the uv plane seen from one metre before it."""
+    """Vertex attributes (n, 3) rasterised over the texture (row 0 on top): the uv plane seen from one metre in front of it."""
     plane = np.column_stack([uv[:, 0] - 0.5, 0.5 - uv[:, 1], np.ones(len(uv))])
     half = size_px / 2
     camera = Intrinsics(fx=size_px, fy=size_px, cx=half, cy=half, width=size_px, height=size_px)

@@ -1,4 +1,4 @@
-"""The weight-free generator: what was seen, at LiDAR noise, completed by symmetry, to the wall or to the category's depth."""
+"""Weight-free generator: observed geometry at LiDAR noise, completed by symmetry, to the wall or to the category's depth."""
 
 import zlib
 from collections.abc import Sequence
@@ -28,33 +28,37 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How fine textures are."""
+    """Tuned parameters of texture resolution."""
 
-    front_px: int = param(768, "px", "long side of a front's picture, where photos show no more", ge=16)
+    front_px: int = param(768, "px", "Minimum long side of a front's texture, where photos show no more detail", ge=16)
     finest_texel_m: float = param(
-        0.0012, "m", "side of a texel, at least, where photos show no more", source="a phone at 1 m sees 1.3 mm per pixel", gt=0
+        0.0012,
+        "m",
+        "Minimum side of a texel, unless photos show finer detail",
+        source="a phone at 1 m sees 1.3 mm per pixel",
+        gt=0,
     )
-    thing_px: int = param(512, "px", "side of a thing's picture, where photos show no more", ge=16)
-    most_front_px: int = param(1536, "px", "long side of a front's picture: 9 views of it are baked in 0.1 GB", ge=16)
-    most_thing_px: int = param(1024, "px", "side of a thing's picture: 20 views of it are baked in 0.15 GB", ge=16)
-    packed: float = param(0.6, "share", "of a thing's picture that its charts cover", gt=0, le=1)
+    thing_px: int = param(512, "px", "Minimum side of an object's texture, where photos show no more detail", ge=16)
+    most_front_px: int = param(1536, "px", "Maximum long side of a front's texture: baking 9 views of it takes 0.1 GB", ge=16)
+    most_thing_px: int = param(1024, "px", "Maximum side of an object's texture: baking 20 views of it takes 0.15 GB", ge=16)
+    packed: float = param(0.6, "share", "Expected fraction of an object's texture that its charts cover", gt=0, le=1)
 
 
 class Completion(MeshGenerator):
-    """Boxes for furniture, clean solids or carved ones for things."""
+    """Weight-free generator: boxes for furniture; cuboids, solids of revolution or carved solids for objects."""
 
     def __init__(self) -> None:
         self._known: _Known | None = None
 
     def make(self, evidence: Evidence, candidate_id: str, seed: int) -> MeshAsset:
-        """One candidate: one of the hypotheses about what nobody saw, by turns.
+        """One candidate: one of the shape hypotheses, in turn.
 
-        With seed 0 the first turn is from all good frames; every other is a draw of its own, from some.
+        With seed 0 the first turn uses all good frames; every other turn draws its own subset.
         """
         guess = self._guess(evidence, candidate_id, seed)
         atlas = cut_open(guess.shape, evidence.pool)
         shape, variation = guess.shape, guess.variation
-        # a bare side may show in a few frames only, so furniture is pictured from the whole pool
+        # a bare side may show in a few frames only, so furniture is textured from the whole pool
         views = variation.views if shape.front_y_m is None else evidence.pool
         picture = bake(atlas, shape.vertices_world, shape.faces, shape.world_from_local, views, shape.front_y_m)
         mesh, local_from_mesh = centred(shape.vertices_local, atlas.source, atlas.faces, atlas.uv, picture.texture)
@@ -74,12 +78,12 @@ class Completion(MeshGenerator):
         )
 
     def measured(self, evidence: Evidence, candidate_id: str, seed: int) -> tuple[Shape, dict[str, float], str]:
-        """The same candidate where it stands, without a picture, its measures, and what it assumes."""
+        """The same candidate's posed shape without texture, its metrics, and the hypothesis it assumes."""
         guess = self._guess(evidence, candidate_id, seed)
         return guess.shape, _metrics(guess.shape, evidence), guess.assumes
 
     def _guess(self, evidence: Evidence, candidate_id: str, seed: int) -> "_Guess":
-        """The candidate's shape, closed; raises GenerationFailed."""
+        """The candidate's closed shape; raises GenerationFailed."""
         known = self._hypotheses(evidence)
         turn, place = divmod(int(candidate_id.removeprefix("c")), len(known.hypotheses))
         hypothesis = known.hypotheses[place]
@@ -90,12 +94,12 @@ class Completion(MeshGenerator):
         return _Guess(shape, variation, hypothesis.assumes.format(**shape.parameters))
 
     def _hypotheses(self, evidence: Evidence) -> "_Known":
-        """Found once for all candidates of an object, and kept until the next object's turn."""
+        """Shape hypotheses, computed once per object and cached until the next object."""
         if self._known is None or self._known.evidence is not evidence:
             everything = whole_pool(evidence)
             try:
                 self._known = _Known(evidence, everything, _hypotheses_of(evidence, everything), {})
-            except GenerationFailed as error:  # the other candidates would fail alike
+            except GenerationFailed as error:  # the other candidates would fail equally
                 self._known = _Known(evidence, everything, (), {}, error)
         if self._known.failure is not None:
             raise self._known.failure.with_traceback(None)
@@ -110,7 +114,7 @@ class _Known(NamedTuple):
     failure: GenerationFailed | None = None  # why there are no hypotheses
 
     def draw(self, turn: int, seed: int) -> Variation:
-        """The frames and settings that all hypotheses share in one turn: at seed 0 first every good frame, else some."""
+        """Frames and settings that all hypotheses share in one turn: every good frame first at seed 0, else a subset."""
         if turn == 0 and seed == 0:
             return self.everything
         if (turn, seed) not in self.draws:
@@ -125,12 +129,12 @@ class _Guess(NamedTuple):
 
 
 def _generator(evidence: Evidence, purpose: str, seed: int) -> np.random.Generator:
-    """Randomness for one purpose of one object."""
+    """Random generator for one purpose of one object."""
     return np.random.default_rng([seed, zlib.crc32(evidence.track.name.encode()), zlib.crc32(purpose.encode())])
 
 
 def _metrics(shape: Shape, evidence: Evidence) -> dict[str, float]:
-    """Scale-free measures, and how the shape fits what is known: masks and depth of the frames that judge all alike."""
+    """Scale-free shape metrics and the fit to masks and depth of the common judging views."""
     fit = self_consistency(shape.vertices_world, shape.faces, shape.maskable, evidence.pool[: tuned(ConsistencyParams).judges])
     more = {} if shape.unseen_error_m is None else {"unseen_error_m": shape.unseen_error_m}
     if evidence.track.kind == "thing":  # furniture hangs on its wall
@@ -139,7 +143,7 @@ def _metrics(shape: Shape, evidence: Evidence) -> dict[str, float]:
 
 
 def _hypotheses_of(evidence: Evidence, everything: Variation) -> tuple[Hypothesis, ...]:
-    """By what the segmenter found; a front or appliance without its measures is treated as a thing."""
+    """Hypotheses by the segmenter's kind of object; a front or appliance without measurements is treated as a free object."""
     track = evidence.track
     if track.kind == "front" and track.front is not None:
         return front_hypotheses(evidence)
@@ -149,7 +153,7 @@ def _hypotheses_of(evidence: Evidence, everything: Variation) -> tuple[Hypothesi
 
 
 def cut_open(shape: Shape, views: Sequence[View]) -> Atlas:
-    """The shape's atlas, as fine as the nearest photo shows it, within what memory allows."""
+    """The shape's atlas at the resolution of the nearest photo, within the memory limits."""
     params = tuned(Params)
     pixel_m = _finest_pixel_m(shape, views)
     if shape.front_y_m is not None:
@@ -162,13 +166,13 @@ def cut_open(shape: Shape, views: Sequence[View]) -> Atlas:
 
 
 def _finest_pixel_m(shape: Shape, views: Sequence[View]) -> float:
-    """What a pixel covers at the shape's distance in the photo that shows it finest."""
+    """Smallest footprint of a pixel at the shape's distance over all photos."""
     centre = shape.vertices_world.mean(axis=0)[None]
     depths = [max(float(view.world_from_camera.inverse.apply(centre)[0, 2]), 0.1) for view in views]
     return min((depth / view.rgb_camera.fx for depth, view in zip(depths, views, strict=True)), default=np.inf)
 
 
 def _is_solid(shape: Shape) -> bool:
-    """Closed, manifold, wound outwards."""
+    """Whether the mesh is closed, manifold and wound outwards."""
     vertices, faces = shape.vertices_local, shape.faces
     return is_watertight(vertices, faces) and is_manifold(vertices, faces) and volume(vertices, faces) > 0

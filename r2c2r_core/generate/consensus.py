@@ -1,17 +1,17 @@
-"""Which candidate to take: the one most like the others that also agrees best with masks and depth.
+"""Consensus ranking of candidates: medoid of shape, combined with agreement with masks and depth.
 
 The paper (§4.2) takes the mesh whose bounding box and volume are closest to their mean. Two departures, both measured in
 backends.md §2.6: the candidates come in frames and units of their own, so the measures are scale-free (box sides over the
-longest, filled share of the box); and the mean follows outliers (solid IoU 0.734, no better than a random pick), so the
-default is the medoid (0.780), joined with the candidates' own consistency with masks and depth (0.783).
+longest, filled share of the box); and the mean follows outliers (solid IoU 0.734, no better than a random pick), so the default
+is the medoid (0.780), joined with the candidates' own consistency with masks and depth (0.783).
 
-A candidate that says what it assumes differs from the others on purpose: being odd does not count against it, only what the
-scan says does; of a side that nobody saw that is the wall behind it, the worktop on it or what is usual.
+A candidate with a stated hypothesis differs from the others on purpose: its oddness is not penalised, only its disagreement
+with the scan; for an unobserved side that is the wall behind it, the worktop on it or the usual size.
 
 Metrics read here (MeshAsset.metrics): extent_middle, extent_short, volume_ratio, mask_iou, depth_residual_m, unseen_error_m,
-stands, carved, faces. Masks and depth are unknown for a mesh whose generator does not know its place, until it was placed
-(pipeline.py does that); without them it is judged by its shape alone. What would fall over, an open mesh, or one with more
-faces than a simulator likes, has to fit better to win.
+stands, carved, faces. Masks and depth are unknown for a mesh whose generator does not know its pose, until it is placed
+(pipeline.py does that); without them it is judged by its shape alone. A mesh that would tip over, is open, or has more faces
+than a simulator handles well, must fit better to win.
 """
 
 from collections.abc import Sequence
@@ -37,31 +37,34 @@ _BUT = {
     "copied": "it copies the masks with their errors",
     "open": "it is not closed",
 }
-"""What each cost but the fit says of who has to bear it."""
+"""Explanation of each cost other than the fit, for the candidate that bears it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a candidate's faults cost, in units of mask IoU."""
+    """Tuned costs of a candidate's faults, in units of mask IoU."""
 
     unseen_weight: float = param(
-        1.0, "score", "per metre that what nobody saw is off the likeliest", source="half of an error that was seen"
+        1.0,
+        "score",
+        "Cost per metre between an unobserved side and its most likely position",
+        source="half the cost of an observed error",
     )
-    open_cost: float = param(0.1, "score", "of a mesh that is not closed: it has no inside, volume or mass")
-    falls_cost: float = param(0.1, "score", "of what would tip over, for it was not found standing")
-    most_faces: int = param(20_000, "count", "triangles that cost nothing")
-    heavy_cost: float = param(0.02, "score", "per doubling of the triangles beyond them")
+    open_cost: float = param(0.1, "score", "Cost of an open mesh, which has no inside, volume or mass")
+    falls_cost: float = param(0.1, "score", "Cost of a shape that would tip over, since objects were scanned standing")
+    most_faces: int = param(20_000, "count", "Number of triangles above which a mesh is penalised")
+    heavy_cost: float = param(0.02, "score", "Cost per doubling of the number of triangles above most_faces")
     by_chance: float = param(
         0.02,
         "score",
-        "by which draws of one hypothesis differ",
-        source="the frames that were drawn are the ones that judge, or are not",
+        "Maximum cost difference attributed to chance between draws of one hypothesis",
+        source="the drawn frames may or may not be among the judging frames",
     )
-    fits_alike: float = param(0.005, "score", "by which two candidates may differ and fit alike")
+    fits_alike: float = param(0.005, "score", "Maximum cost difference at which two candidates fit equally well")
 
 
 def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str] = (), rule: Rule = "medoid") -> CandidateSet:
-    """Rank all candidates, best first, and choose the best that nobody rejected; raises GenerationFailed without one."""
+    """Rank all candidates, best first, and choose the best that was not rejected; raises GenerationFailed without one."""
     allowed = [i for i, c in enumerate(candidates) if c.candidate_id not in rejected]
     if not allowed:
         name = candidates[0].object_name if candidates else "object"
@@ -93,7 +96,7 @@ def chosen_by_person(candidates: CandidateSet, candidate_id: str) -> CandidateSe
 
 
 def _of_most_frames(candidates: Sequence[MeshAsset], order: Sequence[int], cost: np.ndarray) -> int:
-    """The best one; of draws that assume what it does and cost no more than chance makes of it, that from most frames."""
+    """Index of the best candidate, or of the draw from most frames with the same hypothesis and a cost within chance."""
     params = tuned(Params)
     best = order[0]
     said = candidates[best].assumes
@@ -111,7 +114,7 @@ def _oddness(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule
 
 
 def _costs(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule) -> dict[str, np.ndarray]:
-    """Per candidate all that speaks against it, in units of IoU, by what it is."""
+    """Costs by kind, one array over the candidates each, in units of IoU."""
     consistency_params = tuned(ConsistencyParams)
     params = tuned(Params)
     by_chance = np.array([not c.assumes or rule == "mean" for c in candidates])
@@ -132,7 +135,7 @@ def _costs(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule) 
 
 
 def _papers_choice(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], rule: Rule) -> str:
-    """What the published rule (nearest to the mean box and volume) takes, to end the sentence; empty without a choice."""
+    """Choice of the published rule (nearest to the mean box and volume), as the end of a sentence; empty without one."""
     if len(allowed) < 3 or rule == "mean":
         return ""
     from_mean = _oddness(candidates, allowed, "mean")
@@ -144,7 +147,7 @@ def _papers_choice(candidates: Sequence[MeshAsset], best: int, allowed: Sequence
 def _reason(
     candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray], rule: Rule
 ) -> str:
-    """One sentence for the reviewer: how well it fits, why not its rival, what the paper's rule takes."""
+    """One sentence for the reviewer: how well the candidate fits, why its rival lost, and what the paper's rule takes."""
     chosen, count = candidates[best], len(allowed)
     passed_over = len(candidates) - count
     skipped = f" ({passed_over} rejected)" if passed_over else ""
@@ -152,7 +155,7 @@ def _reason(
         return f"{chosen.candidate_id} is the only candidate left{skipped}."
     name = f"{chosen.candidate_id} ({chosen.assumes})" if chosen.assumes else chosen.candidate_id
     middle = "mean" if rule == "mean" else "others"
-    counted = not chosen.assumes or rule == "mean"  # what assumes something is odd on purpose
+    counted = not chosen.assumes or rule == "mean"  # candidates with a stated hypothesis are odd on purpose
     shape = f"its proportions differ {100 * costs['oddness'][best]:.1f} % from the {middle}, " if counted else ""
     beside = _papers_choice(candidates, best, allowed, rule)
     if "mask_iou" not in chosen.metrics:
@@ -166,7 +169,7 @@ def _reason(
 
 
 def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray]) -> str:
-    """Why not the one that fits masks and depth best of the others, where their fit does not say it; begins with "; "."""
+    """Why the best-fitting rival lost, if its fit does not explain it; begins with "; "."""
     params = tuned(Params)
     fit = costs["fit"]
     rival = min((i for i in allowed if i != best and "mask_iou" in candidates[i].metrics), key=lambda i: fit[i], default=None)

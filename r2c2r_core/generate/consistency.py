@@ -1,4 +1,4 @@
-"""How well a mesh, where its generator believes it is, reproduces the masks and the depth it came from."""
+"""Consistency of a posed mesh with the masks and depth of its views."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,34 +15,43 @@ from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.tuning import param, tuned
 
-VIEWS_KEPT = 24  # an object's pool: what is known of a view is asked for again by every candidate
+VIEWS_KEPT = 24  # size of an object's pool: every candidate needs the same per-view data again
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a candidate is compared with masks and depth."""
+    """Tuned parameters of the comparison with masks and depth."""
 
-    render_px: int = param(240, "px", "long side of the view", source="finer changes the IoU by less than its noise", ge=32)
-    occluder_gap_m: float = param(0.05, "m", "beyond the depth's noise, before the object, from where something hides it")
-    worst_depth_m: float = param(0.2, "m", "to which the error of a depth pixel is cut", source="backends.md 2.7")
-    depth_weight: float = param(2.0, "score", "per metre of depth error, against 1 per unit of IoU", source="backends.md 2.7")
+    render_px: int = param(
+        240, "px", "Long side of the rendered view", source="finer changes the IoU by less than its noise", ge=32
+    )
+    occluder_gap_m: float = param(
+        0.05, "m", "Minimum distance, beyond the depth noise, in front of the object for measured depth to occlude it"
+    )
+    worst_depth_m: float = param(0.2, "m", "Limit to which the error of a depth pixel is clipped", source="backends.md 2.7")
+    depth_weight: float = param(
+        2.0, "score", "Cost per metre of depth error, relative to 1 per unit of IoU", source="backends.md 2.7"
+    )
     whole_m: float = param(
         0.9,
         "m",
-        "longest side of what that weight is for; of a smaller thing, an error counts by its share of the size",
+        "Longest side of an object for which depth_weight applies; for smaller ones errors scale with 1/size",
         source="the chair of backends.md 2.7",
         gt=0,
     )
-    judges: int = param(8, "count", "views of the pool, best first, that judge every shape of an object alike", ge=1)
+    judges: int = param(
+        8, "count", "Number of views of the pool, best first, on which every shape of an object is judged", ge=1
+    )
     copied_cost: float = param(
-        0.05, "score", "of carving, which copies the masks' errors: it has to agree with them better than a clean shape"
+        0.05, "score", "Cost of carving, which reproduces mask errors: it must agree with the masks better than a clean shape"
     )
 
 
 def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray, views: Sequence[View]) -> dict[str, float]:
-    """`mask_iou` of the visible silhouette and `depth_residual_m`, means over the views, and the mesh's longest side, `size_m`.
+    """Mean `mask_iou` of the visible silhouette and mean `depth_residual_m` over the views, and the mesh's longest side,
+    `size_m`.
 
-    A front's mask leaves its carcass out, except where a bare side shows: the better of both silhouettes counts.
+    A front's mask excludes its carcass, except where a bare side shows: the better of both silhouettes counts.
     """
     params = tuned(Params)
     overlaps, residuals = [], []
@@ -64,7 +73,7 @@ def self_consistency(vertices_world: Points, faces: Faces, maskable: np.ndarray,
 
 
 def disagreement(fit: Mapping[str, float]) -> float:
-    """What `self_consistency` measured as one cost, 0 for a perfect fit, in units of IoU."""
+    """Combined cost of the `self_consistency` metrics, 0 for a perfect fit, in units of IoU."""
     params = tuned(Params)
     smaller = max(params.whole_m / fit["size_m"], 1.0)
     return 1.0 - fit["mask_iou"] + params.depth_weight * smaller * fit.get("depth_residual_m", 0.0)
@@ -80,7 +89,7 @@ def silhouette_iou(vertices_world: Points, faces: Faces, views: Sequence[View]) 
 
 
 def render_depth(vertices_world: Points, faces: Faces, view: View) -> DepthMetres:
-    """The mesh's depth in the view's crop, at a small size."""
+    """The mesh's depth rendered in the view's crop at reduced size."""
     camera = view.rgb_camera
     scale = min(1.0, tuned(Params).render_px / max(camera.width, camera.height))
     small = camera.resized(max(round(camera.width * scale), 1), max(round(camera.height * scale), 1))
@@ -89,20 +98,20 @@ def render_depth(vertices_world: Points, faces: Faces, view: View) -> DepthMetre
 
 @lru_cache(maxsize=VIEWS_KEPT)
 def mask_at(view: View, shape: tuple[int, ...]) -> Mask:
-    """The view's mask at another size of its crop."""
+    """The view's mask resampled to another size of its crop."""
     small = cv2.resize(view.mask.astype(np.uint8) * 255, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
     return np.asarray(small > 127)
 
 
 @lru_cache(maxsize=VIEWS_KEPT)
 def sensor_depth(view: View, shape: tuple[int, ...]) -> DepthMetres:
-    """The measured depth at the pixels of the view's colour crop resized to `shape`; 0 where unknown."""
+    """Measured depth at the pixels of the view's colour crop resized to `shape`; 0 where unknown."""
     rgb = view.rgb_camera.resized(shape[1], shape[0])
     values, inside = sample_through(view.depth_m, view.depth_camera, rgb)
     return np.where(inside, values, 0.0).astype(np.float32)
 
 
 def _visible_iou(depth: DepthMetres, sensor: DepthMetres, mask: Mask, noise: DepthNoise) -> float:
-    """IoU of the silhouette with the mask, leaving out pixels where something nearer hides the mesh."""
+    """IoU of the silhouette with the mask, ignoring pixels where something nearer occludes the mesh."""
     hidden = (depth > 0) & noise.occluded(sensor, depth, tuned(Params).occluder_gap_m) & ~mask
     return mask_iou((depth > 0) & ~hidden, mask)

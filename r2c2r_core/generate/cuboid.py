@@ -1,9 +1,9 @@
-"""The upright box that fits an object's masks and depth best: its outline in slanted frames tells the depth nobody faced.
+"""Upright cuboid fitted to silhouettes and depth by robust least squares; oblique frames constrain the unobserved depth.
 
-A front seen squarely says nothing of the depth behind it, and a phone's depth near an outline is a mixture with the wall, so
-extents of points are wrong where a side is seen at a flat angle only. The outline of a box, however, is that of its corners:
-one joint robust least-squares fit over all frames to outline pixels and depth points, with each frame's pose error (a shift
-of its outline) projected out, finds yaw and sides together, and its covariance says which side the scan really fixes.
+A front seen squarely gives no information on the depth behind it, and a phone's depth near an outline mixes with the wall, so
+extents of points are wrong where a side is seen only at a flat angle. The outline of a box, however, is that of its corners:
+one joint robust least-squares fit over all frames to outline pixels and depth points, with each frame's pose error (a shift of
+its outline) projected out, estimates yaw and sides together, and its covariance tells which sides the scan constrains.
 """
 
 from collections.abc import Sequence
@@ -22,47 +22,58 @@ from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.tuning import param, tuned
 
-_YAW_RAD = np.pi  # the local frame's own yaw says next to nothing
-_WALL_ROW, _USUAL_ROW = -3, -1  # of the residuals: what no frame shows of the depth
+_YAW_RAD = np.pi  # weak prior: the local frame's own yaw carries almost no information
+_WALL_ROW, _USUAL_ROW = -3, -1  # rows of the residuals: priors on the depth that no frame shows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What is known, and how well, of a box fitted to masks and depth."""
+    """Tuned noise levels, priors and iterations of the cuboid fit."""
 
-    outline_samples: int = param(80, "count", "of a view's outline", ge=8)
-    points: int = param(1200, "count", "depth points that are fitted", ge=10)
-    outline_m: float = param(0.004, "m", "noise of an outline, one sigma", gt=0)
-    depth_m: float = param(0.008, "m", "noise of a depth point, one sigma", gt=0)
+    outline_samples: int = param(80, "count", "Approximate number of outline pixels sampled per view", ge=8)
+    points: int = param(1200, "count", "Approximate number of depth points in the fit", ge=10)
+    outline_m: float = param(0.004, "m", "Standard deviation of an outline pixel", gt=0)
+    depth_m: float = param(0.008, "m", "Standard deviation of a depth point", gt=0)
     independent: float = param(
-        12.0, "count", "outline pixels, and depth points, of one frame that err on their own: neighbours err together", gt=0
+        12.0,
+        "count",
+        "Effective number of independent outline pixels, and depth points, per frame: neighbours' errors correlate",
+        gt=0,
     )
-    robust: float = param(2.5, "σ", "beyond which a residual is something else", gt=0)
-    shift_m: float = param(0.006, "m", "a frame's pose error, across the view", gt=0)
-    wall_m: float = param(0.003, "m", "how far a box may stand in a wall, one sigma", gt=0)
-    usual_depth: float = param(0.5, "ratio", "of depth to width: all that is known of a box seen squarely", gt=0)
-    depth_spread: float = param(0.35, "ratio", "of that, one sigma", gt=0)
-    starts: tuple[float, float, float] = param((0.25, 0.5, 1.0), "ratio", "of depth to width, from where the fit starts")
-    same_yaw_rad: float = param(float(np.radians(2.0)), "rad", "between two yaws to start from")
-    no_box_m: float = param(0.012, "m", "median distance of the depth points from the box, beyond which it is no box")
-    rough_rounds: int = param(8, "count", "of the first fit", ge=1)
-    rounds: int = param(12, "count", "of the last", ge=1)
-    along_px: float = param(2.5, "px", "of depth, to either side of an outline, where it is judged whose outline it is")
-    before_m: float = param(0.03, "m", "nearer beyond the outline than within: something else covers the object")
+    robust: float = param(
+        2.5, "σ", "Residual, in standard deviations, at which the Cauchy kernel starts to discount outliers", gt=0
+    )
+    shift_m: float = param(0.006, "m", "Standard deviation of a frame's pose error across the view", gt=0)
+    wall_m: float = param(0.003, "m", "Standard deviation of how far a box may penetrate a wall", gt=0)
+    usual_depth: float = param(
+        0.5, "ratio", "Prior mean of the ratio of depth to width, the only information for a box seen squarely", gt=0
+    )
+    depth_spread: float = param(0.35, "ratio", "Standard deviation of the depth prior, relative to the width", gt=0)
+    starts: tuple[float, float, float] = param(
+        (0.25, 0.5, 1.0), "ratio", "Ratios of depth to width at which the fit is initialised"
+    )
+    same_yaw_rad: float = param(float(np.radians(2.0)), "rad", "Yaw difference below which two initial yaws count as the same")
+    no_box_m: float = param(0.012, "m", "Maximum median distance of the depth points from the box for it to be accepted")
+    rough_rounds: int = param(8, "count", "Maximum function evaluations of the coarse fit", ge=1)
+    rounds: int = param(12, "count", "Maximum function evaluations of the final fit", ge=1)
+    along_px: float = param(2.5, "px", "Offset to either side of an outline at which depth decides whose outline it is")
+    before_m: float = param(
+        0.03, "m", "Depth step from inside to outside the outline above which a nearer object occludes this one"
+    )
 
 
 class Cuboid(NamedTuple):
-    """An upright box, and how well the scan fixes its sides."""
+    """An upright cuboid with the uncertainty of its sides."""
 
     world_from_cuboid: Rigid3  # origin at its centre, +Z up, -Y towards the cameras
     size_m: Vector3
-    sigma_m: Vector3  # standard deviation of each size by what the frames show
-    depth_spread_m: float  # of the depth by all that is known: walls and what is usual too
+    sigma_m: Vector3  # standard deviation of each size from the frames alone
+    depth_spread_m: float  # standard deviation of the depth including the priors: walls and the usual ratio
     cost: float
 
 
 class _Outline(NamedTuple):
-    """Outline pixels of one view that are the object's own edge."""
+    """Outline pixels of one view that belong to the object's own edge."""
 
     view: View
     uv_px: np.ndarray
@@ -77,10 +88,10 @@ def fit_cuboid(
     world_from_local: Rigid3,
     walls: Sequence[Wall],
 ) -> Cuboid | None:
-    """The box nearest to points and outlines, from the box `low`..`high` of the local frame; None without three outlines,
-    or where the points lie on no box.
+    """Cuboid fitted to points and outlines, started from the box `low`..`high` of the local frame.
 
-    The bottom, `low[2]`, is what it stands on and stays. Walls are the room's, in the world frame.
+    None without three outlines, or where the points do not lie on a box. The bottom, `low[2]`, is the support height and stays
+    fixed. Walls are the room's, in the world frame.
     """
     params = tuned(Params)
     outlines = [found for view in views if (found := _own_outline(view)) is not None]
@@ -106,7 +117,7 @@ def fit_cuboid(
 
 
 def _starts(points: Points, top_m: float) -> list[np.ndarray]:
-    """Boxes of several depths behind the points, along the frame and along the points' own smallest rectangle."""
+    """Initial boxes of several depths, along the frame and along the points' own smallest rectangle."""
     params = tuned(Params)
     own = (upright_box(points, trim=0.01).yaw_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4
     starts = []
@@ -124,7 +135,7 @@ def surface_distance(cuboid: Cuboid, points_world: Points) -> np.ndarray:
 
 
 def room_behind(cuboid: Cuboid, walls: Sequence[Wall]) -> float:
-    """How much deeper the box may be before its back stands in a wall, metres; infinite where none is behind it."""
+    """Free depth behind the box before its back meets a wall, metres; infinite without a wall behind it."""
     params = tuned(Params)
     corners = cuboid.world_from_cuboid.apply(box_corners(cuboid.size_m))
     into = cuboid.world_from_cuboid.rotation[:, 1]
@@ -137,7 +148,7 @@ def room_behind(cuboid: Cuboid, walls: Sequence[Wall]) -> float:
 
 
 class _Problem:
-    """Residuals of a box (yaw, left, right, front, back, top; local frame) and their weights."""
+    """Residuals and weights of a box (yaw, left, right, front, back, top; local frame)."""
 
     def __init__(
         self,
@@ -165,7 +176,7 @@ class _Problem:
         self._scales: np.ndarray = scales
 
     def fitted(self, start: np.ndarray, rounds: int) -> tuple[np.ndarray, float]:
-        """Parameters of the least robust cost from `start` (Cauchy kernel, trust region), and that cost."""
+        """Minimiser of the robust cost from `start` (Cauchy kernel, trust region), and its cost."""
         from scipy.optimize import least_squares
 
         sigma = self._weights**-0.5
@@ -178,11 +189,11 @@ class _Problem:
         return solved.x, 2.0 * float(solved.cost)
 
     def median_distance(self, parameters: np.ndarray) -> float:
-        """Of the depth points from the box's surface, metres."""
+        """Median distance of the depth points from the box's surface, metres."""
         return float(np.median(np.abs(self._residuals(parameters)[: len(self._points)])))
 
     def size_sigma(self, parameters: np.ndarray, left_out: tuple[int, ...]) -> Vector3:
-        """Standard deviation of width, depth and height by the curvature at the fit, some rows left out."""
+        """Standard deviation of width, depth and height from the curvature at the fit, with some rows left out."""
         residual = self._residuals(parameters)
         slope = self._slope(parameters, residual)
         weight = self._weights * cauchy(residual, self._scales)
@@ -218,7 +229,7 @@ def _box_distance(points: Points, half: np.ndarray) -> np.ndarray:
 
 
 def _outline_residual(corners_camera: Points, outline: _Outline) -> np.ndarray:
-    """Metres of each outline pixel outside the corners' silhouette, without what a shift of the whole frame explains."""
+    """Signed distance (m) of outline pixels from the corners' silhouette, a common shift of the frame projected out."""
     params = tuned(Params)
     if corners_camera[:, 2].min() < 0.05:
         return np.full(len(outline.uv_px), 1.0)
@@ -237,7 +248,7 @@ def _outline_residual(corners_camera: Points, outline: _Outline) -> np.ndarray:
 
 
 def _own_outline(view: View) -> _Outline | None:
-    """The outline pixels that are neither at the photo's border nor beside something in front; None for too few."""
+    """Outline pixels away from the photo's border and from occluders; None if too few."""
     params = tuned(Params)
     contours, _ = cv2.findContours(view.mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
@@ -267,7 +278,7 @@ def _own_outline(view: View) -> _Outline | None:
 
 
 def _depth_at(view: View, uv_px: np.ndarray) -> np.ndarray:
-    """The measured depth at pixels of the colour crop; 0 where unknown."""
+    """Measured depth at pixels of the colour crop; 0 where unknown."""
     rays = unproject(uv_px, np.ones(len(uv_px)), view.rgb_camera)
     values, inside = sample_nearest(view.depth_m, project(rays, view.depth_camera))
     return np.where(inside, values, 0.0)

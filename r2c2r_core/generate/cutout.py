@@ -1,4 +1,4 @@
-"""What an image-to-3D model is shown: the object alone, as RGBA with the mask in alpha."""
+"""Input image of an image-to-3D model: the object alone as RGBA, with the mask in alpha."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ _BORDER_PX = 4
 def rgba_cutout(view: View, longest_px: int = LONGEST_PX) -> RGBA:
     """The view's crop with its mask in alpha, at most `longest_px` wide or high; raises GenerationFailed without a usable mask.
 
-    Some alpha is always 0: TRELLIS takes an image without transparency for one whose background it must remove itself.
+    Some alpha is always 0: TRELLIS removes the background itself from an image without transparency.
     """
     rows, columns = np.flatnonzero(view.mask.any(axis=1)), np.flatnonzero(view.mask.any(axis=0))
     if min(len(rows), len(columns)) < _LEAST_PX:
@@ -35,7 +35,7 @@ def rgba_cutout(view: View, longest_px: int = LONGEST_PX) -> RGBA:
 
 
 def bounded(view: View, longest_px: int = LONGEST_PX) -> View:
-    """The view with a picture of at most `longest_px`; its depth keeps its own resolution."""
+    """The view with its colour image limited to `longest_px`; its depth keeps its own resolution."""
     height, width = view.mask.shape
     scale = longest_px / max(height, width)
     if scale >= 1:
@@ -52,7 +52,7 @@ def usable_views(views: tuple[View, ...]) -> tuple[View, ...]:
 
 
 def png_of(rgba: RGBA) -> bytes:
-    """The picture as PNG."""
+    """The image as PNG bytes."""
     done, png = cv2.imencode(".png", cv2.cvtColor(rgba, cv2.COLOR_RGBA2BGRA))
     assert done, "encoding a uint8 array cannot fail"
     return png.tobytes()

@@ -1,4 +1,4 @@
-"""A mesh made by a model elsewhere, as a candidate: checked, closed, and with what was done to it."""
+"""Import of a mesh from an external model as a candidate: checked, closed, with a record of the changes."""
 
 import zlib
 
@@ -25,9 +25,9 @@ def delivered_asset(
     warnings: tuple[str, ...] = (),
     assumes: str = "",
 ) -> MeshAsset:
-    """The parts as one closed candidate in a frame and unit of its own; raises GenerationFailed for what cannot be closed.
+    """The parts as one closed candidate in its own frame and unit; raises GenerationFailed for what cannot be closed.
 
-    Its place is not kept: placing is the next stage's, and a +Y-up GLB is turned like everything else.
+    Its pose is discarded, since placement is the next stage's task, and a +Y-up GLB is rotated like every other mesh.
     """
     rng = np.random.default_rng([zlib.crc32(object_name.encode()), zlib.crc32(candidate_id.encode()), seed])
     try:
@@ -51,5 +51,5 @@ def delivered_asset(
 
 
 def first_line(error: Exception) -> str:
-    """What a model's own code raised, in a line: of CUDA it is often a page."""
+    """First line of an exception from a model's own code; CUDA errors often fill a page."""
     return (str(error).strip() or type(error).__name__).splitlines()[0][:200]

@@ -1,4 +1,4 @@
-"""What is known about one object before a mesh is made: its good frames, cropped to it, with mask and depth."""
+"""Evidence of one object for mesh generation: its good frames, cropped to it, with mask and depth."""
 
 from dataclasses import dataclass
 
@@ -20,10 +20,13 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which depth pixels of an object are its outline."""
+    """Tuned parameters of depth edges."""
 
     edge_step: float = param(
-        0.06, "ratio", "of a step within 3x3 pixels to the depth: the outline, where depth mixes", source="backends.md 2.7"
+        0.06,
+        "ratio",
+        "Depth step within 3x3 pixels, relative to the depth, above which a pixel mixes depths at an edge",
+        source="backends.md 2.7",
     )
 
 
@@ -44,7 +47,7 @@ class View:
 
     @property
     def eye_world(self) -> Vector3:
-        """Where the camera stands."""
+        """Camera centre."""
         return self.world_from_camera.translation
 
 
@@ -70,12 +73,14 @@ def gather_evidence(capture: Capture, track: MaskTrack, pool_size: int) -> Evide
     best_first = np.argsort(-view_scores(chosen), kind="stable")
     pool = [_load_view(capture, chosen[k].mask, capture.frame(chosen[k].frame_index), float(order[k])) for k in best_first]
     front = track.front
-    closed = [view for view in pool if front is None or not _is_open(view, front)]  # one joint state: as it was measured
+    closed = [
+        view for view in pool if front is None or not _is_open(view, front)
+    ]  # one joint state: the one in which the front was measured
     return Evidence(capture=capture, track=track, pool=tuple(closed or pool))
 
 
 def object_centre(capture: Capture, track: MaskTrack, frame: Frame) -> Vector3:
-    """Where the object is, in the world: from what the segmenter measured, else the median depth point of `frame`."""
+    """World position of the object: the segmenter's measurement, else the median depth point of `frame`."""
     if track.box is not None:
         return track.box.world_from_object.translation
     if track.front is not None:
@@ -112,7 +117,7 @@ def moved_edge(mask: Mask, outwards_px: float) -> Mask:
 
 
 def depth_edges(depth_m: DepthMetres) -> Mask:
-    """Pixels whose neighbourhood steps in depth."""
+    """Mask of pixels whose 3x3 neighbourhood contains a depth step."""
     filled = np.where(depth_m > 0, depth_m, np.nan).astype(np.float32)
     near = cv2.erode(np.where(np.isnan(filled), np.float32(1e3), filled), np.ones((3, 3), np.uint8))
     far = cv2.dilate(np.where(np.isnan(filled), np.float32(0), filled), np.ones((3, 3), np.uint8))
@@ -130,7 +135,7 @@ def _view_of(frame: Frame, track: MaskTrack, centre_world: Vector3) -> MaskView:
 
 
 def _is_open(view: View, front: FrontPanel) -> bool:
-    """Whether the front stands open in a view."""
+    """Whether a view shows the front open."""
     return stands_open(-front.world_from_front.inverse.apply(masked_points(view))[:, 1])
 
 

@@ -1,4 +1,4 @@
-"""One HTTP request at a time to a machine that may be slow, gone or wrong: bounded, repeatable, and stoppable."""
+"""Bounded, repeatable and cancellable HTTP requests to a generator that may be slow, unreachable or faulty."""
 
 import contextlib
 import http.client
@@ -14,29 +14,29 @@ from urllib.parse import urlsplit
 from r2c2r_core.errors import BackendUnavailable, GenerationFailed
 from r2c2r_core.progress import SILENT, Progress
 
-MOST_BYTES = 200_000_000  # of an answer: ten times the largest GLB that TRELLIS gives
-_PASSING = (429, 502, 503, 504)  # states a server leaves by itself
-_POLL_S = 0.2  # how soon a person's "stop" is noticed
+MOST_BYTES = 200_000_000  # limit of a response: ten times the largest GLB that TRELLIS returns
+_PASSING = (429, 502, 503, 504)  # transient states
+_POLL_S = 0.2  # interval at which a cancellation is noticed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Patience:
-    """How long and how often to try."""
+    """Timeouts and number of attempts."""
 
     connect_s: float = 10.0
     answer_s: float = 900.0  # a textured sample takes 20 s to some minutes, and it may wait behind others
-    leave_s: float = 3.0  # to connect, and to be heard, when nobody waits for an answer any more
+    leave_s: float = 3.0  # to cancel a job on the server whose result is no longer needed
     tries: int = 4
     first_wait_s: float = 1.0  # doubled after every try
 
 
 class _NoAnswer(TimeoutError):
-    """Who took the connection said nothing for too long."""
+    """Response timeout of a server that accepted the connection."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Endpoint:
-    """A server, and how to talk to it."""
+    """A server with its token and timeouts."""
 
     url: str  # http(s)://host[:port][/path]
     token: str = ""
@@ -69,10 +69,10 @@ def ask(
     *,
     progress: Progress = SILENT,
 ) -> bytes:
-    """The body of a successful answer.
+    """The body of a successful response.
 
-    Passing failures are tried again with growing pauses. Raises BackendUnavailable when the server cannot be used at all
-    (unreachable, wrong token, wrong path), GenerationFailed when it refuses or breaks on this request, Cancelled when asked.
+    Transient failures are retried with exponential back-off. Raises BackendUnavailable when the server cannot be used at all
+    (unreachable, wrong token, wrong path), GenerationFailed when it refuses or fails on this request, Cancelled on request.
     """
     patience = endpoint.patience
     wait = patience.first_wait_s
@@ -102,13 +102,13 @@ def ask(
 def ask_json(
     endpoint: Endpoint, method: str, path: str, document: Any = None, *, progress: Progress = SILENT
 ) -> dict[str, Any]:
-    """The JSON object of a successful answer; raises as `ask` does."""
+    """The JSON object of a successful response; raises as `ask` does."""
     body = None if document is None else json.dumps(document).encode()
     return json_object(endpoint, ask(endpoint, method, path, body, progress=progress))
 
 
 def json_object(endpoint: Endpoint, content: bytes) -> dict[str, Any]:
-    """The JSON object in an answer's body; raises GenerationFailed when it is none."""
+    """The JSON object in a response body; raises GenerationFailed if there is none."""
     try:
         answer = json.loads(content)
     except (ValueError, RecursionError) as error:
@@ -121,7 +121,7 @@ def json_object(endpoint: Endpoint, content: bytes) -> dict[str, Any]:
 def _once(
     endpoint: Endpoint, method: str, path: str, body: bytes | None, content_type: str, progress: Progress
 ) -> tuple[int, bytes, float]:
-    """Status, body and Retry-After of one request. It runs in a thread of its own, so that a person can stop it."""
+    """Status, body and Retry-After of one request, which runs in its own thread so that it can be cancelled."""
     connection, connected = _connection(endpoint), threading.Event()
     outcome: list[tuple[int, bytes, float] | BaseException] = []
 
@@ -136,7 +136,7 @@ def _once(
             connection.request(method, path, body, headers)
             with connection.getresponse() as response:
                 outcome.append((response.status, _bounded(response), _seconds(response.headers.get("Retry-After"))))
-        except BaseException as error:  # handed to the waiting thread as it is
+        except BaseException as error:  # passed unchanged to the waiting thread
             outcome.append(error)
         finally:
             connection.close()
@@ -167,7 +167,7 @@ def _connection(endpoint: Endpoint) -> http.client.HTTPConnection:
 
 
 def _hang_up(connection: http.client.HTTPConnection) -> None:
-    """End the talk, also under a thread that is reading: it then finds the connection closed."""
+    """Shut the connection down, even while a thread reads from it: that thread then finds it closed."""
     with contextlib.suppress(OSError, AttributeError):  # not connected yet, or closed already
         connection.sock.shutdown(socket.SHUT_RDWR)
 
@@ -180,7 +180,7 @@ def _bounded(response: http.client.HTTPResponse) -> bytes:
 
 
 def _judged(endpoint: Endpoint, path: str, status: int, content: bytes) -> bytes:
-    """The body of a good answer, or the failure that the status means."""
+    """The body of a successful response; raises the failure that the status means."""
     if 200 <= status < 300:
         return content
     said = _said(content)
@@ -198,7 +198,7 @@ def _judged(endpoint: Endpoint, path: str, status: int, content: bytes) -> bytes
 
 
 def _said(content: bytes) -> str:
-    """What the server said about its failure, on one short line."""
+    """The server's failure message on one short line."""
     text = " ".join(content[:2000].decode(errors="replace").split())
     return f": {text[:200]}" if text else ""
 

@@ -1,4 +1,4 @@
-"""Carved things in their variants: what nobody saw solid, mirrored, empty, or on legs."""
+"""Hypotheses of carved objects: unobserved space solid, mirrored, empty, or on legs."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -29,13 +29,15 @@ ON_LEGS = "a slab on four legs"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a thing is solid in any case."""
+    """Tuned parameters of sheet-like objects."""
 
-    least_sheets: float = param(3.0, "ratio", "of its width to a board's thickness, below which it is")
+    least_sheets: float = param(
+        3.0, "ratio", "Smallest extent, in sheet thicknesses, above which the sheet hypothesis is offered"
+    )
 
 
 def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) -> tuple[Hypothesis, ...]:
-    """What masks and free space leave, completed in several ways; raises GenerationFailed where there is too little depth."""
+    """Visual hull and free space completed in several ways; raises GenerationFailed with too little depth."""
     is_legged = category_of(evidence.track.category).on_legs
 
     @lru_cache(maxsize=1)  # the variants of one draw share it
@@ -98,7 +100,7 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
 
 
 def _cost(hypothesis: Hypothesis, evidence: Evidence, everything: Variation) -> float:
-    """How far it disagrees with masks and depth of the best frames; infinite for what cannot be made."""
+    """Disagreement with masks and depth of the best frames; infinite for a hypothesis that yields no shape."""
     try:
         shape = hypothesis.shape(everything)
     except GenerationFailed:
@@ -109,13 +111,13 @@ def _cost(hypothesis: Hypothesis, evidence: Evidence, everything: Variation) -> 
 
 class _Carved(NamedTuple):
     carving: Carving
-    field: np.ndarray  # solid where nobody saw it, mirrored where it is symmetric
+    field: np.ndarray  # unobserved space solid, mirrored where the object is symmetric
     mirrored: bool
     level: float
 
 
 def _on_legs(known: _Carved, support: Support) -> Shape:
-    """What was carved above the slab's underside, the whole slab, and its posts."""
+    """The carved shape above the slab's underside, united with the whole slab and its posts."""
     body = _surfaced(known, above(known.carving, known.field, float(support.slab.low[2])))
     boxes = [box_mesh(*support.slab), *(post.surface() for post in support.posts)]
     count, unseen = len(support.posts), sum(not post.is_seen for post in support.posts)
@@ -130,7 +132,7 @@ def _on_legs(known: _Carved, support: Support) -> Shape:
 
 
 def _less_likely(shape: Shape, known: _Carved, field: np.ndarray, support: Support | None) -> Shape:
-    """A slab that was seen on posts has air under it: the mean height of what is there is an error that nobody saw."""
+    """The shape, with the mean height of its volume below a slab on posts as unobserved error: that space should be air."""
     if support is None:
         return shape
     plan = (support.slab.high - support.slab.low)[:2]
@@ -139,7 +141,7 @@ def _less_likely(shape: Shape, known: _Carved, field: np.ndarray, support: Suppo
 
 
 def _surfaced(known: _Carved, field: np.ndarray, **parameters: float) -> Shape:
-    """The field's closed surface at the level that suits the draw's masks."""
+    """Closed surface of the field at the level that suits the draw's masks."""
     seen = known.carving.seen
     surface = surface_at(known.carving.grid, field, known.level, seen.floor)
     return thing_model(surface, seen.world_from_local, {**parameters, "carved": 1.0, "level_m": known.level})

@@ -1,4 +1,4 @@
-"""What may be true of an object beyond what was seen: one of several completions somebody could want."""
+"""Shape hypothesis: one way to complete the unobserved part of an object."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from r2c2r_core.generate.variation import Variation
 
 
 class Hypothesis(NamedTuple):
-    """A completion, and in a few words what it takes for true ("{depth_m:.2f} m deep, to the wall behind it")."""
+    """A completion and a short statement of what it assumes ("{depth_m:.2f} m deep, to the wall behind it")."""
 
-    assumes: str  # a format that the made shape's parameters fill: each draw tells its own measures
+    assumes: str  # a format string filled with the parameters of the shape of each draw
     shape: Callable[[Variation], Shape]  # raises GenerationFailed

@@ -1,4 +1,4 @@
-"""The jobs of a worker: one at a time, in order, each with its state and its mesh until somebody fetched it or it got old."""
+"""Job queue of a worker: one job at a time, in order; finished jobs keep their mesh until it is deleted or expires."""
 
 import hashlib
 import logging
@@ -21,27 +21,27 @@ log = logging.getLogger(__name__)
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 Make = Callable[[Wish, Progress], MeshAsset]
 
-_KEPT = 64  # finished jobs remembered
-_WAITING = 32  # jobs that may wait
+_KEPT = 64  # maximum number of finished jobs remembered
+_WAITING = 32  # maximum number of waiting jobs
 
 
 @dataclass(slots=True)
 class Job:
-    """One wish and what became of it."""
+    """One request with its state and result."""
 
-    wish: Wish | None  # dropped when it is done: its pictures are large
+    wish: Wish | None  # dropped when it is done: its images are large
     state: State = "queued"
     error: str = ""
     artifact: dict[str, Any] = field(default_factory=dict)
     glb: bytes = b""
 
     def to_json(self) -> dict[str, Any]:
-        """As the protocol shows it."""
+        """The job's state in the protocol's JSON form."""
         return {"state": self.state, "error": self.error, "artifacts": [self.artifact] if self.state == "done" else []}
 
 
 class Jobs:
-    """A queue with one worker thread: a GPU makes one mesh at a time."""
+    """A queue with one worker thread: a GPU generates one mesh at a time."""
 
     def __init__(self, make: Make) -> None:
         self._make = make
@@ -51,7 +51,7 @@ class Jobs:
         threading.Thread(target=self._work, daemon=True).start()
 
     def add(self, wish: Wish) -> str | None:
-        """The new job's id; None when too many wait already."""
+        """The new job's id; None when the queue is full."""
         identity = secrets.token_hex(8)
         with self._lock:
             try:
@@ -65,12 +65,12 @@ class Jobs:
         return identity
 
     def find(self, identity: str) -> Job | None:
-        """The job of that id, while it is remembered."""
+        """The job with that id, while it is remembered."""
         with self._lock:
             return self._jobs.get(identity)
 
     def cancel(self, identity: str) -> bool:
-        """Stop a job that is not done yet and forget its mesh; False when there is none of that id."""
+        """Cancel an unfinished job and discard its mesh; False when no job has that id."""
         job = self.find(identity)
         if job is None:
             return False
@@ -92,7 +92,7 @@ class Jobs:
             asset = self._make(wish, Progress(is_cancelled=lambda: job.state == "cancelled"))
             glb = glb_bytes(asset.mesh.vertices, asset.mesh.faces, asset.mesh.uv, asset.mesh.texture)
         except Cancelled:
-            pass  # its state says so already
+            pass  # its state is already set
         except Exception as error:  # the edge of a job: the traceback goes to the log, one line to the client
             log.warning("%s %s failed", wish.evidence.track.name, wish.candidate_id, exc_info=not isinstance(error, R2C2RError))
             self._finish(job, "failed", error=" ".join(str(error).split())[:300] or type(error).__name__)
@@ -106,7 +106,7 @@ class Jobs:
             job.wish = None
             if job.state == "running":
                 job.error, job.glb, job.artifact = error, glb, artifact or {}
-                job.state = state  # last: who sees it done finds the mesh
+                job.state = state  # last, so that a client that sees it done finds the mesh
 
 
 def _artifact(asset: MeshAsset, glb: bytes) -> dict[str, Any]:

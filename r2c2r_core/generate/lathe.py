@@ -1,7 +1,7 @@
-"""Round things (bottles, cans, vases): one clean body of revolution whose profile is read off the masks.
+"""Solids of revolution (bottles, cans, vases): one clean solid whose profile is measured in the silhouettes.
 
-A LiDAR pixel is a fifth of a bottle; a colour pixel is a fortieth. So depth says where the axis is and that the thing is
-round, and the silhouettes say how wide it is at each height.
+A LiDAR pixel covers a fifth of a bottle's width, a colour pixel a fortieth. So depth determines the axis and that the object is
+round, and the silhouettes determine its width at each height.
 """
 
 from dataclasses import dataclass
@@ -19,29 +19,34 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Bodies of revolution read off the masks."""
+    """Tuned parameters of solids of revolution."""
 
-    rings: int = param(40, "count", "heights of the profile", ge=4)
-    segments: int = param(40, "count", "round the axis", ge=6)
-    step_px: float = param(0.25, "px", "between places across an outline", gt=0)
-    same_width: float = param(0.08, "share", "of the median radius by which a view's own may differ and be whole")
-    bitten: float = param(
-        0.88, "ratio", "of the narrower to the wider side, below which the mask is bitten, not the thing", gt=0, lt=1
+    rings: int = param(40, "count", "Number of heights of the profile", ge=4)
+    segments: int = param(40, "count", "Number of segments around the axis", ge=6)
+    step_px: float = param(0.25, "px", "Sampling distance across an outline", gt=0)
+    same_width: float = param(
+        0.08, "share", "Maximum deviation of a view's width, relative to the median, for its silhouette to be complete"
     )
-    mask_weight: float = param(0.3, "ratio", "of the masks to the depth, where the axis is fitted")
-    least_views: int = param(3, "count", "that tell a radius", ge=1)
+    bitten: float = param(
+        0.88, "ratio", "Ratio of narrower to wider half-width below which the narrower side counts as occluded", gt=0, lt=1
+    )
+    mask_weight: float = param(0.3, "ratio", "Weight of the masks relative to depth in the axis fit")
+    least_views: int = param(3, "count", "Minimum number of views that measure a radius", ge=1)
     robust_scales_m: tuple[float, float, float, float] = param(
-        (0.04, 0.02, 0.01, 0.01), "m", "of the depth residuals, round by round", source="the first axis may be 2 cm off"
+        (0.04, 0.02, 0.01, 0.01),
+        "m",
+        "Scale of the robust kernel on depth residuals, iteration by iteration",
+        source="the initial axis may be 2 cm off",
     )
 
 
 def fit_lathe(
     points: Points, start: Revolution, bottom_m: float, top_m: float, views: tuple[View, ...], world_from_local: Rigid3
 ) -> Revolution | None:
-    """The body of revolution that fits masks and depth best, or None where too few masks show the thing whole.
+    """Solid of revolution fitted to masks and depth; None if too few masks show the whole object.
 
-    The rays through the mask's two edges at a height touch the circle there, which gives the radius; with the radii known,
-    the axis is where the depth points lie on them and the masks are balanced about it. (A circle fitted to depth alone is
+    The rays through the mask's two edges at a height are tangent to the circle there, which gives the radius; with the radii
+    known, the axis is where the depth points lie on them and the masks are centred on it. (A circle fitted to depth alone is
     too small and too near: noise along the rays looks like curvature.)
     """
     params = tuned(Params)
@@ -60,7 +65,7 @@ def fit_lathe(
 
 
 def is_round(points: Points, revolution: Revolution) -> bool:
-    """Whether the points lie on the revolution within LiDAR noise: a carton's flat side and a mug's handle do not."""
+    """Whether the points lie on the solid of revolution within LiDAR noise: a carton's flat side and a mug's handle do not."""
     off = np.abs(revolution.signed_distance(points))
     radius = np.interp(points[:, 2], revolution.heights_m, revolution.radii_m)
     near = off < np.maximum(0.01, 0.3 * radius)
@@ -70,7 +75,7 @@ def is_round(points: Points, revolution: Revolution) -> bool:
 def _silhouette_profile(
     revolution: Revolution, bottom_m: float, top_m: float, views: tuple[View, ...], world_from_local: Rigid3
 ) -> tuple[Revolution, np.ndarray] | None:
-    """Radii at `_RINGS` heights, and each view's equation (sideways x, y, metres): how far its mask is off the axis."""
+    """Radii at `rings` heights, and per view one equation (sideways x, y, metres) for its mask's offset from the axis."""
     params = tuned(Params)
     from scipy import ndimage
 
@@ -86,7 +91,7 @@ def _silhouette_profile(
     smooth = ndimage.gaussian_filter1d(ndimage.median_filter(radii, 5, mode="nearest"), 1.0, mode="nearest")
     step = (top_m - bottom_m) / params.rings
     ends = np.concatenate([[bottom_m], heights, [heights[-1] + step / 2]])
-    # a mask narrower than the others ends at something in front, not at the thing's own outline
+    # a mask narrower than the others ends at an occluder, not at the object's own outline
     own = [k for k in range(len(views)) if abs(_middle(widths[k] / radii) - 1.0) < params.same_width]
     balance = np.array([_balance(revolution, edges[k], views[k], world_from_local) for k in own]).reshape(-1, 3)
     profile = Revolution(revolution.centre, ends, np.concatenate([smooth[:1], smooth, smooth[-1:]]))
@@ -94,7 +99,7 @@ def _silhouette_profile(
 
 
 def _full_halves(edges: np.ndarray) -> np.ndarray:
-    """Half-widths (view, height) from both edges; where one side is bitten out, the other one, for the thing is symmetric."""
+    """Half-widths (view, height) from both edges; where one side is occluded the other one counts, by symmetry."""
     shift = np.array([_middle((view[0] - view[1]) / 2) for view in edges])
     centred = edges - np.where(np.isfinite(shift), shift, 0.0)[:, None, None] * np.array([1.0, -1.0])[None, :, None]
     narrow, wide = centred.min(axis=1), centred.max(axis=1)
@@ -102,13 +107,13 @@ def _full_halves(edges: np.ndarray) -> np.ndarray:
 
 
 def _middle(values: np.ndarray) -> float:
-    """Median of the numbers among the values; infinite where there are none."""
+    """Median of the finite values; infinite without any."""
     numbers = values[np.isfinite(values)]
     return float(np.median(numbers)) if len(numbers) else np.inf
 
 
 def _balance(revolution: Revolution, edges: np.ndarray, view: View, world_from_local: Rigid3) -> np.ndarray:
-    """(sideways x, sideways y, metres the mask's middle lies that way); nan where the axis is hidden."""
+    """(sideways x, sideways y, offset of the mask's centre in that direction in metres); nan where the axis is hidden."""
     shift = (edges[0] - edges[1]) / 2
     seen = np.isfinite(shift)
     if not seen.any():
@@ -118,19 +123,19 @@ def _balance(revolution: Revolution, edges: np.ndarray, view: View, world_from_l
 
 
 def _forward(revolution: Revolution, view: View, world_from_local: Rigid3) -> np.ndarray:
-    """From the camera to the axis, level, local frame."""
+    """Horizontal vector from the camera to the axis, local frame."""
     return np.asarray(revolution.centre - world_from_local.inverse.apply(view.eye_world[None])[0, :2])
 
 
 def _balanced_centre(points: Points, profile: Revolution, balance: np.ndarray, scale_m: float) -> np.ndarray:
-    """The axis' place after one Gauss-Newton step: points on the radii (robust), masks balanced."""
+    """Axis position after one Gauss-Newton step: points on the radii (robust), masks centred."""
     offset = points[:, :2] - profile.centre
     distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-6)
     body = (points[:, 2] > profile.heights_m[0]) & (points[:, 2] < profile.heights_m[-1])
     residual = distance - np.interp(points[:, 2], profile.heights_m, profile.radii_m)
     weight = np.where(body, cauchy(residual, scale_m), 0.0)
     rows = (offset / distance[:, None]) * weight[:, None]
-    # masks fix the axis sideways; how far away it is they only tell through pose errors, so depth weighs more
+    # masks constrain the axis sideways; its distance they show only through pose errors, so depth has more weight
     share = tuned(Params).mask_weight * weight.sum() / max(len(balance), 1) * cauchy(balance[:, 2:], scale_m)
     system = np.concatenate([rows, balance[:, :2] * share])
     target = np.concatenate([residual * weight, balance[:, 2] * share[:, 0]])
@@ -139,7 +144,7 @@ def _balanced_centre(points: Points, profile: Revolution, balance: np.ndarray, s
 
 
 def lathe_mesh(revolution: Revolution) -> tuple[Points, Faces]:
-    """The closed, outward surface of a body of revolution with flat ends."""
+    """Closed, outward-facing surface of a solid of revolution with flat ends."""
     params = tuned(Params)
     angle = np.arange(params.segments) / params.segments * 2 * np.pi
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -183,20 +188,20 @@ def _half_widths(revolution: Revolution, heights: np.ndarray, view: View, world_
     for sign, run in ((1.0, right), (-1.0, left)):
         edge = pixel + sign * (_run_length(run) - 0.5)[:, None] * params.step_px * across
         ray = (unproject(edge, np.ones(len(edge)), view.rgb_camera) @ local_from_camera.T)[:, :2]
-        # seen from above, the ray touches the circle: its distance from the axis is the radius
+        # in plan view the ray is tangent to the circle: its distance from the axis is the radius
         edges.append(sign * (ray[:, 0] * forward[1] - ray[:, 1] * forward[0]) / np.linalg.norm(ray, axis=1))
     return np.where(shown, np.stack(edges), np.nan)
 
 
 def _run_length(rows: np.ndarray) -> np.ndarray:
-    """How many leading entries of each row are true."""
+    """Number of leading true entries in each row."""
     return np.asarray(np.where(rows.all(axis=1), rows.shape[1], np.argmin(rows, axis=1)))
 
 
 def _silhouette_top(
     revolution: Revolution, bottom_m: float, top_m: float, views: tuple[View, ...], world_from_local: Rigid3
 ) -> float:
-    """The height at which the far rim leaves the masks, median over the views (from above, the far rim is what shows)."""
+    """Median height over the views at which the far rim leaves the mask (seen from above, the far rim is visible)."""
     heights = np.linspace(bottom_m + 0.5 * (top_m - bottom_m), bottom_m + 2.0 * (top_m - bottom_m), 400)
     rim = float(revolution.radii_m[-1])
     tops = []

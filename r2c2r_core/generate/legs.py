@@ -1,8 +1,8 @@
-"""Chairs, stools and tables: a level slab on four posts, where a table or the slab itself hid what it stands on.
+"""Chairs, stools and tables: a level slab on four posts, completed where a table or the slab itself occludes its support.
 
-From above, all that is under a seat is hidden, and carving leaves it solid. But a slab needs support down to the floor: the
-posts that depth shows say how thick they are and how they lean (masks often leave dark legs out), and the other corners get
-the same, mirrored, where free space lets one stand.
+Seen from above, the space under a seat is hidden, and carving leaves it solid. But a slab needs support down to the floor:
+posts that depth shows give their thickness and slant (masks often miss dark legs), and the other corners get the same,
+mirrored, where free space allows one.
 """
 
 from collections.abc import Sequence
@@ -25,55 +25,62 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a slab on posts is."""
+    """Tuned parameters of slabs on posts."""
 
-    cell_m: float = param(0.02, "m", "side of the cells in plan", gt=0)
-    level_m: float = param(0.015, "m", "half the height within which a sheet is level")
-    tilted: float = param(2.0, "ratio", "to that: how far off a slab's ends may be, which poses tilt by half a degree", ge=1)
-    least_area: float = param(0.3, "share", "of the thing's plan that its slab covers")
-    lowest: float = param(0.3, "share", "of the thing's height, above which the slab is")
-    highest_m: float = param(1.15, "m", "height of a slab, at most")
-    slab_m: float = param(0.05, "m", "thickness of a slab, where nobody sees it")
-    slab_range_m: tuple[float, float] = param((0.02, 0.12), "m", "least and most thickness of a slab")
-    post_m: float = param(0.045, "m", "width of a post, where nobody sees it")
-    post_range_m: tuple[float, float] = param((0.025, 0.11), "m", "least and most width of a post")
-    rim_m: float = param(0.03, "m", "how far in a slab's edge reaches")
-    least_rim: int = param(20, "count", "points of an edge in a centimetre of height")
-    corner_m: float = param(0.10, "m", "from a corner to its post, at most")
-    lean: float = param(0.35, "ratio", "sideways to down of a post, at most")
-    step_m: float = param(0.03, "m", "between heights at which depth must show a post", gt=0)
-    least_steps: int = param(5, "count", "heights that show it")
-    least_points: int = param(8, "count", "of a post at each of them")
-    to_edge_m: float = param(0.06, "m", "from the thing's end, within which a slab reaches it")
+    cell_m: float = param(0.02, "m", "Side of the cells in plan", gt=0)
+    level_m: float = param(0.015, "m", "Half the height interval within which points form a level sheet")
+    tilted: float = param(
+        2.0,
+        "ratio",
+        "Tolerance of a slab's height at its ends, relative to level_m: pose errors tilt it by half a degree",
+        ge=1,
+    )
+    least_area: float = param(0.3, "share", "Minimum fraction of the object's plan that its slab covers")
+    lowest: float = param(0.3, "share", "Minimum height of the slab, relative to the object's height")
+    highest_m: float = param(1.15, "m", "Maximum height of a slab")
+    slab_m: float = param(0.05, "m", "Thickness of a slab where it is not observed")
+    slab_range_m: tuple[float, float] = param((0.02, 0.12), "m", "Minimum and maximum thickness of a slab")
+    post_m: float = param(0.045, "m", "Width of a post where it is not observed")
+    post_range_m: tuple[float, float] = param((0.025, 0.11), "m", "Minimum and maximum width of a post")
+    rim_m: float = param(0.03, "m", "Width of the strip along a slab's outline that counts as its edge")
+    least_rim: int = param(20, "count", "Minimum number of edge points in the first height step")
+    corner_m: float = param(0.10, "m", "Maximum distance of a post from its corner")
+    lean: float = param(0.35, "ratio", "Maximum slant of a post, sideways to down")
+    step_m: float = param(0.03, "m", "Height interval at which depth must show a post", gt=0)
+    least_steps: int = param(5, "count", "Minimum number of heights that show a post")
+    least_points: int = param(8, "count", "Minimum number of points of a post at each height")
+    to_edge_m: float = param(0.06, "m", "Distance from the object's end within which a slab is extended to it")
     edge_m: tuple[float, float] = param(
         (0.02, 0.16),
         "m",
-        "below a slab, between which its edge is looked for: the first two centimetres may be its rounded edge",
+        "Range below a slab in which its edge is measured: the first two centimetres may be rounded",
     )
-    edge_step_m: float = param(0.01, "m", "of height in which points of an edge are counted", gt=0)
-    edge_ends: float = param(0.3, "share", "of the points of an edge's first step, below which it has ended")
-    seat_m: float = param(0.002, "m", "that a post reaches into its slab")
-    outside_m: float = param(0.02, "m", "outside its slab, that a post may stand")
-    line_m: float = param(0.01, "m", "off a post's line, from where a height counts half")
-    steady_m: float = param(0.02, "m", "off it at most heights, beyond which there is no post")
-    closed: float = param(0.5, "share", "of the height below a slab filled wider than a post: a side")
+    edge_step_m: float = param(0.01, "m", "Height interval in which edge points are counted", gt=0)
+    edge_ends: float = param(0.3, "share", "Fraction of the first interval's points below which the edge has ended")
+    seat_m: float = param(0.002, "m", "Depth to which a post reaches into its slab")
+    outside_m: float = param(0.02, "m", "Maximum distance of a post outside its slab")
+    line_m: float = param(0.01, "m", "Scale of the robust kernel on distances from a post's line")
+    steady_m: float = param(0.02, "m", "Maximum median distance from a post's line")
+    closed: float = param(
+        0.5, "share", "Fraction of the height below a slab, filled wider than a post, above which the side is closed"
+    )
     inwards: tuple[float, float, float] = param(
-        (0.0, 0.25, 0.5), "share", "of the way to a slab's middle, where a leg may stand"
+        (0.0, 0.25, 0.5), "share", "Candidate positions of a leg, as fractions of the way from its corner to the slab's centre"
     )
-    empty: float = param(0.7, "share", "of a corner's height that is seen free: nothing stands there")
+    empty: float = param(0.7, "share", "Fraction of a post's height observed free above which no post is there")
 
 
 class Post(NamedTuple):
     """A leg from the floor to a slab, local frame."""
 
-    top: Vector3  # the middle of its upper end
-    lean: np.ndarray  # (2,) metres sideways a metre up
+    top: Vector3  # centre of its upper end
+    lean: np.ndarray  # (2,) horizontal metres per metre of height
     width_m: float
     floor_m: float
     is_seen: bool
 
     def surface(self) -> tuple[Points, Faces]:
-        """Its closed surface."""
+        """Closed surface of the post."""
         half = np.array([self.width_m / 2, self.width_m / 2])
         vertices, faces = box_mesh(np.append(self.top[:2] - half, self.floor_m), np.append(self.top[:2] + half, self.top[2]))
         vertices[:, :2] += self.lean * (vertices[:, 2:] - self.top[2])
@@ -88,7 +95,7 @@ class Support(NamedTuple):
 
 
 def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
-    """The slab that was seen and its four posts; None without a floor or a slab, with a closed side or an empty corner."""
+    """The observed slab and its four posts; None without a floor or a slab, with a closed side or an empty corner."""
     params = tuned(Params)
     seen, points = carving.seen, carving.seen.points
     if seen.floor is None:
@@ -107,7 +114,7 @@ def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
     corners = [(x, y) for x in (0, 1) for y in (0, 1)]
     seen_posts = {corner: _seen_post(under, slab, corner, seen.floor) for corner in corners}
     posts = tuple(seen_posts[corner] or _likely_post(seen_posts, slab, corner, seen.floor) for corner in corners)
-    width = float(np.mean([post.width_m for post in posts]))  # each was seen from one side, and what was before it hides some
+    width = float(np.mean([post.width_m for post in posts]))  # each is seen from one side and partly occluded
     posts = tuple(post._replace(width_m=width) for post in posts)
     inwards = (0.0,) if any(post.is_seen for post in posts) else params.inwards
     standing = [post if post.is_seen else _where_not_empty(carving, slab, post, inwards) for post in posts]
@@ -116,7 +123,7 @@ def find_support(carving: Carving, views: Sequence[View]) -> Support | None:
 
 
 def _slab_level(points: Points, floor: float, top: float, plan: np.ndarray) -> float | None:
-    """The height at which the points cover most of the plan."""
+    """Height at which the points cover most of the plan; None if they cover too little."""
     params = tuned(Params)
     lowest, highest = floor + params.lowest * (top - floor), min(top, floor + params.highest_m)
     best, level = params.least_area * float(np.prod(plan)), None
@@ -130,7 +137,7 @@ def _slab_level(points: Points, floor: float, top: float, plan: np.ndarray) -> f
 
 
 def _thickness(points: Points, level: float, low: np.ndarray, high: np.ndarray) -> float:
-    """How far down the points of the slab's own edge reach, between its corners."""
+    """Thickness of the slab from the points of its edge between the corners."""
     params = tuned(Params)
     near = (points[:, :2] > low - params.cell_m).all(axis=1) & (points[:, :2] < high + params.cell_m).all(axis=1)
     at_edge = ((points[:, :2] < low + params.rim_m) | (points[:, :2] > high - params.rim_m)).any(axis=1)
@@ -145,9 +152,9 @@ def _thickness(points: Points, level: float, low: np.ndarray, high: np.ndarray) 
 
 
 def _has_closed_side(points: Points, slab: BoxPart, floor: float) -> bool:
-    """Whether the thing's own points below the slab's rim, between its corners, are wider than a post at most heights.
+    """Whether the object's own points below the slab's rim, between its corners, are wider than a post at most heights.
 
-    Without this, a closed side that is cut off round a corner and seen at a slant is as slender as a post.
+    Without this check, a closed side that is cut off around a corner and seen at a slant is as slender as a post.
     """
     params = tuned(Params)
     from scipy import ndimage
@@ -171,7 +178,7 @@ def _has_closed_side(points: Points, slab: BoxPart, floor: float) -> bool:
 
 
 def _points_under(slab: BoxPart, floor: float, views: Sequence[View], world_from_local: Rigid3) -> list[tuple[Points, Vector3]]:
-    """Each view's depth points between slab and floor, whatever the mask says, and the camera's place."""
+    """Each view's depth points between slab and floor, regardless of the mask, and its camera centre."""
     params = tuned(Params)
     found = []
     low, high = slab.low[:2] - params.corner_m, slab.high[:2] + params.corner_m
@@ -199,7 +206,9 @@ def _seen_post(under: Sequence[tuple[Points, Vector3]], slab: BoxPart, corner: t
             level = np.abs(near[:, 2] - z) < params.step_m / 2
             if np.count_nonzero(level) < params.least_points:
                 continue
-            width = float(np.ptp(np.percentile(across[level], [5, 95]))) / float(np.abs(away).sum())  # a square one, seen askew
+            width = float(np.ptp(np.percentile(across[level], [5, 95]))) / float(
+                np.abs(away).sum()
+            )  # width of a square post seen at an angle
             if width < params.post_range_m[1]:
                 middles.append(np.append(np.median(near[level, :2], axis=0) + width / 2 * away, z))
                 widths.append(width)
@@ -214,7 +223,7 @@ def _seen_post(under: Sequence[tuple[Points, Vector3]], slab: BoxPart, corner: t
 
 
 def _steady_line(middles: Points) -> tuple[np.ndarray, np.ndarray] | None:
-    """(x, y) as a line over z by reweighted least squares; None for too few heights or where the middles lie on no line."""
+    """(x, y) as a line over z by IRLS; None with too few heights or if the points do not lie on a line."""
     params = tuned(Params)
     if len(np.unique(np.round(middles[:, 2] / params.step_m))) < params.least_steps:
         return None
@@ -226,7 +235,7 @@ def _steady_line(middles: Points) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def _likely_post(seen: dict[tuple[int, int], Post | None], slab: BoxPart, corner: tuple[int, int], floor: float) -> Post:
-    """A corner's post as the mirror image of a seen one, left-right before front-back; without one, upright."""
+    """A corner's post as the mirror image of an observed one, left-right before front-back; without one, upright."""
     params = tuned(Params)
     middle = (slab.low + slab.high)[:2] / 2
     for flip in ((1, 0), (0, 1), (1, 1)):
@@ -242,7 +251,7 @@ def _likely_post(seen: dict[tuple[int, int], Post | None], slab: BoxPart, corner
 
 
 def _where_not_empty(carving: Carving, slab: BoxPart, post: Post, shares: Sequence[float]) -> Post | None:
-    """A post that nobody saw, at the first share of the way to the middle not seen to be empty; None where all were."""
+    """An unobserved post at the first candidate position that was not observed free; None if all were."""
     middle = (slab.low + slab.high)[:2] / 2
     for inwards in shares:
         moved = post._replace(top=np.append(post.top[:2] + inwards * (middle - post.top[:2]), post.top[2]))
@@ -252,7 +261,7 @@ def _where_not_empty(carving: Carving, slab: BoxPart, post: Post, shares: Sequen
 
 
 def _is_empty(carving: Carving, post: Post) -> bool:
-    """Whether most of the post's height was seen to be free."""
+    """Whether most of the post's height was observed free."""
     params = tuned(Params)
     grid = carving.grid
     z = np.arange(post.floor_m + params.step_m, post.top[2], grid.voxel_m)

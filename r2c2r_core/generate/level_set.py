@@ -1,4 +1,4 @@
-"""Distance fields on a grid, and the closed surface of one that agrees best with the masks."""
+"""Distance fields on a grid, and their closed level-set surface that agrees best with the masks."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -16,14 +16,14 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How fine fields and their surfaces are."""
+    """Tuned resolution of distance fields and their surfaces."""
 
-    most_voxels: int = param(1_000_000, "count", "of a grid", ge=1000)
-    most_cells: int = param(160, "count", "along the longest side", source="6 mm on a chair", ge=8)
-    most_faces: int = param(6000, "count", "triangles of the surface", ge=100)
-    flatter: float = param(0.35, "ratio", "to a voxel: how far simplifying may move the surface")
-    outwards_m: tuple[float, float] = param((0.002, 0.004), "m", "by which a surface is tried further out, at first")
-    inwards_m: tuple[float, float] = param((-0.002, -0.004), "m", "by which it is tried further in")
+    most_voxels: int = param(1_000_000, "count", "Maximum number of voxels of a grid", ge=1000)
+    most_cells: int = param(160, "count", "Maximum number of voxels along the longest side", source="6 mm on a chair", ge=8)
+    most_faces: int = param(6000, "count", "Maximum number of triangles of the surface", ge=100)
+    flatter: float = param(0.35, "ratio", "Maximum displacement by mesh simplification, in voxels")
+    outwards_m: tuple[float, float] = param((0.002, 0.004), "m", "Levels that move the surface outwards, tried first")
+    inwards_m: tuple[float, float] = param((-0.002, -0.004), "m", "Levels that move the surface inwards")
 
 
 class Grid(NamedTuple):
@@ -55,14 +55,14 @@ def grid_round(low: Vector3, high: Vector3, voxel_m: float, margin_m: float) -> 
 
 
 def best_level(grid: Grid, field: np.ndarray, floor: float | None, variation: Variation, world_from_local: Rigid3) -> float:
-    """The level of `field`, within ±4 mm, whose surface's silhouettes agree best with the masks: votes err to one side.
+    """Level of `field`, within ±4 mm, whose surface's silhouettes agree best with the masks, as votes are biased.
 
-    `field` has the grid's shape and is positive outside. `floor` is the height that the thing stands on, if it is known.
+    `field` has the grid's shape and is positive outside. `floor` is the height of the object's support, if it is known.
     """
     params = tuned(Params)
     views = variation.views[:: max(len(variation.views) // 5, 1)]
     best, best_score = 0.0, -1.0
-    for levels in ((0.0,), params.outwards_m, params.inwards_m):  # the agreement has one peak: climb it
+    for levels in ((0.0,), params.outwards_m, params.inwards_m):  # hill climbing: the agreement has a single peak
         for level in levels:
             extracted = _extract(grid, field, level, floor)
             score = -1.0 if extracted is None else silhouette_iou(world_from_local.apply(extracted[0]), extracted[1], views)
@@ -75,7 +75,7 @@ def best_level(grid: Grid, field: np.ndarray, floor: float | None, variation: Va
 
 
 def surface_at(grid: Grid, field: np.ndarray, level: float, floor: float | None) -> tuple[Points, Faces]:
-    """The closed surface field = level, in the local frame; raises GenerationFailed where there is none."""
+    """Closed surface field = level in the local frame; raises GenerationFailed if it is empty."""
     params = tuned(Params)
     extracted = _extract(grid, field, level, floor)
     if extracted is None:
@@ -87,11 +87,11 @@ def surface_at(grid: Grid, field: np.ndarray, level: float, floor: float | None)
 
 
 def _extract(grid: Grid, field: np.ndarray, level: float, floor: float | None) -> tuple[Points, Faces] | None:
-    """Largest closed surface field = level, in the local frame; None where the field nowhere goes below it."""
+    """Largest closed surface field = level (marching cubes), in the local frame; None if the field is nowhere below it."""
     from skimage.measure import marching_cubes
 
     shifted = field - level
-    if floor is not None:  # the level must not lift the thing off its support
+    if floor is not None:  # the level must not lift the object off its support
         shifted = np.maximum(shifted, floor - grid.heights())
     padded = np.pad(shifted, 1, constant_values=grid.voxel_m)
     padded[np.abs(padded) < 1e-7] = 1e-7  # a vertex exactly on a voxel centre would be duplicated

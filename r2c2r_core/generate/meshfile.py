@@ -1,4 +1,4 @@
-"""Reading a mesh file (GLB, OBJ, PLY, STL) into plain parts with their colours."""
+"""Reader of mesh files (GLB, OBJ, PLY, STL) into plain parts with their colours."""
 
 import io
 import json
@@ -29,16 +29,16 @@ class MeshPart(NamedTuple):
     uv: TextureCoords | None  # v = 0 is the bottom row
     texture: Image | None
     vertex_colours: Colours  # used where there is no texture
-    is_plain: bool = False  # no colour of any kind came with it
+    is_plain: bool = False  # the file gives it no colour of any kind
 
     @property
     def keeps_its_texture(self) -> bool:
-        """Whether uv and texture can be used as they are: no tiling beyond 0..1."""
+        """Whether uv and texture can be used unchanged: no tiling beyond 0..1."""
         return self.uv is not None and self.texture is not None and bool((self.uv > -1e-3).all() and (self.uv < 1.001).all())
 
 
 def read_parts(path: Path) -> list[MeshPart]:
-    """The file's geometries with their placements applied; raises OverrideError when it cannot be read."""
+    """The file's geometries with their transforms applied; raises OverrideError when it cannot be read."""
     import trimesh
 
     if path.suffix.lower() not in SUFFIXES:
@@ -51,7 +51,7 @@ def read_parts(path: Path) -> list[MeshPart]:
         )
     try:
         geometries = _triangles(trimesh.load_scene(path))
-    # the parsers behind trimesh raise whatever the broken bytes make them raise
+    # the parsers behind trimesh raise arbitrary exceptions on corrupt files
     except Exception as error:
         raise OverrideError(
             f"{path.name}: not a readable {path.suffix[1:].upper()} mesh ({error})", hint="export it again"
@@ -61,7 +61,7 @@ def read_parts(path: Path) -> list[MeshPart]:
 
 
 def missing_files(path: Path) -> tuple[str, ...]:
-    """Files that a mesh file names and that do not lie beside it: an OBJ's materials and pictures, a GLB's pictures."""
+    """Files referenced by a mesh file but missing beside it: an OBJ's materials and textures, a GLB's textures."""
     named: list[str] = []
     if path.suffix.lower() == ".obj":
         libraries = _named_in(path, ("mtllib",))
@@ -73,17 +73,17 @@ def missing_files(path: Path) -> tuple[str, ...]:
 
 
 def _beside(path: Path, name: str) -> Path | None:
-    """The file of that name in the mesh file's folder or below it; None also where the name leads out of there."""
+    """The file of that name in the mesh file's folder or below it; None also where the path leads outside."""
     folder = path.parent.resolve()
     try:
         found = (folder / name).resolve()
         return found if found.is_relative_to(folder) and found.is_file() else None
-    except (OSError, ValueError):  # a name that no file can have
+    except (OSError, ValueError):  # not a valid file name
         return None
 
 
 def _named_in(path: Path, keywords: tuple[str, ...]) -> list[str]:
-    """The files behind the keywords of an OBJ or MTL file; options such as `-o 0 0 0` stand before the name."""
+    """File names after the keywords of an OBJ or MTL file; options such as `-o 0 0 0` precede the name."""
     try:
         with path.open(errors="replace") as lines:
             words = [line.split() for line in lines if line.lstrip().startswith(keywords)]
@@ -93,7 +93,7 @@ def _named_in(path: Path, keywords: tuple[str, ...]) -> list[str]:
 
 
 def _glb_pictures(path: Path) -> list[str]:
-    """The pictures that a binary glTF keeps in files of their own."""
+    """External image files that a binary glTF references."""
     with path.open("rb") as handle:
         head = handle.read(20)
         chunk = handle.read(min(int.from_bytes(head[12:16], "little"), MOST_BYTES))
@@ -122,7 +122,7 @@ def parts_of(geometries: Sequence[Any]) -> list[MeshPart]:
 
 
 def _triangles(scene: Any) -> list[Any]:
-    """Every geometry with faces, with its placement applied."""
+    """Every geometry with faces, with its transform applied."""
     import trimesh
 
     return [g for g in scene.dump() if isinstance(g, trimesh.Trimesh) and len(g.faces)]
@@ -143,7 +143,7 @@ def _check_geometries(label: str, geometries: Sequence[Any]) -> None:
 
 
 def colours_at(parts: list[MeshPart], points: Points) -> Colours:
-    """The colour of the surface nearest to each point."""
+    """Colour of the surface nearest to each point."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     vertices = np.concatenate([part.vertices for part in parts])
     faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])

@@ -1,8 +1,8 @@
-"""Where an appliance's sides and top end: depth pixels beyond its rear edge lie on the wall, not on the face continued.
+"""Rear edge of an appliance by change-point detection: depth beyond it lies on the wall, not on the face's continuation.
 
-Colour does not tell a white microwave from a white wall, and points on its sides thin out where they are seen at a flat
-angle. Each depth pixel whose ray crosses the plane of a face says how far behind the crossing the surface is: nothing where
-the face goes on, what is left to the wall where it has ended. The edge is the change point of all frames together.
+Colour does not separate a white microwave from a white wall, and points on its sides thin out where they are seen at a flat
+angle. Each depth pixel whose ray crosses the plane of a face tells how far behind the crossing the surface is: zero where the
+face continues, the remaining distance to the wall where it has ended. The edge is the change point of all frames together.
 """
 
 from collections.abc import Sequence
@@ -19,21 +19,21 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where a face seen at a slant ends."""
+    """Tuned parameters of rear-edge detection."""
 
-    flattest: float = param(0.08, "cosine", "with the face's normal of a ray that tells")
-    widest_m: float = param(0.08, "m", "from where it was thought, within which the edge is looked for")
-    before_m: float = param(0.05, "m", "nearer than the face: something in front of it")
-    bin_m: float = param(0.01, "m", "width of the strips along the face", gt=0)
-    least: int = param(6, "count", "pixels of a strip, and of a frame on either part of a face", ge=1)
-    least_bins: int = param(8, "count", "strips that are known")
-    sure: float = param(0.7, "share", "of the depth up to which the face is there")
-    least_gap_m: float = param(0.015, "m", "between the rear edge and what is behind it")
-    clearer: float = param(0.5, "ratio", "of the misfit to that of a face without an end, at most")
+    flattest: float = param(0.08, "cosine", "Minimum cosine between a ray and the face's normal for the ray to count")
+    widest_m: float = param(0.08, "m", "Maximum distance of the edge from its initial estimate")
+    before_m: float = param(0.05, "m", "Distance in front of the face beyond which a point belongs to an occluder")
+    bin_m: float = param(0.01, "m", "Width of the bins along the face", gt=0)
+    least: int = param(6, "count", "Minimum number of pixels per bin, and of a frame on either part of a face", ge=1)
+    least_bins: int = param(8, "count", "Minimum number of bins with data")
+    sure: float = param(0.7, "share", "Fraction of the depth up to which the face is known to exist")
+    least_gap_m: float = param(0.015, "m", "Minimum gap between the rear edge and the surface behind it")
+    clearer: float = param(0.5, "ratio", "Maximum misfit relative to that of a face without an end")
 
 
 def rear_edge(low: Vector3, high: Vector3, views: Sequence[View], world_from_local: Rigid3) -> float:
-    """Y of the rear edge of the box `low`..`high` (local frame): `high[1]`, moved to where depth lets the edge be."""
+    """Y of the rear edge of the box `low`..`high` (local frame): `high[1]`, clipped to the interval that depth allows."""
     params = tuned(Params)
     thought = float(high[1])
     bounds = []
@@ -58,7 +58,7 @@ def rear_edge(low: Vector3, high: Vector3, views: Sequence[View], world_from_loc
 def _continued(
     low: Vector3, high: Vector3, view: View, world_from_local: Rigid3, axis: int, side: float, reach_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where pixels' rays cross the plane of a face (y), and how far behind the crossing, along y, the surface they hit lies."""
+    """Crossing (y) of each pixel's ray with a face's plane, and the distance along y from there to the measured surface."""
     params = tuned(Params)
     eye = world_from_local.inverse.apply(view.eye_world)
     face = high[axis] if side > 0 else low[axis]
@@ -80,9 +80,9 @@ def _continued(
 
 
 def _change_point(crossing: np.ndarray, behind: np.ndarray, thought: float, reach_m: float) -> tuple[float, float] | None:
-    """The last y at which the surface is the face, and the first at which it is the wall; None where no edge shows.
+    """The last y on the face and the first y on the wall; None where no edge shows.
 
-    Bins of y are told apart by least absolute deviations. Between the two lie the pixels that a phone drops at an edge.
+    Bins of y are split by least absolute deviations. Between the two lie the pixels that a phone drops at an edge.
     """
     params = tuned(Params)
     index = np.floor(crossing / params.bin_m).astype(int)
@@ -91,7 +91,7 @@ def _change_point(crossing: np.ndarray, behind: np.ndarray, thought: float, reac
         return None
     y = (bins + 0.5) * params.bin_m
     gap = np.array([np.median(behind[index == k]) for k in bins])
-    walls = [float(np.median(gap[k:] + y[k:])) for k in range(1, len(bins) - 1)]  # upright: the gap shrinks as y grows
+    walls = [float(np.median(gap[k:] + y[k:])) for k in range(1, len(bins) - 1)]  # upright wall: the gap shrinks as y grows
     misfits = [np.abs(gap[:k]).sum() + np.abs(gap[k:] + y[k:] - wall).sum() for k, wall in enumerate(walls, 1)]
     best = int(np.argmin(misfits)) + 1
     to_the_wall = walls[best - 1] - y[best] < params.least_gap_m  # the face ends where the wall begins

@@ -1,4 +1,4 @@
-"""What stands out of a flat front or lies back in it: handles, fields and mouldings, as flat-faced boxes.
+"""Relief of a flat front: handles, panels and mouldings, raised or recessed, as boxes with planar faces.
 
 Everything here is in a `front`-like frame: +X right, +Y into the furniture, +Z up, the outer face at y = 0.
 """
@@ -19,20 +19,20 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What stands out of a front."""
+    """Tuned parameters of the relief of fronts."""
 
-    overlap_m: float = param(0.002, "m", "by which pieces reach into the panel, so that the union is one solid")
-    least_step_m: float = param(0.005, "m", "height of a step that is shown")
-    least_area_m2: float = param(0.0012, "m²", "of a step that is shown")
-    deepest_step_m: float = param(0.04, "m", "height of a step that is believed")
-    border_m: float = param(0.015, "m", "along the front's edge, where no step is looked for")
-    least_fill: float = param(0.75, "share", "of its bounding rectangle that a step must cover")
-    sigmas: float = param(4.0, "σ", "of the heights' noise that a step must pass")
+    overlap_m: float = param(0.002, "m", "Depth to which parts reach into the panel, so that the union is one solid")
+    least_step_m: float = param(0.005, "m", "Minimum height of a step")
+    least_area_m2: float = param(0.0012, "m²", "Minimum area of a step")
+    deepest_step_m: float = param(0.04, "m", "Maximum plausible height of a step")
+    border_m: float = param(0.015, "m", "Width of the margin along the front's edge in which steps are ignored")
+    least_fill: float = param(0.75, "share", "Minimum fraction of its bounding rectangle that a step covers")
+    sigmas: float = param(4.0, "σ", "Minimum height of a step in standard deviations of the height noise")
     hand_m: tuple[float, float] = param(
         (0.01, 0.09),
         "m",
-        "least and most that a handle stands out",
-        source="what hands need behind it, and what would be in the way",
+        "Minimum and maximum protrusion of a handle",
+        source="clearance that a hand needs, and what would obstruct passage",
     )
 
 
@@ -44,7 +44,7 @@ class BoxPart(NamedTuple):
 
 
 class HeightMap(NamedTuple):
-    """Metres by which each cell stands out of the front (nan where nothing was measured); row 0 is the bottom."""
+    """Height of each cell above the front in metres (nan where unmeasured); row 0 is the bottom."""
 
     height_m: np.ndarray
     cell_m: float
@@ -53,7 +53,7 @@ class HeightMap(NamedTuple):
 
 
 class Relief(NamedTuple):
-    """What stands out of a front or lies back in it, and its handle as depth has it."""
+    """Raised and recessed parts of a front, and its handle as measured in depth."""
 
     raised: Sequence[BoxPart]
     sunk: Sequence[BoxPart]
@@ -64,7 +64,7 @@ NO_RELIEF = Relief((), (), None)
 
 
 def measure_relief(front: FrontPanel, variation: Variation) -> Relief:
-    """The relief of a front by the views of one draw, in the front's frame."""
+    """Relief of a front from the views of one draw, in the front's frame."""
     points = [front.world_from_front.inverse.apply(masked_points(v, variation.erosion_px)) for v in variation.views]
     footprint = _depth_footprint(variation.views, front.world_from_front.translation)
     heights = measure_heights(points, front.width_m, front.height_m, max(0.006, 1.5 * footprint))
@@ -76,7 +76,7 @@ def measure_relief(front: FrontPanel, variation: Variation) -> Relief:
 
 
 def measure_heights(views_points: Sequence[Points], width_m: float, height_m: float, cell_m: float) -> HeightMap:
-    """Median relief per cell over all views, each view first levelled to the face (its pose is off by millimetres)."""
+    """Median height per cell over all views, each view first levelled to the face (its pose is off by millimetres)."""
     columns, rows = max(round(width_m / cell_m), 1), max(round(height_m / cell_m), 1)
     cells: list[np.ndarray] = []
     heights: list[np.ndarray] = []
@@ -98,9 +98,9 @@ def measure_heights(views_points: Sequence[Points], width_m: float, height_m: fl
 
 
 def _levelled_together(cells: list[np.ndarray], heights: list[np.ndarray], count: int) -> list[np.ndarray]:
-    """Each view shifted to agree, cell by cell, with the views before it.
+    """Each view's heights shifted to agree, cell by cell, with the mean of the views before it.
 
-    A framed front has two levels of like area, so the median of a view alone may be either.
+    A framed front has two levels of similar area, so the median of a single view may be either.
     """
     total, seen = np.zeros(count), np.zeros(count)
     levelled = []
@@ -125,7 +125,7 @@ def _cell_medians(cell: np.ndarray, height: np.ndarray, count: int) -> np.ndarra
 
 
 def find_steps(heights: HeightMap, handle: FrontHandle | None) -> tuple[list[BoxPart], list[BoxPart]]:
-    """Rectangles that stand out of, and that lie back in, the outer face, where depth supports them beyond noise."""
+    """Rectangles raised above and recessed below the outer face, where depth supports them beyond noise."""
     params = tuned(Params)
     z = _levelled_to_border(heights)
     known = np.isfinite(z)
@@ -165,7 +165,7 @@ def handle_parts(handle: FrontHandle, *, as_bar: bool) -> list[BoxPart]:
 
 
 def measured_protrusion(heights: HeightMap, handle: FrontHandle, footprint_m: float) -> float:
-    """How far the handle stands out by depth, where its pixels are fine enough to land on it; else as the track says."""
+    """The handle's protrusion measured in depth, if depth pixels resolve it; else the track's value."""
     narrow = min(handle.right_m - handle.left_m, handle.top_m - handle.bottom_m)
     inside = heights.height_m[_handle_cells(heights, handle, grow_m=0.0) & np.isfinite(heights.height_m)]
     if footprint_m > narrow / 4 or len(inside) < 6:
@@ -175,7 +175,7 @@ def measured_protrusion(heights: HeightMap, handle: FrontHandle, footprint_m: fl
 
 
 def _levelled_to_border(heights: HeightMap) -> np.ndarray:
-    """Heights above the outer frame: on a framed front most cells lie on the sunken field, so the median is not the face."""
+    """Heights above the outer frame: on a framed front most cells lie on the recessed panel, so the median is not the face."""
     z = heights.height_m
     strip = _border_cells(heights, 0.05) & ~_border_cells(heights, tuned(Params).border_m) & np.isfinite(z)
     if strip.sum() < 20:
@@ -185,7 +185,7 @@ def _levelled_to_border(heights: HeightMap) -> np.ndarray:
 
 
 def _step_boxes(heights: HeightMap, smooth: np.ndarray, strong: np.ndarray, sign: float) -> list[BoxPart]:
-    """The connected regions that fill a rectangle at one level, as boxes."""
+    """Connected regions that fill a rectangle at one level, as boxes."""
     params = tuned(Params)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(strong.astype(np.uint8), connectivity=4)
     rows, columns = smooth.shape
@@ -228,6 +228,6 @@ def _handle_cells(heights: HeightMap, handle: FrontHandle | None, grow_m: float 
 
 
 def _depth_footprint(views: Sequence[View], target_world: Vector3) -> float:
-    """Size of a depth pixel on the object, metres, at the median distance."""
+    """Size of a depth pixel on the object at the median distance, metres."""
     sizes = [float(np.linalg.norm(v.eye_world - target_world)) / v.depth_camera.fx for v in views]
     return float(np.median(sizes))

@@ -1,4 +1,4 @@
-"""A generator on another machine, over HTTP. The address names the protocol by its path:
+"""Generator on another machine, over HTTP. The path of the address selects the protocol:
 
 `…/v1/mesh`   ours, for any generator behind serve_worker.py:
     POST   /v1/mesh                        the form of wire.py -> 202 {"job": id}
@@ -7,7 +7,7 @@
                                                "parameters": {name: number}, "metrics": {}, "warnings": [text],
                                                "assumes": text}]}
     GET    /v1/jobs/{id}/artifacts/{n}     -> the mesh as GLB
-    DELETE /v1/jobs/{id}                   nobody waits for it any more
+    DELETE /v1/jobs/{id}                   cancel: the result is no longer needed
 `…/v1/infer`  TRELLIS as NVIDIA NIM (nvcr.io/nim/microsoft/trellis, variant large:image): one JSON request, one answer
     {"artifacts": [{"base64": …, "finishReason": "SUCCESS"|…, "seed": n}]}. NVIDIA's hosted address takes only its own
     example pictures, so the container must be one's own.
@@ -44,7 +44,7 @@ _NIM_PX = 768  # it crops to 518; base64 of eight larger pictures would pass 10 
 
 
 class Remote(MeshGenerator):
-    """Makes candidates by asking a server."""
+    """Client that obtains candidates from a server."""
 
     def __init__(self, *, url: str, patience: Patience | None = None, progress: Progress = SILENT) -> None:
         if not url:
@@ -106,7 +106,7 @@ class Remote(MeshGenerator):
         )
 
     def _wait(self, job: str) -> dict[str, Any]:
-        """The first artifact of a job when it is done; tells the server when nobody waits any more."""
+        """First artifact of a job once it is done; on failure or cancellation the job is deleted on the server."""
         until = time.monotonic() + self._endpoint.patience.answer_s
         try:
             while True:
@@ -140,7 +140,7 @@ class Remote(MeshGenerator):
 
 
 def _nim_request(sampling: Sampling) -> dict[str, Any]:
-    """The NIM's request; a field that is absent must be left out, for null counts as present."""
+    """Request body of the NIM; an absent field must be omitted, since null counts as present."""
     pictures = [
         "data:image/png;base64," + base64.b64encode(png_of(rgba_cutout(view, _NIM_PX))).decode() for view in sampling.views
     ]
@@ -161,7 +161,7 @@ def _nim_request(sampling: Sampling) -> dict[str, Any]:
 
 
 def _nim_mesh(answer: dict[str, Any], endpoint: Endpoint) -> bytes:
-    """The GLB in the NIM's answer."""
+    """The GLB in the NIM's response."""
     try:
         artifact = answer["artifacts"][0]
         reason = artifact.get("finishReason", "SUCCESS")
@@ -173,6 +173,6 @@ def _nim_mesh(answer: dict[str, Any], endpoint: Endpoint) -> bytes:
 
 
 def _numbers(entry: Any) -> dict[str, float]:
-    """The numeric values of a JSON object; anything else is left out."""
+    """The numeric values of a JSON object; other values are dropped."""
     items = entry.items() if isinstance(entry, dict) else ()
     return {str(key): float(value) for key, value in items if isinstance(value, int | float)}

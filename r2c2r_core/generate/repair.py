@@ -1,4 +1,4 @@
-"""Any triangles as a closed, outward, textured mesh: what was wrong is mended, and every step is noted for a person."""
+"""Mesh repair: any triangles to a closed, outward, textured mesh, with a note of every step for a person."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -31,37 +31,42 @@ _LEAST_SIZE, _MOST_SIZE = 1e-9, 1e9  # in the file's own unit: volumes and squar
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How foreign meshes are mended."""
+    """Tuned parameters of mesh repair."""
 
-    kept_faces: int = param(20_000, "count", "triangles of a mesh that is kept as it is")
+    kept_faces: int = param(20_000, "count", "Maximum number of triangles of a mesh that is kept unchanged")
     reduced_faces: int = param(
-        10_000, "count", "of a mesh that must be unwrapped anew", source="the atlas of 20 000 takes seconds"
+        10_000,
+        "count",
+        "Maximum number of triangles of a mesh that must be unwrapped again",
+        source="the atlas of 20 000 takes seconds",
     )
-    remesh_cells: int = param(80, "count", "along the longest side of a mesh that is not closed", ge=8)
-    shell_ratio: float = param(0.75, "ratio", "to a cell: half the thickness a leaking sheet is given")
-    least_flatness: float = param(1e-4, "ratio", "of the shortest to the longest side of a mesh that has a volume")
-    texture_px: int = param(1024, "px", "side of a new texture", ge=16)
-    largest_px: int = param(2048, "px", "longest side of a texture that is kept", ge=16)
-    crumb: float = param(0.01, "ratio", "to the largest body's diagonal: what floats beside it and is smaller is no part of it")
+    remesh_cells: int = param(
+        80, "count", "Number of grid cells along the longest side when a mesh is remeshed to close it", ge=8
+    )
+    shell_ratio: float = param(0.75, "ratio", "Half the thickness given to an open sheet, in grid cells")
+    least_flatness: float = param(1e-4, "ratio", "Minimum ratio of the shortest to the longest side of a mesh with a volume")
+    texture_px: int = param(1024, "px", "Side of a new texture", ge=16)
+    largest_px: int = param(2048, "px", "Maximum side of a texture that is kept", ge=16)
+    crumb: float = param(0.01, "ratio", "Maximum size of a loose piece, relative to the largest body's diagonal, to be dropped")
 
 
 class Mended(NamedTuple):
-    """The mesh in the frame and unit of its parts, and what was done to it; no note means it was taken as it is."""
+    """The mesh in the frame and unit of its parts, and notes on its repair; without notes it is unchanged."""
 
     mesh: TexturedMesh
     notes: tuple[str, ...]
 
 
 def mended(parts: list[MeshPart], label: str) -> Mended:
-    """The parts as one closed textured mesh; raises OverrideError, naming `label`, for what no repair can save.
+    """The parts as one closed textured mesh; raises OverrideError, naming `label`, for what cannot be repaired.
 
-    Closed bodies with one texture keep both. Anything else is closed, and its colours are carried over to a new texture.
+    Closed bodies with one texture keep both. Anything else is closed, and its colours are transferred to a new texture.
     """
     vertices, faces = join_vertices(*_stacked([(part.vertices, part.faces) for part in parts]))
     _check_sane(label, vertices, faces)
     try:
         return _closed_and_coloured(parts, label, vertices, faces)
-    except (ValueError, ArithmeticError, LookupError) as error:  # of the libraries, at shapes that they have not met
+    except (ValueError, ArithmeticError, LookupError) as error:  # raised by the libraries on unusual shapes
         raise OverrideError(f"{label}: the mesh cannot be mended ({error})", hint="close it in a mesh editor") from error
 
 
@@ -76,7 +81,7 @@ def _closed_and_coloured(parts: list[MeshPart], label: str, vertices: Points, fa
 
 
 def _once_each(faces: Faces, notes: list[str]) -> Faces:
-    """The faces without those that repeat another one, whichever way round."""
+    """The faces without duplicates, regardless of winding."""
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     if len(first) < len(faces):
         notes.append(f"{len(faces) - len(first)} faces given twice were dropped")
@@ -84,7 +89,7 @@ def _once_each(faces: Faces, notes: list[str]) -> Faces:
 
 
 def _bodies(vertices: Points, faces: Faces, notes: list[str]) -> list[Surface]:
-    """The pieces that hang together over edges with two faces, largest first, without crumbs."""
+    """Connected components over edges with two faces, largest first, without tiny pieces."""
     params = tuned(Params)
     import trimesh
 
@@ -99,7 +104,7 @@ def _bodies(vertices: Points, faces: Faces, notes: list[str]) -> list[Surface]:
 
 
 def _keeps_its_skin(parts: list[MeshPart], bodies: list[Surface]) -> bool:
-    """Whether nothing has to be changed but, perhaps, the side all faces look to: closed bodies that stand apart."""
+    """Whether the mesh can be kept unchanged except for its winding: closed, disjoint bodies with one usable texture."""
     count = len(parts[0].faces)
     if len(parts) != 1 or not parts[0].keeps_its_texture or count > tuned(Params).kept_faces:
         return False
@@ -117,7 +122,7 @@ def _outward(body: Surface) -> Surface:
 
 
 def _check_sane(label: str, vertices: Points, faces: Faces) -> None:
-    """Raise OverrideError for what no repair can turn into a solid."""
+    """Raise OverrideError for input that cannot be repaired into a solid."""
     if len(faces) < 4:
         raise OverrideError(f"{label}: {len(faces)} triangles, at least 4 expected", hint="export it again as triangles")
     sides = np.ptp(vertices[np.unique(faces)], axis=0)
@@ -134,7 +139,7 @@ def _is_solid(vertices: Points, faces: Faces) -> bool:
 
 
 def _with_own_texture(part: MeshPart, notes: list[str]) -> TexturedMesh:
-    """A closed part as it is, wound outwards."""
+    """A closed part unchanged, but wound outwards and its texture reduced to the size limit."""
     params = tuned(Params)
     assert part.uv is not None
     assert part.texture is not None
@@ -146,12 +151,12 @@ def _with_own_texture(part: MeshPart, notes: list[str]) -> TexturedMesh:
         scale = params.largest_px / max(texture.shape[:2])
         texture = np.asarray(cv2.resize(texture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), dtype=np.uint8)
         notes.append(f"its texture was reduced to {texture.shape[1]} x {texture.shape[0]} pixels")
-    used, faces = np.unique(faces, return_inverse=True)  # a vertex that no face uses would count for the mesh's size
+    used, faces = np.unique(faces, return_inverse=True)  # an unused vertex would enlarge the mesh's extent
     return TexturedMesh(vertices=part.vertices[used], faces=faces.reshape(-1, 3), uv=part.uv[used], texture=texture)
 
 
 def _closed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
-    """One closed, outward surface within the face limit; notes what was done."""
+    """One closed, outward surface within the face limit; appends notes on the repair."""
     params = tuned(Params)
     vertices, faces = _solid_union(bodies, notes) or _remeshed(label, bodies, notes)
     if len(faces) > params.kept_faces:
@@ -162,7 +167,7 @@ def _closed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
 
 
 def _solid_union(bodies: list[Surface], notes: list[str]) -> Surface | None:
-    """The outside of all bodies together; None when one of them cannot be closed by filling small holes."""
+    """Union of all bodies; None if one of them cannot be closed by filling small holes."""
     solids, patched = [], 0
     for body in bodies:
         mended_body = body if _is_solid(*body) else _patched(*body)
@@ -183,7 +188,7 @@ def _solid_union(bodies: list[Surface], notes: list[str]) -> Surface | None:
 
 
 def _patched(vertices: Points, faces: Faces) -> tuple[Points, Faces] | None:
-    """Holes filled and winding made consistent; None when that does not close it."""
+    """The mesh with holes filled and winding made consistent; None if that does not close it."""
     import trimesh
 
     mesh = trimesh.Trimesh(vertices, faces, process=True)
@@ -196,7 +201,7 @@ def _patched(vertices: Points, faces: Faces) -> tuple[Points, Faces] | None:
 
 
 def _remeshed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
-    """The outer boundary on a grid: everything that air from outside cannot reach is solid; sheets get a thickness."""
+    """Outer boundary on a grid: all space unreachable from outside is solid; sheets get a thickness."""
     params = tuned(Params)
     from scipy import ndimage
     from skimage.measure import marching_cubes
@@ -226,7 +231,7 @@ def _remeshed(label: str, bodies: list[Surface], notes: list[str]) -> Surface:
 
 
 def _tightened(vertices: Points, faces: Faces, inside: np.ndarray, start: np.ndarray, cell: float, original: Surface) -> Points:
-    """The grid's surface moved onto the original one, but for sheets: without their thickness they would have no volume."""
+    """The grid's surface projected onto the original one except at sheets, which would lose their volume."""
     inward = vertices - 2.0 * cell * vertex_normals(vertices, faces)
     index = np.clip(np.round((inward - start) / cell).astype(int), 0, np.array(inside.shape) - 1)
     thick = inside[tuple(index.T)]
@@ -237,14 +242,14 @@ def _tightened(vertices: Points, faces: Faces, inside: np.ndarray, start: np.nda
 
 
 def _stacked(bodies: list[Surface]) -> Surface:
-    """All bodies as one list of faces."""
+    """All bodies concatenated into one mesh."""
     starts = np.cumsum([0, *(len(body[0]) for body in bodies)])
     faces = [body[1] + start for body, start in zip(bodies, starts, strict=False)]
     return np.concatenate([body[0] for body in bodies]), np.concatenate(faces)
 
 
 def _recoloured(vertices: Points, faces: Faces, parts: list[MeshPart]) -> TexturedMesh:
-    """A new texture for a changed surface: each texel takes the nearest colour of the original."""
+    """The changed surface with a new texture: each texel takes the nearest colour of the original."""
     atlas = unwrapped_atlas(vertices, faces, tuned(Params).texture_px)
     colours = colours_at(parts, atlas.points)
     texture = np.zeros((*atlas.size, 3), np.uint8)

@@ -1,4 +1,4 @@
-"""Round things in their variants: closed or hollow, with their handle or without."""
+"""Hypotheses of round objects: closed or hollow, with or without handle."""
 
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -19,7 +19,7 @@ from r2c2r_core.kitchen.names import category_of
 
 
 def round_family(evidence: Evidence, everything: Variation) -> tuple[tuple[Hypothesis, ...], bool]:
-    """A clean body of revolution in its variants, none where masks do not give one, and whether depth lies on it too."""
+    """Solids of revolution as hypotheses, none if the masks do not yield one, and whether depth also lies on it."""
 
     @lru_cache(maxsize=1)  # the variants of one draw share it
     def measured(variation: Variation) -> tuple[Seen, Revolution]:
@@ -47,7 +47,9 @@ def round_family(evidence: Evidence, everything: Variation) -> tuple[tuple[Hypot
 
     def full(variation: Variation) -> Shape:
         made = body(variation)
-        return replace(made, unseen_error_m=float(np.ptp(made.vertices_local[:, 2])))  # its inner floor is usually at its foot
+        return replace(
+            made, unseen_error_m=float(np.ptp(made.vertices_local[:, 2]))
+        )  # its inner floor is usually near its base
 
     try:
         seen, outline = measured(everything)

@@ -1,13 +1,12 @@
-"""SAM 3D Objects in this process: one masked photo with its measured points in, a textured mesh out.
+"""SAM 3D Objects in this process: one masked photo and its measured points to a textured mesh.
 
-Of today's models this one takes what a LiDAR scan has and the others cannot use: a metric point for every pixel. It needs
-the environment of github.com/facebookresearch/sam-3d-objects (start with LIDRA_SKIP_INIT=true; a GPU with 32 GB) and the
-folder with its pipeline.yaml.
+Of current models this one uses what a LiDAR scan provides and the others ignore: a metric point for every pixel. It needs the
+environment of github.com/facebookresearch/sam-3d-objects (start with LIDRA_SKIP_INIT=true; a GPU with 32 GB) and the folder
+with its pipeline.yaml.
 
-Frames, from its code and threads 57, 78 and 100: the point map is in PyTorch3D's camera axes (x left, y up, z forward, that
-is diag(-1, -1, 1) of ours), NaN where nothing was measured; the mesh is +Y up, its pose maps the +Z-up mesh as rows,
-p_camera = scale * p_mesh @ R(quat_wxyz) + translation. The pose serves to judge the candidate in all its frames; placing
-remains the next stage's.
+Frames, from its code and threads 57, 78 and 100: the point map is in PyTorch3D's camera axes (x left, y up, z forward, that is
+diag(-1, -1, 1) of ours), NaN where unmeasured; the mesh is +Y up, its pose maps the +Z-up mesh as rows, p_camera = scale *
+p_mesh @ R(quat_wxyz) + translation. The pose only serves to score the candidate in all its frames; the next stage places it.
 """
 
 import zlib
@@ -33,19 +32,19 @@ from r2c2r_core.tuning import param, tuned
 
 _P3D_FROM_CAMERA = np.diag([-1.0, -1.0, 1.0])
 _Z_UP_FROM_Y_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-_OWN_CODE = ("sam3d_objects", "torch", "torchvision", "moge")  # what its pipeline.yaml may name to be built
+_OWN_CODE = ("sam3d_objects", "torch", "torchvision", "moge")  # packages that its pipeline.yaml may instantiate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which of the model's own poses are believed."""
+    """Tuned parameters for accepting the model's own poses."""
 
-    judges: int = param(8, "count", "views that judge a candidate, as for the weight-free ones", ge=1)
-    least_iou: float = param(0.3, "score", "IoU of a pose worth believing")
+    judges: int = param(8, "count", "Number of views on which a candidate is judged, as for the weight-free ones", ge=1)
+    least_iou: float = param(0.3, "score", "Minimum mask IoU for the model's pose to be used")
 
 
 class Sam3dObjects(MeshGenerator):
-    """Makes candidates with InferencePipelinePointMap."""
+    """Generator that runs InferencePipelinePointMap."""
 
     def __init__(self, *, weights: Path) -> None:
         self._pipeline = _pipeline(weights)
@@ -61,7 +60,7 @@ class Sam3dObjects(MeshGenerator):
         model_seed = int(rng.integers(2**31 - 1))
         try:
             mesh, posed = _sample(self._pipeline, view, model_seed)
-        except Exception as error:  # whatever CUDA, spconv or the mesh extraction raise: it costs this sample only
+        except Exception as error:  # any error of CUDA, spconv or the mesh extraction fails this sample only
             raise GenerationFailed(f"{name}: SAM 3D failed on {candidate_id}: {first_line(error)}") from error
         return delivered_asset(
             parts_of([mesh]),
@@ -77,7 +76,7 @@ class Sam3dObjects(MeshGenerator):
 
 @cache
 def _pipeline(weights: Path) -> Any:
-    """The loaded pipeline, once a process."""
+    """The pipeline, loaded once per process."""
     try:
         import sam3d_objects  # noqa: F401  # registers the classes that the file names
         from hydra.utils import instantiate
@@ -104,7 +103,7 @@ def _pipeline(weights: Path) -> Any:
 
 
 def _check_targets(node: Any, path: Path) -> None:
-    """Refuse a file that would build anything but its own models: hydra calls whatever `_target_` names."""
+    """Refuse a file that would instantiate anything but its own models: hydra calls whatever `_target_` names."""
     if isinstance(node, dict):
         target = str(node.get("_target_", _OWN_CODE[0]))
         if target.split(".")[0] not in _OWN_CODE:
@@ -117,7 +116,7 @@ def _check_targets(node: Any, path: Path) -> None:
 
 
 def _sample(pipeline: Any, view: View, seed: int) -> tuple[Any, Points]:
-    """The mesh as it was given (+Y up), and its vertices in the world by the model's own pose."""
+    """The mesh as the model returns it (+Y up), and its vertices in the world by the model's own pose."""
     import torch
 
     rgba, points = _centred(view)
@@ -143,7 +142,7 @@ def _sample(pipeline: Any, view: View, seed: int) -> tuple[Any, Points]:
 
 
 def _centred(view: View) -> tuple[np.ndarray, np.ndarray]:
-    """RGBA and point map (h, w, 3) float32, padded until the principal point is their middle, as the model assumes it."""
+    """RGBA and point map (h, w, 3) float32, padded so that the principal point is at the centre, as the model assumes."""
     depth = sensor_depth(view, view.mask.shape)
     points = depth_points(depth, view.rgb_camera) @ _P3D_FROM_CAMERA
     points[depth <= 0] = np.nan
@@ -157,12 +156,12 @@ def _centred(view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _either_side(centre: float, size: int) -> tuple[int, int]:
-    """Pixels to add before and after, so that `centre` becomes the middle to within half a pixel."""
+    """Padding in pixels before and after that centres `centre` to within half a pixel."""
     return max(round(size - 2 * centre), 0), max(round(2 * centre - size), 0)
 
 
 def _judged(posed: Points, faces: np.ndarray, evidence: Evidence) -> dict[str, float]:
-    """Agreement with masks and depth where the model says it stands; nothing when that place is plainly wrong."""
+    """Agreement with masks and depth at the model's own pose; empty when that pose is clearly wrong."""
     params = tuned(Params)
     measures = self_consistency(posed, faces, np.ones(len(faces), dtype=bool), evidence.pool[: params.judges])
     return measures if measures.get("mask_iou", 0.0) >= params.least_iou else {}

@@ -1,7 +1,7 @@
-"""What differs between the samples of TRELLIS for one object (paper §4.2: "randomly varying the input images and parameters").
+"""Random sampling of TRELLIS inputs for one object (paper §4.2: "randomly varying the input images and parameters").
 
-Ranges from backends.md §1b: 4-8 of the good frames, stochastic or multidiffusion conditioning, guidance of the structure
-5-9 around the model's 7.5, 12 steps of each sampler, and the seed.
+Ranges from backends.md §1b: 4-8 of the good frames, stochastic or multidiffusion conditioning, guidance of the structure 5-9
+around the model's 7.5, 12 steps of each sampler, and the seed.
 """
 
 import zlib
@@ -18,19 +18,19 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How many views are drawn."""
+    """Tuned number of views per draw."""
 
-    fewest: int = param(4, "count", "views of a draw", ge=1)
-    most: int = param(8, "count", "views of a draw", ge=1)
+    fewest: int = param(4, "count", "Minimum number of views of a draw", ge=1)
+    most: int = param(8, "count", "Maximum number of views of a draw", ge=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sampling:
-    """One draw."""
+    """Inputs and parameters of one TRELLIS sample."""
 
     views: tuple[View, ...]
     mode: Literal["stochastic", "multidiffusion"]
-    seed: int  # never 0, which the NIM takes for "draw one"
+    seed: int  # never 0, which the NIM interprets as "draw one"
     structure_steps: int
     structure_guidance: float
     latent_steps: int
@@ -51,15 +51,15 @@ class Sampling:
 
     @property
     def frames(self) -> tuple[int, ...]:
-        """Frame.index of the images shown to the model."""
+        """Frame.index of the model's input images."""
         return tuple(sorted(view.frame_index for view in self.views))
 
 
 def draw_sampling(evidence: Evidence, candidate_id: str, seed: int) -> Sampling:
-    """One draw for a candidate; the same object, candidate and seed give the same. Raises GenerationFailed without images.
+    """One draw for a candidate, deterministic in object, candidate and seed. Raises GenerationFailed without images.
 
-    `stochastic` conditions each step on one image in turn, so images beyond the number of steps would never be looked at:
-    there are always at least as many steps as images.
+    `stochastic` conditions each step on one image in turn, so images beyond the number of steps would be ignored: there are
+    always at least as many steps as images.
     """
     params = tuned(Params)
     name = evidence.track.name

@@ -1,4 +1,4 @@
-"""What the frames show of a thing: its depth points and the box in which it is looked for."""
+"""Observation of a free-standing object: its depth points and the box that bounds them."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -16,31 +16,31 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which depth points are a thing's."""
+    """Tuned parameters for selecting an object's depth points."""
 
-    least_points: int = param(60, "count", "of a thing that is seen at all")
-    component_cell_m: float = param(0.03, "m", "gap that parts two things", gt=0)
+    least_points: int = param(60, "count", "Minimum number of depth points of an object")
+    component_cell_m: float = param(0.03, "m", "Side of the cells whose connected components separate objects", gt=0)
 
 
 class Seen(NamedTuple):
-    """What the frames of one draw show of a thing, in its box's frame (gravity-aligned, origin at the box's centre)."""
+    """An object as observed in one draw's frames, in its box's frame (gravity-aligned, origin at the box's centre)."""
 
     world_from_local: Rigid3
     points: Points
-    low: Vector3  # corners of what is carved
+    low: Vector3  # corners of the carved volume
     high: Vector3
-    floor: float | None  # the height it stands on; None where unknown
+    floor: float | None  # height of its support; None where unknown
 
 
 def observe_thing(evidence: Evidence, variation: Variation) -> Seen:
-    """The thing's points and box; raises GenerationFailed where there is too little depth."""
+    """The object's points and box; raises GenerationFailed with too little depth."""
     world_from_local = _local_frame(evidence)
     points = _object_points(evidence, variation, world_from_local)
     return Seen(world_from_local, points, *_prior_box(evidence, variation, points, world_from_local))
 
 
 def _local_frame(evidence: Evidence) -> Rigid3:
-    """The track's box frame; without one, a frame along the room's dominant directions at the middle of the points."""
+    """The track's box frame; without one, a frame along the room's dominant directions at the median of the points."""
     if evidence.track.box is not None:
         return evidence.track.box.world_from_object
     points = np.concatenate([masked_points(v) for v in evidence.pool])
@@ -52,7 +52,7 @@ def _local_frame(evidence: Evidence) -> Rigid3:
 
 
 def _object_points(evidence: Evidence, variation: Variation, world_from_local: Rigid3) -> Points:
-    """Depth points of the object in the local frame: its largest connected piece."""
+    """Depth points of the object in the local frame: its largest connected component."""
     params = tuned(Params)
     found = [masked_points(view, variation.erosion_px) for view in variation.views]
     points = world_from_local.inverse.apply(np.concatenate(found))
@@ -65,7 +65,7 @@ def _object_points(evidence: Evidence, variation: Variation, world_from_local: R
 
 
 def _largest_cluster(points: Points) -> Points:
-    """The points of the largest component of coarse occupied cells: what shines through slats or past edges falls off."""
+    """Points of the largest component of coarse occupied cells; removes background seen through slats or past edges."""
     from scipy import ndimage
 
     cell = np.floor((points - points.min(axis=0)) / tuned(Params).component_cell_m).astype(int)
@@ -81,7 +81,7 @@ def _largest_cluster(points: Points) -> Points:
 def _prior_box(
     evidence: Evidence, variation: Variation, points: Points, world_from_local: Rigid3
 ) -> tuple[Vector3, Vector3, float | None]:
-    """Corners of the solid that is carved, and the height it stands on (local), None where unknown."""
+    """Corners of the carved volume and the height of its support (local), None where unknown."""
     percentile = variation.bbox_percentile
     low, high = np.percentile(points, percentile, axis=0), np.percentile(points, 100 - percentile, axis=0)
     box = evidence.track.box
@@ -89,13 +89,13 @@ def _prior_box(
         return low, high, None
     half = np.asarray(box.dimensions_m) / 2
     eyes = world_from_local.inverse.apply(np.array([v.eye_world for v in variation.views]))
-    for axis in (0, 1):  # a side no camera looks at keeps the track's box, when that reaches further
+    for axis in (0, 1):  # a side that no camera faces keeps the track's box, if that reaches further
         if not (eyes[:, axis] > half[axis]).any():
             high[axis] = max(high[axis], half[axis] * variation.depth_scale)
         if not (eyes[:, axis] < -half[axis]).any():
             low[axis] = min(low[axis], -half[axis] * variation.depth_scale)
     floor = box.support_z_m - float(world_from_local.translation[2])
-    is_legged = category_of(evidence.track.category).on_legs  # of a table, often nothing but its top is seen
+    is_legged = category_of(evidence.track.category).on_legs  # often only the top of a table is observed
     if low[2] - floor > 0.5 * (high[2] - low[2]) and not is_legged:  # hangs or stands on something else
         return low, high, None
     low[2] = floor

@@ -92,7 +92,7 @@ def open_server(make: Make, *, name: str, address: tuple[str, int], token: str) 
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """One request. Subclassed with the worker's jobs and token, because http.server makes a handler a connection."""
+    """Handler of one request, subclassed with the worker's jobs and token, as http.server creates a handler per connection."""
 
     jobs: Jobs
     token: str

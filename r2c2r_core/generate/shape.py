@@ -1,4 +1,4 @@
-"""A candidate before it gets its picture: a closed surface in a local metric frame whose place the generator knows."""
+"""Untextured candidate: a closed surface in a local metric frame with known pose."""
 
 from dataclasses import dataclass
 
@@ -16,24 +16,24 @@ class Shape:
     vertices_local: Points
     faces: Faces
     world_from_local: Rigid3
-    front_y_m: float | None  # furniture: where its front face lies; it is made of flat faces along the axes. None: a thing
-    maskable: np.ndarray  # per face: whether the track's mask covers it when it is seen (a front's mask leaves out its carcass)
+    front_y_m: float | None  # furniture with axis-aligned faces: y of its front face. None: a free object
+    maskable: np.ndarray  # per face: whether the track's mask covers it when visible (a front's mask excludes its carcass)
     parameters: dict[str, float]
     warnings: tuple[str, ...]
     unseen_error_m: float | None = (
-        None  # how far a side that nobody saw lies from where scan or category have it; None: all seen
+        None  # distance of an unobserved side from its position by scan or category; None: all observed
     )
 
     @property
     def vertices_world(self) -> Points:
-        """The vertices where the generator believes they are."""
+        """The vertices in the world, by the generator's own pose."""
         return self.world_from_local.apply(self.vertices_local)
 
 
 def thing_model(
     surface: Surface, world_from_local: Rigid3, parameters: dict[str, float], warnings: tuple[str, ...] = ()
 ) -> Shape:
-    """A thing's shape: all of it is in the masks, and none of it is a flat front."""
+    """A free object's shape: covered by the masks entirely, without a flat front."""
     vertices, faces = surface
     return Shape(
         vertices_local=vertices,

@@ -1,4 +1,4 @@
-"""§4.2: several candidate meshes of one object, and the one to take."""
+"""Mesh generation (§4.2): several candidate meshes of one object, and the choice of one."""
 
 import logging
 import os
@@ -73,7 +73,7 @@ GENERATORS: Registry[MeshGenerator] = Registry(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GenerateConfig:
-    """How many candidates, from how many frames, and how one is chosen."""
+    """Number of candidates, number of frames, and the rule of choice."""
 
     # the paper samples up to 10; 5 take about 4 s an object on one core
     count: int = setting(5, "1 to 10 candidates an object", ge=1, le=10)
@@ -103,8 +103,10 @@ def generate_candidates(
 ) -> CandidateSet:
     """Candidates of one object, each in an arbitrary frame and unit, and their consensus.
 
-    With `batch` n there are n more times as many: a candidate's draw (frames, settings, seed) follows from its id, and ids go
-    on, so no draw comes again. `earlier` is what the batches before this one gave, made anew where it is not at hand.
+    With `batch` n there are n more times as many: a candidate's draw (frames, settings, seed) follows from its id, and ids
+    continue, so no draw repeats. `earlier` holds the results of the previous batches, which are generated again where it is
+    missing.
+
     A candidate that fails is left out; raises GenerationFailed when none is left, OverrideError for an unusable upload, and
     BackendUnavailable when the generator cannot be used on this machine at all.
     """
@@ -121,7 +123,7 @@ def generate_candidates(
             f"{track.name}: {_count_of(failures)} failed: {failures[0]}",
             hint="add a click on a clearer frame, or upload a mesh",
         )
-    if not made:  # what the person gave stands alone; why is said with it
+    if not made:  # only the uploads remain; the warning gives the reason
         given = [_warned(asset, f"{generator} made no mesh: {failures[0]}") for asset in given]
     return choose_candidate([*made, *given], rule=config.rule)
 
@@ -137,7 +139,7 @@ def load_generator(name: str, config: GenerateConfig, progress: Progress = SILEN
 
 
 def with_uploads(found: CandidateSet, uploads: tuple[Path, ...], rule: Rule) -> CandidateSet:
-    """The candidates and the given meshes, and the consensus of all; raises OverrideError for an unusable upload."""
+    """The candidates and the uploaded meshes, and the consensus of all; raises OverrideError for an unusable upload."""
     return choose_candidate([*found.candidates, *_read_all(uploads, found.object_name)], rule=rule)
 
 
@@ -146,7 +148,7 @@ def _read_all(uploads: tuple[Path, ...], name: str) -> list[MeshAsset]:
 
 
 def marked(found: CandidateSet, warning: str) -> CandidateSet:
-    """The same candidates, each with a warning more: it is shown wherever one of them is."""
+    """The same candidates, each with an additional warning, shown wherever one of them is."""
     return replace(found, candidates=tuple(_warned(asset, warning) for asset in found.candidates))
 
 
@@ -159,7 +161,7 @@ def _warned(asset: MeshAsset, warning: str) -> MeshAsset:
 def _make_all(
     backend: MeshGenerator, evidence: Evidence, names: list[str], seed: int, progress: Progress
 ) -> tuple[list[MeshAsset], list[str]]:
-    """The candidates that could be made, and why the others could not; a generator that is gone is not asked again."""
+    """The successful candidates, and the reasons of failures; an unavailable generator is not called again."""
     made: list[MeshAsset] = []
     failures: list[str] = []
     for k, name in enumerate(names):
@@ -177,7 +179,7 @@ def _make_all(
 
 
 def _attempt(make: Callable[[], MeshAsset], failures: list[str]) -> MeshAsset | None:
-    """The candidate, or None with the reason noted: one bad draw must not cost the object."""
+    """The candidate, or None with the reason recorded: one bad draw must not fail the object."""
     try:
         return make()
     except (Cancelled, BackendUnavailable):

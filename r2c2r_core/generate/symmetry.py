@@ -1,4 +1,4 @@
-"""Symmetries that complete what no camera saw: a body of revolution, or a left-right mirror."""
+"""Symmetries that complete the unobserved part of an object: revolution about an axis, or a left-right mirror."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -11,11 +11,11 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a thing is round."""
+    """Tuned parameters of solids of revolution."""
 
-    slices: int = param(8, "count", "in height", ge=2)
-    largest_radius_m: float = param(0.25, "m", "of a body of revolution that is believed")
-    least_points: int = param(150, "count", "that tell it")
+    slices: int = param(8, "count", "Number of height slices", ge=2)
+    largest_radius_m: float = param(0.25, "m", "Maximum radius of a solid of revolution")
+    least_points: int = param(150, "count", "Minimum number of points for the fit")
 
 
 class Revolution(NamedTuple):
@@ -32,10 +32,10 @@ class Revolution(NamedTuple):
 
 
 def fit_revolution(points: Points) -> Revolution | None:
-    """The body of revolution about a vertical axis through the points; None for a few points or a wide thing.
+    """Solid of revolution about a vertical axis through the points; None with few points or for a wide object.
 
-    Each slice of height is a circle about one common centre: linear least squares in the centre and the slices' terms
-    r^2 - |c|^2.
+    Each slice of height is a circle about one common centre: linear least squares in the centre and the slices' terms r^2 -
+    |c|^2.
     """
     params = tuned(Params)
     if len(points) < params.least_points:
@@ -64,7 +64,7 @@ def fit_revolution(points: Points) -> Revolution | None:
 
 
 def is_rounder_than_box(points: Points, revolution: Revolution) -> bool:
-    """Whether the points are nearer to the revolution than to the rectangle around each slice of height."""
+    """Whether the points are nearer to the solid of revolution than to the rectangle around each height slice."""
     params = tuned(Params)
     low, high = np.percentile(points[:, 2], [1, 99])
     member = np.clip(((points[:, 2] - low) / max(high - low, 1e-6) * params.slices).astype(int), 0, params.slices - 1)
@@ -73,7 +73,7 @@ def is_rounder_than_box(points: Points, revolution: Revolution) -> bool:
 
 
 def best_mirror(occupied: np.ndarray, seen: np.ndarray, free: np.ndarray) -> int | None:
-    """The horizontal axis (0 or 1) about whose middle the seen voxels agree with their twins; None where neither does.
+    """The horizontal axis (0 or 1) about whose middle the observed voxels agree best with their twins; None if neither does.
 
     `seen` marks voxels whose state is known, `free` those known to be empty; `occupied` is the solid they bound.
     """

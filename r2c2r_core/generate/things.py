@@ -1,4 +1,4 @@
-"""Free-standing things: round or box-shaped where masks and depth agree that they are, else carved from free space."""
+"""Hypotheses of free-standing objects: round or box-shaped where masks and depth support it, else carved from free space."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,33 +24,33 @@ Family = tuple[Hypothesis, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a simple shape is good enough."""
+    """Tuned parameters for accepting a simple shape."""
 
-    lathe_fit: float = param(0.75, "score", "IoU below which carving is tried beside a body of revolution")
-    cuboid_fit: float = param(0.8, "score", "IoU below which a box is given up")
+    lathe_fit: float = param(0.75, "score", "Score below which carving competes with a solid of revolution")
+    cuboid_fit: float = param(0.8, "score", "Score below which a cuboid is rejected")
 
 
 def thing_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hypothesis, ...]:
-    """A thing's solids in a gravity-aligned frame, of the kind that fits first, then of the other kinds by turns."""
+    """Hypotheses of an object's shape in a gravity-aligned frame: the best-fitting kind interleaved with the others."""
     seen = observe_thing(evidence, everything)
     revolution = fit_revolution(seen.points)
     is_rounder = revolution is not None and is_rounder_than_box(seen.points, revolution)
     lathe, is_certain = round_family(evidence, everything) if revolution is not None else ((), False)
     cuboid = carton_family(evidence, seen)
     carved = carved_family(evidence, everything, is_round=is_rounder and not lathe)
-    if carved[0].assumes == ON_LEGS:  # its top alone would be a fine box
+    if carved[0].assumes == ON_LEGS:  # its top alone would fit a cuboid well
         return carved
     first = _likeliest(lathe, is_certain, cuboid, carved, partial(_fit, evidence, everything))
     if first is cuboid or not is_certain:
         others = [family for family in (lathe, carved, cuboid) if family and family is not first]
-    else:  # what is surely round is no box
+    else:  # an object that is certainly round is no box
         others = [carved]
     turns = zip_longest(first, *others)
     return tuple(h for h in chain.from_iterable(turns) if h is not None)
 
 
 def _likeliest(lathe: Family, is_certain: bool, cuboid: Family, carved: Family, fit: Callable[[Hypothesis], float]) -> Family:
-    """The clean family that fits well enough, else the better of a lathe and carving; a box where neither can be made."""
+    """The clean family that fits well enough, else the better of a lathe and carving; a cuboid if neither can be built."""
     params = tuned(Params)
     sure = [
         (fit(family[0]), family, least) for family, least in ((lathe, params.lathe_fit), (cuboid, params.cuboid_fit)) if family
@@ -67,7 +67,7 @@ def _likeliest(lathe: Family, is_certain: bool, cuboid: Family, carved: Family, 
 
 
 def _fit(evidence: Evidence, everything: Variation, hypothesis: Hypothesis) -> float:
-    """How well it agrees with masks and depth of the best frames, at most 1; -inf for what cannot be made."""
+    """Agreement with masks and depth of the best frames, at most 1; -inf for a hypothesis that yields no shape."""
     try:
         shape = hypothesis.shape(everything)
     except GenerationFailed:

@@ -1,7 +1,7 @@
-"""TRELLIS in this process: several masked photos in, a textured mesh out (paper §4.2; Xiang et al. 2025).
+"""TRELLIS in this process: several masked photos to a textured mesh (paper §4.2; Xiang et al. 2025).
 
 Needs the repository's own environment (github.com/microsoft/TRELLIS; Linux, an NVIDIA GPU with 16 GB) and its weights in a
-folder. TRELLIS loads DINOv2 beside them through torch.hub: run it once with a network, or fill torch.hub's cache.
+folder. TRELLIS also loads DINOv2 through torch.hub: run it once with a network, or fill torch.hub's cache.
 """
 
 from functools import cache
@@ -22,7 +22,7 @@ _TEXTURE_PX = 1024
 
 
 class Trellis(MeshGenerator):
-    """Makes candidates with TrellisImageTo3DPipeline."""
+    """Generator that runs TrellisImageTo3DPipeline."""
 
     def __init__(self, *, weights: Path) -> None:
         self._pipeline = _pipeline(weights)
@@ -33,7 +33,7 @@ class Trellis(MeshGenerator):
         name = evidence.track.name
         try:
             mesh = _textured(_sample(self._pipeline, sampling))
-        except Exception as error:  # whatever CUDA, spconv or the mesh extraction raise: it costs this sample only
+        except Exception as error:  # any error of CUDA, spconv or the mesh extraction fails this sample only
             raise GenerationFailed(f"{name}: TRELLIS failed on {candidate_id}: {first_line(error)}") from error
         return delivered_asset(
             parts_of([mesh]),
@@ -48,7 +48,7 @@ class Trellis(MeshGenerator):
 
 @cache
 def _pipeline(weights: Path) -> Any:
-    """The loaded pipeline, once a process: loading takes most of a minute and 16 GB of GPU memory."""
+    """The pipeline, loaded once per process: loading takes most of a minute and 16 GB of GPU memory."""
     try:
         from trellis.pipelines import TrellisImageTo3DPipeline
     except ImportError as error:
@@ -88,7 +88,7 @@ def _sample(pipeline: Any, sampling: Sampling) -> dict[str, Any]:
 
 
 def _textured(outputs: dict[str, Any]) -> Any:
-    """The mesh as to_glb leaves it: hidden faces culled, small holes filled, simplified, its texture baked, +Y up."""
+    """The mesh after to_glb: hidden faces culled, small holes filled, simplified, its texture baked, +Y up."""
     from trellis.utils import postprocessing_utils
 
     return postprocessing_utils.to_glb(

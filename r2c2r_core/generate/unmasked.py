@@ -1,7 +1,7 @@
-"""What masks get wrong on a body of revolution, put right by depth: a cap of the wall's colour, a shadow at its foot.
+"""Depth-based correction of mask errors on solids of revolution: a cap in the wall's colour, a shadow at the base.
 
-A mask is cut along colours, so a white cap before a white wall is missing from it in every frame, and a dark shadow on the
-worktop is part of it. Depth tells both: pixels over the cap are as near as the body, not as far as the wall.
+A mask follows colours, so a white cap in front of a white wall is missing from it in every frame, and a dark shadow on the
+worktop is part of it. Depth resolves both: pixels on the cap are as near as the body, not as far as the wall.
 """
 
 from collections.abc import Sequence
@@ -19,27 +19,27 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What depth puts right of a mask."""
+    """Tuned parameters of mask correction by depth."""
 
-    step_m: float = param(0.003, "m", "between places that are looked at", gt=0)
-    highest: float = param(0.35, "share", "of the height that may be missing above")
-    least_m: float = param(0.006, "m", "of a piece: a shorter one is within the masks' error")
-    noise_m: float = param(0.015, "m", "of one depth pixel")
-    clear_m: float = param(0.03, "m", "behind the far rim: something else")
-    least_seen: int = param(3, "count", "pixels that know, of all views")
-    foot: float = param(0.12, "share", "of the height that is the foot")
-    body: float = param(0.35, "share", "of the height up to which the body above the foot is looked at")
-    flare: float = param(1.06, "ratio", "of a foot's radius to the body's, from which it is a shadow")
+    step_m: float = param(0.003, "m", "Sampling distance in height and across", gt=0)
+    highest: float = param(0.35, "share", "Maximum height of a missing top, relative to the body's height")
+    least_m: float = param(0.006, "m", "Minimum height of a missing top: less is within the masks' error")
+    noise_m: float = param(0.015, "m", "Noise of one depth pixel")
+    clear_m: float = param(0.03, "m", "Distance behind the far rim beyond which depth belongs to the background")
+    least_seen: int = param(3, "count", "Minimum number of conclusive pixels over all views")
+    foot: float = param(0.12, "share", "Fraction of the height that counts as the base")
+    body: float = param(0.35, "share", "Fraction of the height up to which the body above the base is measured")
+    flare: float = param(1.06, "ratio", "Ratio of the base's radius to the body's above which the base is a shadow")
 
 
 def with_true_ends(revolution: Revolution, points: Points, views: Sequence[View], world_from_local: Rigid3) -> Revolution:
-    """The body with its top and foot where depth has them: the very same one where depth says nothing else."""
+    """The body with top and base corrected by depth; unchanged where depth does not contradict the masks."""
     whole = tuple(view for view in views if not view.is_cropped)
     return with_unmasked_top(without_flared_foot(revolution, points), whole, world_from_local)
 
 
 def with_unmasked_top(revolution: Revolution, views: Sequence[View], world_from_local: Rigid3) -> Revolution:
-    """The body continued upwards for as long as most depth pixels on its axis are as near as the body."""
+    """The body extended upwards while most depth pixels on its axis are as near as the body."""
     params = tuned(Params)
     bottom, top, widest = revolution.heights_m[0], revolution.heights_m[-1], float(revolution.radii_m.max())
     heights = np.arange(top + params.step_m / 2, top + params.highest * (top - bottom), params.step_m)
@@ -48,7 +48,7 @@ def with_unmasked_top(revolution: Revolution, views: Sequence[View], world_from_
     hits, known = (np.sum(values, axis=0) for values in zip(*counts, strict=True))
     solid = (known >= params.least_seen) & (hits > 0.5 * known)
     rows = int(np.argmin(np.append(solid[:, 0], False)))
-    if rows * params.step_m < params.least_m or rows == len(heights):  # something stands behind it all the way up
+    if rows * params.step_m < params.least_m or rows == len(heights):  # an object behind it reaches all the way up
         return revolution
     radii = offsets[np.argmin(np.column_stack([solid[:rows], np.zeros(rows, bool)]), axis=1) - 1] + params.step_m / 2
     radii = np.minimum(np.full(rows, np.median(radii)), widest)
@@ -61,7 +61,7 @@ def with_unmasked_top(revolution: Revolution, views: Sequence[View], world_from_
 
 
 def without_flared_foot(revolution: Revolution, points: Points) -> Revolution:
-    """The foot no wider than the body above it, unless depth points lie that far out."""
+    """The body with its base no wider than the part above, unless depth points lie that far out."""
     params = tuned(Params)
     bottom, top = revolution.heights_m[0], revolution.heights_m[-1]
     share = (revolution.heights_m - bottom) / (top - bottom)
@@ -79,13 +79,15 @@ def without_flared_foot(revolution: Revolution, points: Points) -> Revolution:
 def _hits_and_known(
     revolution: Revolution, heights: np.ndarray, offsets: np.ndarray, view: View, world_from_local: Rigid3
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of the two depth pixels at each (height, distance to either side of the axis): how many lie on the body, or on either."""
+    """Number of the two depth pixels at each (height, distance to either side of the axis) that hit the body, and that are
+    conclusive.
+    """
     params = tuned(Params)
     eye = world_from_local.inverse.apply(view.eye_world)
     away = revolution.centre - eye[:2]
     away /= max(float(np.linalg.norm(away)), 1e-9)
     rim = float(revolution.radii_m[-1])
-    # seen from above, it is the far rim that hides what is behind; nearer to the axis the top itself does
+    # seen from above, the far rim occludes the background; nearer to the axis the top itself does
     sides = np.concatenate([offsets, -offsets])
     plan = revolution.centre + rim * away + sides[:, None] * np.array([away[1], -away[0]])
     places = np.column_stack([np.tile(plan, (len(heights), 1)), np.repeat(heights, len(sides))])

@@ -1,4 +1,4 @@
-"""Colours for the texels that no frame shows."""
+"""Colour completion of texels that no frame shows."""
 
 from dataclasses import dataclass
 
@@ -12,20 +12,25 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Colours of what no frame shows."""
+    """Tuned parameters of texture completion."""
 
-    least_share: float = param(0.15, "share", "of a side that must be seen before its own colours are used")
-    before_face_m: float = param(0.002, "m", "before the front, from where a texel stands out")
-    neighbours: int = param(4, "count", "seen texels whose colours are blended", ge=2)
-    most_known: int = param(12_000, "count", "seen texels that are searched", ge=10)
-    cells_a_reach: int = param(20, "count", "cells to a reach: within one colours hardly change", ge=1)
+    least_share: float = param(0.15, "share", "Minimum observed fraction of a side for its own colours to be used")
+    before_face_m: float = param(
+        0.002, "m", "Distance in front of the front face beyond which a texel belongs to a protruding part"
+    )
+    neighbours: int = param(4, "count", "Number of observed texels whose colours are blended", ge=2)
+    most_known: int = param(12_000, "count", "Maximum number of observed texels in the neighbour search", ge=10)
+    cells_a_reach: int = param(20, "count", "Number of lookup cells per reach: colours hardly change within one cell", ge=1)
     reach: float = param(
-        0.15, "ratio", "to the mesh's size: further from anything seen, the median colour is as good a guess", gt=0
+        0.15,
+        "ratio",
+        "Maximum distance of a neighbour, relative to the mesh's size; beyond it the median colour is as good",
+        gt=0,
     )
 
 
 def own_texels(atlas: Atlas, seen: np.ndarray, front_y_m: float | None) -> np.ndarray:
-    """Texels that may keep what was seen: on a side of which little was seen, texels along its edge show the neighbour."""
+    """Texels that may keep their observed colours: on a barely observed side, texels along its edge show the neighbour."""
     if front_y_m is None:
         return np.ones(len(seen), dtype=bool)
     total = np.bincount(atlas.chart, minlength=6)
@@ -34,11 +39,11 @@ def own_texels(atlas: Atlas, seen: np.ndarray, front_y_m: float | None) -> np.nd
 
 
 def fill_unseen(colours: Colours, seen: np.ndarray, atlas: Atlas, front_y_m: float | None, eye_local: Vector3) -> Colours:
-    """Colours for unseen texels: gaps from what was seen nearest on the surface, the rest from the median colour.
+    """Colours for unobserved texels: gaps from the nearest observed surface, the rest from the median colour.
 
-    Neighbours are found in space, so charts that were cut apart continue each other. The back of a thing is taken for the
-    mirror image of the front that `eye_local` (the cameras' mean place) sees; but a side of furniture of which nothing was
-    seen gets the plain tint, for its material does not follow the front's pattern round the corner.
+    Neighbours are found in space, so separately unwrapped charts continue each other. The back of an object is assumed to
+    mirror the front that `eye_local` (the cameras' mean position) sees; but an entirely unobserved side of furniture gets the
+    plain tint, since its material does not continue the front's pattern around the corner.
     """
     if seen.all() or not seen.any():
         return np.where(seen[:, None], colours, np.uint8(160))
@@ -58,7 +63,7 @@ def fill_unseen(colours: Colours, seen: np.ndarray, atlas: Atlas, front_y_m: flo
 
 
 def spread_colours(texture: Image, atlas: Atlas) -> Image:
-    """Fill the gutters between charts with the nearest chart colour, so that no viewer's filtering bleeds black."""
+    """The texture with gutters between charts filled with the nearest chart colour, so that filtering does not bleed black."""
     covered = np.zeros(atlas.size, np.uint8)
     covered.ravel()[atlas.texel] = 1
     if covered.all() or not covered.any():
@@ -70,12 +75,12 @@ def spread_colours(texture: Image, atlas: Atlas) -> Image:
 
 
 def _stands_out(atlas: Atlas, front_y_m: float) -> np.ndarray:
-    """Texels before the front face: a handle's sides go with the handle, not with the carcass."""
+    """Texels in front of the front face: a handle's sides belong to the handle, not to the carcass."""
     return np.asarray(atlas.points[:, 1] < front_y_m - tuned(Params).before_face_m)
 
 
 def _mirrored(chosen: Points, points: Points, eye_local: Vector3) -> Points:
-    """The chosen points' mirror images about the upright plane through the middle that faces the cameras."""
+    """Mirror images of the chosen points about the upright plane through the centre that faces the cameras."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     towards = (eye_local - middle) * [1.0, 1.0, 0.0]
     towards /= max(float(np.linalg.norm(towards)), 1e-9)
@@ -83,7 +88,7 @@ def _mirrored(chosen: Points, points: Points, eye_local: Vector3) -> Points:
 
 
 def _blend_neighbours(filled: Colours, known: np.ndarray, missing: np.ndarray, points: Points, places: Points) -> None:
-    """Fade the missing texels, in place, from the colours known nearest to their `places` to what they hold."""
+    """Blend the missing texels, in place, from the known colours nearest to their `places` to their current colours."""
     params = tuned(Params)
     from scipy.spatial import cKDTree
 
@@ -103,7 +108,7 @@ def _blend_neighbours(filled: Colours, known: np.ndarray, missing: np.ndarray, p
 
 
 def _by_cell(places: Points, size_m: float) -> tuple[Points, np.ndarray]:
-    """One of the places in each occupied cell of space, and the cell of every place: neighbours are alike within it."""
+    """One place per occupied cell of space, and the cell of every place: neighbours are similar within a cell."""
     cell = np.floor((places - places.min(axis=0)) / max(size_m, 1e-9)).astype(np.int64)
     count = cell.max(axis=0) + 1
     _, first, of_cell = np.unique(

@@ -1,4 +1,4 @@
-"""A mesh file given by the user, as one more candidate: any unit, any frame, repaired where it leaks."""
+"""User-supplied mesh file as an additional candidate: any unit, any frame, repaired where it is not closed."""
 
 import zlib
 from pathlib import Path
@@ -13,7 +13,7 @@ from r2c2r_core.model.mesh import MeshAsset
 
 
 def read_mended(path: Path) -> Mended:
-    """The file as one closed, textured mesh in its own frame and unit, with a note for all that was done to it (repair.py).
+    """The file as one closed, textured mesh in its own frame and unit, with a note of every repair (repair.py).
 
     Raises OverrideError when it cannot be used.
     """

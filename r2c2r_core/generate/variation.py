@@ -1,4 +1,4 @@
-"""What differs between the candidates of one object: an honest spread of the choices nobody can be sure of."""
+"""Random variation between the candidates of one object: a spread over the choices that remain uncertain."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,12 @@ class Variation:
     """One draw. Ranges from backends.md §2.6: 6-14 frames, percentile 0.2-2 %, voxel 4-6 mm, 1-3 votes, prior depth ±5 %."""
 
     views: tuple[View, ...]
-    erosion_px: float  # of the masks, in depth pixels
+    erosion_px: float  # erosion of the masks, in depth pixels
     bbox_percentile: float  # trimmed off each end of the observed points
     carve_votes: int  # frames that must see a voxel free
     voxel_m: float
-    depth_scale: float  # of a depth that is assumed, not seen
-    depth_draw: float  # standard deviations off a depth that was measured badly, -1.5..1.5
+    depth_scale: float  # factor on a depth that is assumed, not observed
+    depth_draw: float  # offset of a poorly measured depth in standard deviations, -1.5..1.5
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -52,7 +52,7 @@ def draw_variation(evidence: Evidence, rng: np.random.Generator) -> Variation:
 
 
 def whole_pool(evidence: Evidence) -> Variation:
-    """No draw at all: every good frame and the middle of each range."""
+    """The deterministic variation: every good frame and the middle of each range."""
     return Variation(
         views=evidence.pool,
         erosion_px=1.0,

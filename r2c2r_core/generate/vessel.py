@@ -1,7 +1,7 @@
-"""Mugs, bowls and pots: a body of revolution with a wall, a floor and a hollow, and the handle that outlines show.
+"""Mugs, bowls and pots: a solid of revolution with a wall, a floor and a cavity, and the handle that silhouettes show.
 
-Depth into a mug is a handful of noisy pixels, so the hollow and the wall's thickness come from the category; where a handle
-stands and how far it reaches is seen in the masks: beside the body, in the frames that look past it.
+Depth inside a mug is a handful of noisy pixels, so the cavity and the wall's thickness come from the category; direction and
+reach of a handle are measured in the masks: beside the body, in the frames that look past it.
 """
 
 from collections.abc import Sequence
@@ -23,31 +23,35 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Mugs, bowls and pots."""
+    """Tuned parameters of mugs, bowls and pots."""
 
-    wall_m: float = param(0.004, "m", "thickness of the wall", source="stoneware")
-    wall_share: float = param(0.2, "share", "of the radius that a wall may take")
-    floor: float = param(1.5, "ratio", "of the floor's thickness to the wall's")
-    azimuths: int = param(36, "count", "directions in which a handle is looked for", ge=8)
-    reaches_m: tuple[float, float, float] = param((0.008, 0.06, 0.004), "m", "from, to and step: beyond the body, of a handle")
-    spread: int = param(4, "count", "azimuths to either side of the clearest that are averaged")
-    beside: float = param(1.08, "ratio", "to the radius: a place that a frame sees past the body")
-    least_views: int = param(3, "count", "that may show a handle", ge=1)
-    shown: float = param(0.5, "share", "of those views that must")
-    bar_m: float = param(0.009, "m", "thickness of a handle's ring")
-    bar_share: float = param(0.5, "share", "of its ring's radius that it may take")
-    tallest: float = param(0.36, "share", "of the height: the radius of a handle's ring")
+    wall_m: float = param(0.004, "m", "Thickness of the wall", source="stoneware")
+    wall_share: float = param(0.2, "share", "Maximum thickness of the wall relative to the radius")
+    floor: float = param(1.5, "ratio", "Ratio of the floor's thickness to the wall's")
+    azimuths: int = param(36, "count", "Number of directions in which a handle is searched", ge=8)
+    reaches_m: tuple[float, float, float] = param(
+        (0.008, 0.06, 0.004), "m", "Start, end and step of the distances beyond the body at which a handle is searched"
+    )
+    spread: int = param(4, "count", "Number of azimuths to either side of the best that are averaged")
+    beside: float = param(
+        1.08, "ratio", "Minimum lateral distance from the axis, relative to the radius, for a frame to see past the body"
+    )
+    least_views: int = param(3, "count", "Minimum number of views that look past the body", ge=1)
+    shown: float = param(0.5, "share", "Minimum fraction of the views that look past the body which show the handle")
+    bar_m: float = param(0.009, "m", "Thickness of a handle's ring")
+    bar_share: float = param(0.5, "share", "Maximum thickness of the ring relative to its radius")
+    tallest: float = param(0.36, "share", "Maximum radius of a handle's ring relative to the height")
 
 
 class VesselHandle(NamedTuple):
-    """Where a handle stands round the axis, and how far its outer edge is from the body."""
+    """A handle's azimuth about the axis and the distance of its outer edge from the body."""
 
     azimuth_rad: float
     reach_m: float
 
 
 def vessel_mesh(revolution: Revolution, handle: VesselHandle | None) -> tuple[Points, Faces]:
-    """The closed surface of the body with its hollow, and the handle as a ring through the wall."""
+    """Closed surface of the body with its cavity, and the handle as a ring through the wall."""
     params = tuned(Params)
     bottom, top = float(revolution.heights_m[0]), float(revolution.heights_m[-1])
     wall = min(params.wall_m, params.wall_share * float(revolution.radii_m.min()))
@@ -63,14 +67,14 @@ def vessel_mesh(revolution: Revolution, handle: VesselHandle | None) -> tuple[Po
 
 
 def find_handle(revolution: Revolution, views: Sequence[View], world_from_local: Rigid3) -> VesselHandle | None:
-    """The direction in which most frames that look past the body show mask beside it; None where there is none."""
+    """Direction in which most frames that look past the body show mask beside it; None without one."""
     params = tuned(Params)
     shares = np.stack([_shown(revolution, azimuth, views, world_from_local) for azimuth in _azimuths()])
     near = shares[:, : len(_reaches_m()) // 3].mean(axis=1)
     if not np.isfinite(near).any():
         return None
     best = int(np.nanargmax(near))
-    if near[best] < params.shown or np.nanmedian(near) > 0.5 * near[best]:  # a mask wide all round is a mask too wide
+    if near[best] < params.shown or np.nanmedian(near) > 0.5 * near[best]:  # a mask that is wide all around is simply too wide
         return None
     reach = float(_reaches_m()[shares[best] >= params.shown].max(initial=_reaches_m()[0]))
     beside = (best + np.arange(-params.spread, params.spread + 1)) % params.azimuths
@@ -84,7 +88,7 @@ def _azimuths() -> np.ndarray:
 
 
 def _shown(revolution: Revolution, azimuth: float, views: Sequence[View], world_from_local: Rigid3) -> np.ndarray:
-    """Per reach, the share of the frames that see past the body there whose mask holds the place; nan for too few frames."""
+    """Per reach, the fraction of the frames looking past the body whose mask contains that point; nan with too few frames."""
     params = tuned(Params)
     bottom, top = revolution.heights_m[0], revolution.heights_m[-1]
     out = np.array([np.cos(azimuth), np.sin(azimuth)])
@@ -107,21 +111,21 @@ def _shown(revolution: Revolution, azimuth: float, views: Sequence[View], world_
 
 
 def _pose_error(view: View, body_px: np.ndarray) -> np.ndarray:
-    """By how many pixels the mask's deepest place, which is in the body and not in the handle, is off the body's middle."""
+    """Offset in pixels of the mask's innermost point, which lies in the body and not the handle, from the body's centre."""
     inside = cv2.distanceTransform(np.pad(view.mask, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
     rows, columns = np.nonzero(inside > 0.9 * inside.max())
     return np.array([columns.mean() + 0.5, rows.mean() + 0.5]) - body_px.mean(axis=0)
 
 
 def _ring(revolution: Revolution, handle: VesselHandle) -> tuple[Points, Faces]:
-    """An upright ring whose outer edge is where the handle ends; its inner part is cut off by the hollow."""
+    """Upright ring whose outer edge is the end of the handle; its inner part is cut off by the cavity."""
     params = tuned(Params)
     bottom, top = float(revolution.heights_m[0]), float(revolution.heights_m[-1])
     middle = 0.55 * top + 0.45 * bottom
     radius = float(np.interp(middle, revolution.heights_m, revolution.radii_m))
-    outer = min(params.tallest * (top - bottom), radius)  # of a tall jug, a larger ring would come out on the other side
+    outer = min(params.tallest * (top - bottom), radius)  # on a tall jug, a larger ring would protrude on the other side
     bar = min(params.bar_m, params.bar_share * outer)
-    stretch = max(1.0, (handle.reach_m / 2 + bar) / outer)  # of a flat pan, a round one would not touch the body
+    stretch = max(1.0, (handle.reach_m / 2 + bar) / outer)  # on a flat pan, a circular ring would not touch the body
     centre = radius + max(handle.reach_m - stretch * outer, -0.4 * outer)
     disc, hole = (
         lathe_mesh(Revolution(np.zeros(2), np.array([-half, half]), np.full(2, size)))

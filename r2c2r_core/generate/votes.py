@@ -1,4 +1,4 @@
-"""What the frames of a thing say of each voxel: seen as surface, seen free, or in no mask at all."""
+"""Voxel votes of an object's frames: observed surface, observed free space, or outside the masks."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -16,19 +16,19 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What frames say of voxels."""
+    """Tuned parameters of voxel votes."""
 
-    block: int = param(4, "count", "voxels, each way, that are looked at as one first", ge=1)
-    occluder_gap_m: float = param(0.03, "m", "nearer than a voxel by more, depth belongs to something in front of it")
+    block: int = param(4, "count", "Side of the blocks of voxels that are tested as one first", ge=1)
+    occluder_gap_m: float = param(0.03, "m", "Distance in front of a voxel beyond which depth belongs to an occluder")
 
 
 class Votes(NamedTuple):
-    """What the frames say of each voxel (flat arrays)."""
+    """Votes of the frames for each voxel (flat arrays)."""
 
-    distance_m: np.ndarray  # mean truncated distance to the seen surface; nan where none
+    distance_m: np.ndarray  # mean truncated distance to the observed surface; nan without one
     free_m: np.ndarray  # the k-th largest distance into free space; -inf where fewer than k frames see it free
-    surfaces: np.ndarray  # how many frames see a surface within the truncation
-    outside_m: np.ndarray  # least distance outside any frame's mask, at most the truncation; positive: in no mask at all
+    surfaces: np.ndarray  # number of frames that see a surface within the truncation
+    outside_m: np.ndarray  # minimum distance outside a frame's mask, clipped to the truncation; positive: outside every mask
 
 
 def collect_votes(centres_world: Points, variation: Variation, truncation: float) -> Votes:
@@ -65,13 +65,13 @@ def grid_votes(
     truncation: float,
     world_from_local: Rigid3,
 ) -> Votes:
-    """The same of a whole grid (last axis fastest); blocks that lie clearly outside the masks are not looked at in detail."""
+    """Votes of a whole grid (last axis fastest), coarse to fine: blocks clearly outside the masks are not refined."""
     params = tuned(Params)
     grid = centres_local.reshape(*shape, 3)
     middles = grid[np.ix_(*[np.minimum(np.arange(0, n, params.block) + params.block // 2, n - 1) for n in shape])]
     reach = max(
         params.block * voxel_m, truncation
-    )  # from a block's middle to its furthest voxel, and as far as anything is told apart
+    )  # from a block's centre to its furthest voxel, and at least the truncation distance
     away = _is_outside(world_from_local.apply(middles.reshape(-1, 3)), variation, truncation, reach).reshape(middles.shape[:3])
     for axis in range(3):
         away = np.repeat(away, params.block, axis=axis)
@@ -98,9 +98,10 @@ def _is_outside(points_world: Points, variation: Variation, truncation: float, r
 def _view_distances(
     points_world: np.ndarray, view: View, erosion_px: float, truncation: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Per voxel, metres: before the seen surface, whether that is known, inside free space (-inf if not), outside the mask.
+    """Per voxel: distance in front of the observed surface (metres), whether that is valid, distance into free space (-inf if
+    not free), distance outside the mask.
 
-    Free is what the depth sees through, and what projects outside the mask with nothing nearer in front of it.
+    Free space is what the depth sees through, and what projects outside the mask without a nearer occluder.
     """
     camera_from_world = view.world_from_camera.inverse
     q = points_world @ camera_from_world.rotation.T.astype(np.float32) + camera_from_world.translation.astype(np.float32)

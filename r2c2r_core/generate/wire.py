@@ -1,4 +1,4 @@
-"""What travels to a machine that makes meshes: multipart/form-data with the object's good frames.
+"""Request format of a remote mesh generator: multipart/form-data with the object's good frames.
 
 POST /v1/mesh carries these parts:
 
@@ -11,8 +11,8 @@ POST /v1/mesh carries these parts:
 
 params: {"version": 1, "object": name, "category": text, "candidate": id, "seed": int, "views": [{"frame": int,
 "rgb_camera": camera, "depth_camera": camera, "world_from_camera": 4x4 rows, "sharpness": 0..1, "cropped": bool,
-"depth_noise": {"floor_m", "per_m"}}]}; the n-th view is of the n-th image and depth; depth errs by floor_m + per_m * z, one
-sigma; camera: {"fx", "fy", "cx", "cy", "width", "height"} in pixels of that picture, pixel
+"depth_noise": {"floor_m", "per_m"}}]}; the n-th view is of the n-th image and depth; the depth's standard
+deviation is floor_m + per_m * z; camera: {"fx", "fy", "cx", "cy", "width", "height"} in pixels of that picture, pixel
 centres at i + 0.5; camera axes as OpenCV (+X right, +Y down, +Z forward), world metres with +Z up. A server that knows
 only pictures reads `image` and `seed` and leaves the rest.
 """
@@ -49,7 +49,7 @@ class Wish(NamedTuple):
 
 
 def encode_wish(wish: Wish) -> tuple[str, bytes]:
-    """Content type and body."""
+    """Content type and body of a request."""
     evidence = wish.evidence
     views = [bounded(view) for view in evidence.pool]
     params = {
@@ -70,7 +70,7 @@ def encode_wish(wish: Wish) -> tuple[str, bytes]:
 
 
 def decode_wish(content_type: str, body: bytes) -> Wish:
-    """What `encode_wish` wrote; raises InputError naming what is missing or wrong."""
+    """The request that `encode_wish` wrote; raises InputError naming the missing or invalid part."""
     form = decode_form(content_type, body)
     try:
         params = json.loads(form["params"][0])
@@ -83,7 +83,7 @@ def decode_wish(content_type: str, body: bytes) -> Wish:
         candidate, seed = str(params["candidate"]), int(params["seed"])
     except InputError:
         raise
-    except Exception as error:  # bytes from the network: the decoders raise whatever a broken part makes them raise
+    except Exception as error:  # bytes from the network: the decoders raise arbitrary exceptions on a corrupt part
         raise InputError(f"the request cannot be read: {type(error).__name__}: {error}") from error
     if not isinstance(track, MaskTrack) or not isinstance(room, Room) or not views:
         raise InputError("the request cannot be read: a track, a room and at least one view expected")
@@ -104,7 +104,7 @@ def encode_form(parts: list[tuple[str, str, bytes]]) -> tuple[str, bytes]:
 
 
 def decode_form(content_type: str, body: bytes) -> dict[str, list[bytes]]:
-    """The contents of a multipart form by part name, in order; raises InputError when it is none."""
+    """The contents of a multipart form by part name, in order; raises InputError for any other body."""
     kind, _, rest = content_type.partition(";")
     boundary = next((p.strip()[9:].strip('"') for p in rest.split(";") if p.strip().startswith("boundary=")), "")
     if kind.strip() != "multipart/form-data" or not boundary:
@@ -157,19 +157,19 @@ def _npy(array: np.ndarray) -> bytes:
 
 
 class _NoFrames:
-    """The pixels of a capture that did not travel."""
+    """Placeholder for the pixels of a capture, which are not transmitted."""
 
     def rgb(self, frame_index: int) -> Image:
-        """Refuses."""
+        """Always raises KeyError."""
         raise KeyError(frame_index)
 
     def depth(self, frame_index: int) -> Depth:
-        """Refuses."""
+        """Always raises KeyError."""
         raise KeyError(frame_index)
 
 
 def _capture_of(room: Room) -> Capture:
-    """As much of the capture as travels: the room, without frames and surface."""
+    """The transmitted part of the capture: the room, without frames and surface."""
     nothing = SceneSurface(
         vertices_world=np.zeros((0, 3)), faces=np.zeros((0, 3), np.int64), colours=np.zeros((0, 3), np.uint8), voxel_m=0.01
     )
