@@ -1,4 +1,4 @@
-"""Whether a placement can be trusted: rivals that fit as well, motions that nothing holds, and both in words."""
+"""Uncertainty of a placement: covariance of the pose, competing modes, ill-conditioned motions, and both in words."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,27 +22,46 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a placement is called uncertain."""
+    """Tuned thresholds of uncertain placements."""
 
     loose_deg: float = param(
-        1.5, "deg", "of turn, from which on a placement is not held", source="what is asked of a placement"
+        1.5,
+        "deg",
+        "Uncertainty of the rotation above which a placement counts as unconstrained",
+        source="accuracy required of a placement",
     )
-    loose_m: float = param(0.015, "m", "of shift, from which on a placement is not held", source="what is asked of a placement")
-    loose_scale: float = param(0.02, "share", "of scale, from which on it is not held", source="what is asked of a placement")
+    loose_m: float = param(
+        0.015,
+        "m",
+        "Uncertainty of the translation above which a placement counts as unconstrained",
+        source="accuracy required of a placement",
+    )
+    loose_scale: float = param(
+        0.02,
+        "share",
+        "Uncertainty of the scale above which a placement counts as unconstrained",
+        source="accuracy required of a placement",
+    )
     confidence: float = param(
-        0.975, "share", "of readings that lie below: Student's t at it widens", source="two σ, one side", lt=1
+        0.975,
+        "share",
+        "One-sided quantile at which Student's t widens the jackknife covariance",
+        source="two σ, one side",
+        lt=1,
     )
-    sigmas: float = param(2.0, "σ", "at which a motion is stated")
-    alike: float = param(0.003, "score", "between two poses that cannot be told apart")
-    clear: float = param(0.05, "score", "between two poses of which one is clearly better")
-    full_frames: int = param(9, "count", "frames as whose independent readings the weights of points and outlines count", gt=0)
-    known_frames: int = param(3, "count", "frames' worth of what other objects tell of how much frames differ", gt=0)
+    sigmas: float = param(2.0, "σ", "Number of standard deviations at which an uncertain motion is reported")
+    alike: float = param(0.003, "score", "Score difference below which two poses are indistinguishable")
+    clear: float = param(0.05, "score", "Score difference above which one pose is clearly better")
+    full_frames: int = param(9, "count", "Number of independent frames that the weights of points and outlines assume", gt=0)
+    known_frames: int = param(
+        3, "count", "Additional degrees of freedom, in frames, from other objects' spread between frames", gt=0
+    )
 
 
 def spread_of(pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted]) -> Spread:
-    """Standard deviations of turn, shift and scale that all the evidence together leaves.
+    """Standard deviations of rotation, translation and scale from all the evidence.
 
-    Turns that leave the shape as it is (a bottle's yaw) count for nothing.
+    Rotations under which the shape is invariant (a bottle's yaw) are ignored.
     """
     unit = rim_unit(observation.size_m)
     covariance = _covariance(all_rows(pose, shape, observation, anchors, lifted, finest_gate(observation)), unit)
@@ -64,13 +83,13 @@ def spread_of(pose: Similarity3, shape: Shape, observation: Observation, anchors
 
 
 def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
-    """Covariance (7, 7) of the step in `unit`: what single readings' noise leaves, and what frames disagree by.
+    """Covariance (7, 7) of the step in `unit`: measurement noise plus jackknife spread between frames.
 
-    A mask's outline and a depth frame are wrong over whole stretches, so their pixels are no independent readings. What
-    that makes of the pose is seen by leaving out one frame at a time (the jackknife, one Newton step for each), and is
-    widened by Student's t: two frames that agree by chance say little. What all frames are wrong by alike is not seen so;
-    the fewer they are, the more of it there is. The normal matrix is inverted as a whole: a turn that a shift makes up for
-    counts as free.
+    Errors of a mask's outline and of a depth frame are correlated over whole stretches, so their pixels are not independent.
+    Their effect on the pose is estimated by leaving out one frame at a time (the jackknife, one Newton step each), widened by
+    Student's t: two frames that agree by chance carry little information. Errors common to all frames are not captured; the
+    fewer the frames, the larger these are. The normal matrix is inverted as a whole: a rotation that a translation can
+    compensate counts as unconstrained.
     """
     params = tuned(Params)
     joined = Rows(*(np.concatenate(column) for column in zip(*rows, strict=True)))
@@ -89,7 +108,7 @@ def _covariance(rows: list[Rows], unit: np.ndarray) -> np.ndarray:
 
 
 def ties(best: Judgement, rival: Judgement) -> bool:
-    """Whether the two cannot be told apart: the scores are close, or close and not consistently ordered over views."""
+    """Whether the two are indistinguishable: their scores are close, or moderately close and inconsistent over views."""
     gain = np.array([a.total - b.total for a, b in zip(best.views, rival.views, strict=True)])
     mean = best.score - rival.score
     params = tuned(Params)
@@ -100,7 +119,7 @@ def ties(best: Judgement, rival: Judgement) -> bool:
 
 
 def loose_ends(spread: Spread, front: FrontPanel | None) -> tuple[str, ...]:
-    """What the scan does not hold as well as a placement should be, a line each; a front tells where the wall is."""
+    """Motions that the scan constrains less than a placement requires, a line each; a front gives the wall's direction."""
     params = tuned(Params)
     limits = np.array([params.loose_deg, params.loose_m, params.loose_scale])
     figures = np.array([spread.turn_deg, spread.shift_m, spread.scale])

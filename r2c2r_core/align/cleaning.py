@@ -1,4 +1,4 @@
-"""Which of the points inside the masks are the object's, and fewer of them."""
+"""Cleaning and subsampling of the points inside the masks."""
 
 from dataclasses import dataclass
 
@@ -13,13 +13,15 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which points are looked at."""
+    """Tuned parameters of point subsampling."""
 
-    crowd: int = param(40, "count", "points looked at for each that is kept", source="a long recording has a million", ge=1)
+    crowd: int = param(
+        40, "count", "Number of points examined per point that is kept", source="a long recording has a million", ge=1
+    )
 
 
 def main_body(points: Points) -> np.ndarray:
-    """Which points belong to the object's connected body, rather than to what shows through slats or behind edges."""
+    """Mask of the points in the object's main connected components, without background seen through slats or past edges."""
     if len(points) < 30:
         return np.ones(len(points), dtype=bool)
     spread = np.quantile(points, 0.95, axis=0) - np.quantile(points, 0.05, axis=0)
@@ -35,10 +37,10 @@ def main_body(points: Points) -> np.ndarray:
 
 
 def thin_out(points: Points, count: int) -> np.ndarray:
-    """Indices of about `count` points spread evenly: one in each cell of a grid, of no frame in particular."""
+    """Indices of about `count` evenly spread points by voxel subsampling, independent of frame order."""
     if len(points) <= count:
         return np.arange(len(points))
-    shuffled = np.random.default_rng(0).permutation(len(points))  # frames disagree by a centimetre: none may be first
+    shuffled = np.random.default_rng(0).permutation(len(points))  # frames disagree by a centimetre: none may take precedence
     shuffled = shuffled[: tuned(Params).crowd * count]
     voxel = 0.002
     while True:
@@ -49,7 +51,7 @@ def thin_out(points: Points, count: int) -> np.ndarray:
 
 
 def _cell_keys(points: Points, voxel: float) -> np.ndarray:
-    """One number for the cell of a grid that a point lies in: far quicker to compare than its three."""
+    """Scalar key of the grid cell of each point, much faster to compare than three indices."""
     cells = np.floor(points / voxel).astype(np.int64)
     cells -= cells.min(axis=0)
     shape = cells.max(axis=0) + 1
@@ -57,7 +59,7 @@ def _cell_keys(points: Points, voxel: float) -> np.ndarray:
 
 
 def _components(cells: np.ndarray, filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Label of each cell and the points in each label, cells touching by a corner being one body."""
+    """Label of each cell and the number of points per label; cells that touch at a corner are connected."""
     if not len(cells):
         return np.zeros(0, dtype=np.int64), np.zeros(0)
     pairs = cKDTree(cells).query_pairs(1.8, output_type="ndarray")

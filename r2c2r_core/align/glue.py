@@ -1,7 +1,7 @@
-"""What SuperGlue and LightGlue share: SuperPoint keypoints of one image, computed once, and a network over pairs of them.
+"""Common base of SuperGlue and LightGlue: SuperPoint keypoints computed once per image, and a network over image pairs.
 
-transformers' own call detects anew for every pair; 6 photos against 100 views would take hours on a CPU. Here keypoints are
-kept (the result is the same, stack.md §7), and of many images only those that look most alike go through the network.
+transformers' own call repeats the detection for every pair; 6 photos against 100 views would take hours on a CPU. Here
+keypoints are cached (the result is the same, stack.md §7), and of many images only the most similar go through the network.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,25 +22,34 @@ CANVAS_PX = 256  # side of the square a crop is scaled to; a multiple of 8. The 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What matching networks are given."""
+    """Tuned parameters of learned matchers."""
 
     keypoints: int = param(
-        512, "count", "of an image", source="2000 of them cost a pair 5 s on two cores, and match a 200 px view no better", ge=8
+        512,
+        "count",
+        "Maximum number of keypoints per image",
+        source="2000 of them cost 5 s per pair on two cores, and match a 200 px view no better",
+        ge=8,
     )
     shortlist: int = param(
-        5, "count", "images of many that go through the network", source="as many as a photo votes with (voting.py)", ge=1
+        5,
+        "count",
+        "Number of most similar images that go through the network",
+        source="as many as a photo votes with (voting.py)",
+        ge=1,
     )
-    detected: int = param(
-        4, "ratio", "of keypoints asked of the detector to those kept, for those beside the object are dropped", ge=1
-    )
+    detected: int = param(4, "ratio", "Ratio of detected to kept keypoints, since those outside the object are dropped", ge=1)
     margin: float = param(
-        0.08, "ratio", "to the object's box, kept around it", source="a descriptor looks at some 8 px on each side"
+        0.08,
+        "ratio",
+        "Margin around the object's box, relative to its size",
+        source="a descriptor covers some 8 px on each side",
     )
-    least: int = param(4, "count", "keypoints in each image", ge=1)
+    least: int = param(4, "count", "Minimum number of keypoints in each image", ge=1)
 
 
 class Keypoints(NamedTuple):
-    """The parts of a feature row: position on the canvas (pixel indices as the network wants them), score, descriptor."""
+    """Components of a feature row: position on the canvas (pixel indices, the network's convention), score, descriptor."""
 
     canvas_px: np.ndarray  # (n, 2)
     scores: np.ndarray  # (n,)
@@ -57,10 +66,10 @@ class Pair(NamedTuple):
 
 
 class GlueMatcher(Matcher):
-    """A matcher of SuperPoint keypoints; its two kinds differ in the class and in how it is called."""
+    """Matcher of SuperPoint keypoints; subclasses set the model class and how it is called."""
 
-    class_name: str  # in transformers
-    settings: Mapping[str, float] = {}  # of its configuration, where the stored ones do not suit
+    class_name: str  # name in transformers
+    settings: Mapping[str, float] = {}  # overrides of its stored configuration
 
     def __init__(self, *, weights: Path) -> None:
         self._model = _load(self.class_name, weights, self.settings)
@@ -74,7 +83,7 @@ class GlueMatcher(Matcher):
         return _match(self._model, self._partners, first, second)
 
     def match_many(self, first: Features, others: Sequence[Features]) -> list[Matches]:
-        """The pairs with those of the others that look most alike; none with the rest."""
+        """Pairs with the most similar of the other images; none with the rest."""
         near = set(_shortlist(first, others))
         return [self.match(first, other) if k in near else NO_MATCH for k, other in enumerate(others)]
 
@@ -84,7 +93,7 @@ class GlueMatcher(Matcher):
 
 
 def _load(class_name: str, weights: Path, settings: Mapping[str, float]) -> Any:
-    """The model of that transformers class from a folder, on the GPU where there is one; raises BackendUnavailable."""
+    """The model of that transformers class from a folder, on the GPU if available; raises BackendUnavailable."""
     params = tuned(Params)
     import torch
     import transformers
@@ -96,7 +105,7 @@ def _load(class_name: str, weights: Path, settings: Mapping[str, float]) -> Any:
         for name, value in settings.items():
             setattr(config, name, value)
         model = model_class.from_pretrained(weights, config=config, local_files_only=True)
-    except Exception as error:  # files of another model, cut short, of another version: each means that they are no use
+    except Exception as error:  # wrong model, truncated files, wrong version: each makes the weights unusable
         line = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise BackendUnavailable(f"{weights}: no {class_name} ({line[:200]})", hint="download the weights again") from error
     return model.to("cuda" if torch.cuda.is_available() else "cpu").eval()
@@ -131,7 +140,7 @@ def _describe(model: Any, image: Image, mask: Mask) -> Features:
 
 
 def _match(model: Any, partners_of: Callable[[Pair], Any], first: Features, second: Features) -> Matches:
-    """Pairs of keypoints by the network."""
+    """Pairs of keypoints from the network."""
     import torch
 
     if min(len(first.uv_px), len(second.uv_px)) < tuned(Params).least:
@@ -144,13 +153,13 @@ def _match(model: Any, partners_of: Callable[[Pair], Any], first: Features, seco
 
 
 def _shortlist(first: Features, others: Sequence[Features]) -> list[int]:
-    """The images whose descriptors have most mutual nearest neighbours with the first's: cheap, and it needs no network."""
+    """Indices of the images with most mutual nearest neighbours of descriptors: cheap, without the network."""
     votes = [_mutual_neighbours(_unpack(first).descriptors, _unpack(other).descriptors) for other in others]
     return sorted(range(len(others)), key=lambda k: -votes[k])[: tuned(Params).shortlist]
 
 
 def _unpack(features: Features) -> Keypoints:
-    """The parts of the rows that `_describe` packed."""
+    """Components of the rows that `_describe` packed."""
     rows = features.descriptors
     return Keypoints(rows[:, :2], rows[:, 2], rows[:, 3:])
 

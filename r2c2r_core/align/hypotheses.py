@@ -1,4 +1,4 @@
-"""Poses worth trying: the mesh's box axes laid onto the object's, in all ways a box can be turned."""
+"""Pose hypotheses: the mesh's box axes aligned with the object's in all rotations of a box."""
 
 from dataclasses import dataclass
 from itertools import permutations, product
@@ -20,37 +20,49 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which poses are tried, and how they settle."""
+    """Tuned parameters of pose hypotheses and of their coarse alignment."""
 
-    least_points: int = param(30, "count", "observed points that tell a box", ge=1)
-    cut: float = param(0.01, "share", "of the observed points left out at either end of an axis: depth has outliers", lt=0.5)
-    mesh_cut: float = param(0.005, "share", "of the mesh's points left out at either end of an axis", lt=0.5)
-    plan_deg: float = param(3.0, "deg", "between the yaws of which the tightest box is taken", gt=0)
-    turn_deg: float = param(15.0, "deg", "between the yaws at which a thing is tried", source="settling turns by more", gt=0)
-    alike_deg: float = param(5.0, "deg", "between two measured boxes that are one")
-    alike_log: float = param(0.1, "log", "between the sides of two measured boxes that are one")
-    boxes: int = param(3, "count", "measured boxes that are tried", ge=1)
-    proportion: float = param(1.4, "ratio", "of the scales that a front's width and height may ask for")
-    step_log: float = param(0.06, "log", "between scales that are both tried")
-    overlong: float = param(1.35, "ratio", "of a seen side to the mesh's, at most")
-    facing: float = param(0.45, "cosine", "with the direction to the cameras, from which a side is seen")
-    fits: float = param(0.06, "share", "of a side by which the mesh's may differ and still lie on both ends")
-    narrow: float = param(300.0, "ratio", "condition of the masks' rays, from which on they leave the distance open")
-    agreed_log: float = param(0.1, "log", "median deviation of the views' scales, at most")
-    samples: tuple[int, int, int] = param((160, 250, 200), "count", "points that settle; of the mesh's outline; of its misfit")
-    steps: int = param(5, "count", "closest-point steps", ge=3)
-    coarse: tuple[int, int] = param((2, 6), "count", "steps after which only so many times those that are kept go on")
-    gates: tuple[float, float, float] = param(
-        (0.12, 0.7, 0.02), "share", "of the size: where evidence counts a quarter; what of that a step keeps; and at least"
+    least_points: int = param(30, "count", "Minimum number of observed points for measuring a box", ge=1)
+    cut: float = param(
+        0.01, "share", "Fraction of the observed points ignored at either end of an axis, as depth has outliers", lt=0.5
     )
-    far: float = param(0.1, "share", "of the size, from which on a point is simply missed")
-    resized: tuple[float, float] = param((0.8, 1.25), "ratio", "least and most that settling may scale")
-    same_deg: float = param(7.0, "deg", "between settled poses that will end alike")
-    same_log: float = param(0.04, "log", "between the scales of settled poses that will end alike")
+    mesh_cut: float = param(0.005, "share", "Fraction of the mesh's points ignored at either end of an axis", lt=0.5)
+    plan_deg: float = param(3.0, "deg", "Yaw step of the search for the tightest upright box", gt=0)
+    turn_deg: float = param(
+        15.0, "deg", "Yaw step of the hypotheses of a free-standing object", source="coarse alignment corrects more", gt=0
+    )
+    alike_deg: float = param(5.0, "deg", "Maximum yaw difference of two measured boxes that count as one")
+    alike_log: float = param(0.1, "log", "Maximum log ratio of the sides of two measured boxes that count as one")
+    boxes: int = param(3, "count", "Maximum number of measured boxes", ge=1)
+    proportion: float = param(1.4, "ratio", "Maximum ratio between the scales from a front's width and height")
+    step_log: float = param(0.06, "log", "Minimum log ratio between two scales that are both tried")
+    overlong: float = param(1.35, "ratio", "Maximum ratio of an observed side to the mesh's")
+    facing: float = param(0.45, "cosine", "Minimum cosine to the viewing direction for a side to count as seen")
+    fits: float = param(0.06, "share", "Maximum relative difference of a side at which the mesh is centred between both ends")
+    narrow: float = param(
+        300.0, "ratio", "Condition number of the masks' viewing rays above which the distance is undetermined"
+    )
+    agreed_log: float = param(0.1, "log", "Maximum median deviation of the views' log scales")
+    samples: tuple[int, int, int] = param(
+        (160, 250, 200), "count", "Number of points for coarse alignment, for outline hypotheses, and for outline misfit"
+    )
+    steps: int = param(5, "count", "Number of closest-point iterations", ge=3)
+    coarse: tuple[int, int] = param(
+        (2, 6), "count", "Iterations before pruning, and the multiple of the final number that survives it"
+    )
+    gates: tuple[float, float, float] = param(
+        (0.12, 0.7, 0.02),
+        "share",
+        "Robust scale relative to the size (weight a quarter there): initial, shrink factor per step, minimum",
+    )
+    far: float = param(0.1, "share", "Distance, relative to the size, at which the cost of a point saturates")
+    resized: tuple[float, float] = param((0.8, 1.25), "ratio", "Minimum and maximum rescaling during coarse alignment")
+    same_deg: float = param(7.0, "deg", "Rotation difference below which aligned poses count as duplicates")
+    same_log: float = param(0.04, "log", "Log scale ratio below which aligned poses count as duplicates")
 
 
 class Hypothesis(NamedTuple):
-    """A pose of the mesh and where it came from."""
+    """A pose of the mesh and its source."""
 
     pose: Similarity3  # world_from_mesh
     up_mesh: Vector3 | None  # the mesh direction that should be vertical
@@ -74,10 +86,10 @@ class Extents:
 
 
 def box_hypotheses(shape: Shape, observation: Observation, track: MaskTrack, room_yaw_rad: float) -> list[Hypothesis]:
-    """All turns of the mesh's box onto the measured boxes, with the scales their sides suggest.
+    """All rotations of the mesh's box onto the measured boxes, at the scales that their sides suggest.
 
-    Gravity fixes the world's up, not the mesh's: a mesh comes in an arbitrary frame, so each of its box directions may
-    be up. Furniture shares its front's axes (24 turns); a free-standing thing may face anywhere.
+    Gravity fixes the world's up, not the mesh's: a mesh comes in an arbitrary frame, so each of its box directions may be up.
+    Furniture shares its front's axes (24 rotations); a free-standing object may have any yaw.
     """
     boxes = measured_extents(observation, track, room_yaw_rad)
     found: list[Hypothesis] = []
@@ -103,7 +115,7 @@ def signed_permutations() -> list[Matrix3]:
 
 
 def measured_extents(observation: Observation, track: MaskTrack, room_yaw_rad: float) -> list[Extents]:
-    """The object's box as the segmenter measured it and as the visible points suggest it."""
+    """The object's box by the segmenter's measurements and by the visible points."""
     boxes = []
     if track.front is not None:
         front = track.front
@@ -130,9 +142,9 @@ def measured_extents(observation: Observation, track: MaskTrack, room_yaw_rad: f
 def settle(
     hypotheses: list[Hypothesis], shape: Shape, observation: Observation, keep: int, *, outlines: bool
 ) -> list[Hypothesis]:
-    """Let all hypotheses slide onto the points together (few points, closest-point steps), and keep the best fitting.
+    """Coarse alignment: batched robust ICP of all hypotheses on few points; keeps the best-fitting distinct ones.
 
-    With `outlines` the boxes around the masks count too: they know the size where depth is missing.
+    With `outlines` the bounding boxes of the masks count too: they constrain the size where depth is missing.
     """
     params, points = tuned(Params), observation.points_world
     if len(points) < params.least_points or not hypotheses:
@@ -152,7 +164,7 @@ def settle(
         if step == params.steps:
             break
         matched = shape.points[nearest].reshape(local.shape)
-        if step == params.coarse[0]:  # the far ones of hundreds need no finish
+        if step == params.coarse[0]:  # prune the hundreds of hypotheses that are far off
             few = np.sort(np.argsort(cost, kind="stable")[: params.coarse[1] * keep])
             which, scales, rotations, shifts, first_scales, distance, matched = (
                 values[few] for values in (which, scales, rotations, shifts, first_scales, distance, matched)
@@ -180,7 +192,7 @@ def settle(
 
 
 def _by_outline(shape: Shape, turns: list[tuple[Matrix3, Vector3]], views: tuple[View, ...]) -> list[Hypothesis]:
-    """The turns at the size and place that the masks' boxes alone suggest, where the views agree on them."""
+    """Rotations at the scale and position from the masks' bounding boxes alone, where the views agree on them."""
     params = tuned(Params)
     boxes = np.array([mask_box(v) for v in views])
     eyes = np.array([v.world_from_camera.translation for v in views])
@@ -189,7 +201,7 @@ def _by_outline(shape: Shape, turns: list[tuple[Matrix3, Vector3]], views: tuple
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     across = np.eye(3)[None] - rays[:, :, None] * rays[:, None, :]
     normal = across.sum(axis=0)
-    if np.linalg.cond(normal) > params.narrow:  # all views from one side: the distance stays open
+    if np.linalg.cond(normal) > params.narrow:  # all views from one side: the distance is undetermined
         return []
     centre = np.linalg.solve(normal, (across @ eyes[:, :, None]).sum(axis=0)[:, 0])
     distance = np.linalg.norm(eyes - centre, axis=1)
@@ -210,7 +222,7 @@ def _by_outline(shape: Shape, turns: list[tuple[Matrix3, Vector3]], views: tuple
 def _outline_misfit(
     shape: Shape, scales: np.ndarray, rotations: np.ndarray, shifts: np.ndarray, views: tuple[View, ...]
 ) -> np.ndarray:
-    """1 less the mean overlap of the placed samples' box with the mask's box, per hypothesis."""
+    """1 minus the mean IoU of the projected samples' bounding box with the mask's, per hypothesis."""
     sample = shape.points[:: max(len(shape.points) // tuned(Params).samples[2], 1)]
     world = scales[:, None, None] * (sample @ rotations.transpose(0, 2, 1)) + shifts[:, None]
     overlap = np.zeros(len(scales))
@@ -227,7 +239,7 @@ def _outline_misfit(
 
 
 def _same(scales: np.ndarray, rotations: np.ndarray, a: int, b: int) -> bool:
-    """Whether two settled hypotheses will end in the same place."""
+    """Whether two aligned hypotheses count as duplicates."""
     params = tuned(Params)
     turn = np.trace(rotations[a].T @ rotations[b])
     close = turn > 1.0 + 2.0 * np.cos(np.radians(params.same_deg))
@@ -235,7 +247,7 @@ def _same(scales: np.ndarray, rotations: np.ndarray, a: int, b: int) -> bool:
 
 
 def _turns(shape: Shape, box: Extents, *, free_yaw: bool) -> list[tuple[Matrix3, Vector3]]:
-    """Rotations world_from_mesh to try, each with the mesh direction it makes vertical."""
+    """Candidate rotations world_from_mesh, each with the mesh direction that it makes vertical."""
     if not free_yaw:
         return [
             (box.world_from_axes @ turn @ frame.T, (turn @ frame.T).T @ np.array([0.0, 0.0, 1.0]))
@@ -254,7 +266,7 @@ def _turns(shape: Shape, box: Extents, *, free_yaw: bool) -> list[tuple[Matrix3,
 
 
 def _scaled(shape: Shape, rotation: Matrix3, box: Extents, track: MaskTrack) -> list[Similarity3]:
-    """The turned mesh at the scales its visible sides suggest, standing where the box stands."""
+    """Poses of the rotated mesh at the scales that its visible sides suggest, positioned at the box."""
     params = tuned(Params)
     turned = shape.points[::3] @ rotation.T @ box.world_from_axes
     low, high = np.quantile(turned, params.mesh_cut, axis=0), np.quantile(turned, 1 - params.mesh_cut, axis=0)
@@ -270,7 +282,7 @@ def _scaled(shape: Shape, rotation: Matrix3, box: Extents, track: MaskTrack) -> 
 
 
 def _distinct_scales(scales: list[float], ratio: np.ndarray) -> list[float]:
-    """Scales that clearly differ and leave no visible side far longer than the mesh's."""
+    """Scales that clearly differ and leave no visible side much longer than the mesh's."""
     params, kept = tuned(Params), list[float]()
     for scale in scales:
         if ratio.max() / scale < params.overlong and all(abs(np.log(scale / k)) > params.step_log for k in kept):
@@ -281,7 +293,7 @@ def _distinct_scales(scales: list[float], ratio: np.ndarray) -> list[float]:
 def _stand(
     shape: Shape, rotation: Matrix3, scale: float, low: Vector3, high: Vector3, box: Extents, track: MaskTrack
 ) -> Similarity3:
-    """Put the side that faces the cameras where the box has it; the middle where neither side does."""
+    """Pose with the side that faces the cameras aligned to the box's, or the centres where neither side does."""
     params = tuned(Params)
     facing = np.where(np.abs(box.towards) > params.facing, np.sign(box.towards), 0.0)
     facing[box.known & (np.abs(scale * (high - low) - box.size) < params.fits * box.size)] = 0.0
@@ -295,14 +307,14 @@ def _stand(
 
 
 def _extents(observation: Observation, rotation: Matrix3, low: Vector3, high: Vector3, known: np.ndarray) -> Extents:
-    """With the mean direction towards the cameras."""
+    """Extents with the mean direction towards the cameras."""
     cameras = np.array([v.world_from_camera.translation for v in observation.views]) - observation.centre_world
     towards = (cameras / np.linalg.norm(cameras, axis=1, keepdims=True)).mean(axis=0) @ rotation
     return Extents(world_from_axes=rotation, low=low, high=high, known=known, towards=towards)
 
 
 def _span(observation: Observation, rotation: Matrix3) -> tuple[Vector3, Vector3]:
-    """Low and high of the visible points along the axes, without the outermost."""
+    """Minimum and maximum of the visible points along the axes, without outliers."""
     cut, points = tuned(Params).cut, observation.points_world @ rotation
     if not len(points):
         return np.full(3, np.inf), np.full(3, -np.inf)
@@ -320,7 +332,7 @@ def _plan_axes(observation: Observation) -> Matrix3:
 
 
 def _distinct(boxes: list[Extents]) -> list[Extents]:
-    """The first boxes whose yaw (modulo a quarter turn) or size differ."""
+    """The first boxes that differ in yaw (modulo a quarter turn) or size."""
     kept: list[Extents] = []
     for box in boxes:
         if all(_differs(box, k) for k in kept):

@@ -1,4 +1,4 @@
-"""Render and compare: how well a placed mesh explains the masks, the depth and the colours of the views."""
+"""Render-and-compare score of a placed mesh against the masks, the depth and the colours of the views."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -21,19 +21,21 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How well a placed mesh explains the views."""
+    """Tuned parameters of the render-and-compare score."""
 
-    slab_m: float = param(0.015, "m", "of a front's depth that counts as its face", source="a door is 18-20 mm thick")
-    forwards: float = param(0.7, "cosine", "to a front's normal, from which a face looks forwards", source="45 degrees")
-    weights: tuple[float, float, float] = param((0.45, 0.35, 0.20), "score", "of mask, depth and colour")
+    slab_m: float = param(0.015, "m", "Depth of a front that counts as its face", source="a door is 18-20 mm thick")
+    forwards: float = param(
+        0.7, "cosine", "Minimum cosine to a front's normal for a mesh face to be front-facing", source="45 degrees"
+    )
+    weights: tuple[float, float, float] = param((0.45, 0.35, 0.20), "score", "Weights of mask, depth and colour")
 
 
 class Rendered(NamedTuple):
-    """The placed mesh in one view."""
+    """Rendering of the placed mesh in one view."""
 
-    depth_m: DepthMetres  # everything
-    own: Mask  # what the mask is expected to show: the face of a front, all of anything else
-    hidden: Mask  # the photo shows something nearer there
+    depth_m: DepthMetres  # of the whole mesh
+    own: Mask  # expected mask: the face of a front, the whole mesh otherwise
+    hidden: Mask  # occluded in the photo
 
 
 class ViewScore(NamedTuple):
@@ -45,7 +47,7 @@ class ViewScore(NamedTuple):
 
     @property
     def total(self) -> float:
-        """The weighted sum."""
+        """Weighted sum of the terms."""
         return float(np.dot(tuned(Params).weights, self))
 
 
@@ -58,7 +60,7 @@ class Judgement(NamedTuple):
 
 
 def judge(pose: Similarity3, shape: Shape, views: tuple[View, ...], front: FrontPanel | None) -> Judgement:
-    """Score a pose of the mesh (world_from_mesh) on every view, large masks counting more."""
+    """Score of a mesh pose (world_from_mesh) over all views, weighted by the root of mask area."""
     vertices = pose.apply(shape.vertices)
     behind = behind_face(pose, shape, vertices, front)
     scores = [_judge_view(pose, shape, vertices, behind, view) for view in views]
@@ -70,7 +72,7 @@ def judge(pose: Similarity3, shape: Shape, views: tuple[View, ...], front: Front
 
 
 def render_pose(shape: Shape, vertices_world: Points, behind: np.ndarray, view: View) -> Rendered:
-    """The placed mesh as a view would see it."""
+    """Rendering of the placed mesh in a view."""
     attributes = np.zeros((len(vertices_world), 3), np.float32)
     attributes[:, 0] = behind
     raster = rasterize(vertices_world, shape.faces, attributes, view.camera, view.world_from_camera.inverse)
@@ -81,9 +83,9 @@ def render_pose(shape: Shape, vertices_world: Points, behind: np.ndarray, view: 
 
 
 def behind_face(pose: Similarity3, shape: Shape, vertices_world: Points, front: FrontPanel | None) -> np.ndarray:
-    """How far each vertex lies behind the mesh's own front face, metres; 0 everywhere for what is no front.
+    """Distance of each vertex behind the mesh's own front face, metres; 0 everywhere if it is not a front.
 
-    Recessed panels are a part of the face, however deep: what looks forwards is not behind it.
+    Recessed panels belong to the face at any depth: front-facing triangles are not behind it.
     """
     if front is None:
         return np.zeros(len(vertices_world))
@@ -99,7 +101,7 @@ def behind_face(pose: Similarity3, shape: Shape, vertices_world: Points, front: 
 
 
 def face_depth(pose: Similarity3, shape: Shape, front: FrontPanel) -> float:
-    """Where the mesh's front plane lies along the panel's +Y."""
+    """Position of the mesh's front plane along the panel's +Y."""
     to_front = front.world_from_front.inverse
     return front_y(to_front.apply(pose.apply(shape.points)), to_front.turn(shape.normals @ pose.rotation.T))
 
@@ -118,7 +120,7 @@ def _judge_view(pose: Similarity3, shape: Shape, vertices: Points, behind: np.nd
 
 
 def _depth_agreement(rendered: Rendered, both: Mask, view: View) -> float:
-    """1 less the mean truncated squared depth error, in units of three standard deviations."""
+    """1 minus the mean truncated squared depth error, in units of three standard deviations."""
     inner = both & (view.depth_m > 0) & (view.signed_px < -min(1.5, 0.5 + 0.5 * view.depth_px))
     if np.count_nonzero(inner) < 6:
         return 0.0
@@ -130,7 +132,7 @@ def _depth_agreement(rendered: Rendered, both: Mask, view: View) -> float:
 
 
 def _colour_agreement(pose: Similarity3, shape: Shape, rendered: Rendered, view: View) -> float:
-    """Correlation of the mesh's colours with the photo's over the visible surface; near 0 where either is plain."""
+    """Correlation of the mesh's colours with the photo's over the visible surface; near 0 where either is uniform."""
     camera_from_world: Rigid3 = view.world_from_camera.inverse
     points = camera_from_world.apply(pose.apply(shape.points))
     uv = project(points, view.camera)

@@ -1,4 +1,4 @@
-"""From matched pixels to matched points: photo keypoints to the world, render keypoints to the mesh (paper eq. 1)."""
+"""Lifting of matched pixels to 3D points: photo keypoints to the world, render keypoints to the mesh (paper eq. 1)."""
 
 from typing import NamedTuple
 
@@ -15,13 +15,13 @@ class Lifted(NamedTuple):
     frame_index: int
     points_mesh: Points
     points_world: Points
-    noise_m: np.ndarray  # of the world point along its ray, from its depth
+    noise_m: np.ndarray  # standard deviation of the world point along its ray, from depth noise
     rays: Points  # unit, from the camera to the world point
     pixel_m: np.ndarray  # width of one pixel of the photo at the world point
 
 
 def depth_at(uv_px: Pixels, depth_m: DepthMetres) -> np.ndarray:
-    """Depth of the pixel that contains uv, 0 where unknown or where its neighbours jump by more than 6 %."""
+    """Depth of the pixel that contains uv, 0 where unknown or where its neighbours differ by more than 6 %."""
     value, inside = sample_nearest(depth_m, uv_px)
     steady = inside & (value > 0)
     for step in ((1.5, 0.0), (-1.5, 0.0), (0.0, 1.5), (0.0, -1.5)):
@@ -31,9 +31,9 @@ def depth_at(uv_px: Pixels, depth_m: DepthMetres) -> np.ndarray:
 
 
 def lift_render(view: MeshView, uv_px: Pixels, centre: np.ndarray, radius: float) -> tuple[Points, np.ndarray]:
-    """Mesh-frame points of render pixels, and which of them hit the surface.
+    """Mesh-frame points of render pixels, and a mask of those that hit the surface.
 
-    Eq. 1 with fx and fy apart and the true principal point (method.md row 8).
+    Eq. 1 with separate fx and fy and the true principal point (method.md row 8).
     """
     depth = depth_at(uv_px, view.depth)
     points = view.camera_from_mesh.inverse.apply(unproject(uv_px, depth, view.camera))

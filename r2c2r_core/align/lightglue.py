@@ -10,7 +10,7 @@ from r2c2r_core.align.glue import CANVAS_PX, GlueMatcher, Pair
 
 
 class LightGlueMatcher(GlueMatcher):
-    """Matches with LightGlueForKeypointMatching."""
+    """Matcher that runs LightGlueForKeypointMatching."""
 
     class_name = "LightGlueForKeypointMatching"
 

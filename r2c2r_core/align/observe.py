@@ -1,4 +1,4 @@
-"""What the recording says about one object: a few small views that look straight at it, and its cleaned points."""
+"""Observation of one object for placement: a few small views centred on it, and its cleaned points."""
 
 from dataclasses import dataclass
 
@@ -19,16 +19,19 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How well meshes are known."""
+    """Tuned accuracy of meshes."""
 
     mesh_m: float = param(
-        0.004, "m", "median distance from scan to mesh", source="measured over the sample kitchens (benchmarks/baseline.json)"
+        0.004,
+        "m",
+        "Median distance from scan to mesh, part of the expected depth residual",
+        source="measured over the sample kitchens (benchmarks/baseline.json)",
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Observation:
-    """The evidence a placement is judged by."""
+    """Evidence against which a placement is scored."""
 
     views: tuple[View, ...]
     points_world: Points
@@ -36,11 +39,11 @@ class Observation:
     noise_m: np.ndarray  # per point
     frame_index: np.ndarray  # per point, int
     centre_world: Vector3
-    size_m: float  # diagonal of what is seen, by the points or by the masks at the points' distance
+    size_m: float  # diagonal of the visible part, from the points or from the masks at the points' distance
 
 
 def observe(capture: Capture, track: MaskTrack, *, view_count: int, size_px: int, point_count: int) -> Observation:
-    """Choose frames that see the object from different sides, and gather their pixels and points."""
+    """Views from different sides with their pixels and points."""
     found = {
         frame: masked_points(frame, capture.images.depth(frame.index), unpack_mask(track.masks[frame.index]))
         for frame in choose_frames(capture, track, view_count)
@@ -71,21 +74,21 @@ def observe(capture: Capture, track: MaskTrack, *, view_count: int, size_px: int
 
 
 def _silhouette_size(views: tuple[View, ...], centre: Vector3) -> float:
-    """Diagonal of the masks at the object's distance: dark glass returns no depth, but has an outline."""
+    """Diagonal of the masks at the object's distance: dark glass returns no depth, but has a silhouette."""
     boxes = np.array([mask_box(v) for v in views]).reshape(-1, 4)
     distance = np.array([np.linalg.norm(v.world_from_camera.translation - centre) for v in views])
     return float(np.median(np.hypot(boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]) * distance)) if len(views) else 0.0
 
 
 def placing_noise(noise: DepthNoise, depth_m: np.ndarray) -> np.ndarray:
-    """Standard deviation to expect between depth and a mesh in its right place, metres: both err."""
+    """Expected standard deviation between depth and a correctly placed mesh, metres: noise of both."""
     return np.hypot(noise.sigma(depth_m), tuned(Params).mesh_m)
 
 
 def choose_frames(capture: Capture, track: MaskTrack, count: int) -> tuple[Frame, ...]:
-    """Up to `count` frames with large, whole, sharp masks, spread over the directions the object is seen from."""
+    """Up to `count` frames with large, complete, sharp masks, spread over the viewing directions."""
     known = [f for f in capture.frames if f.index in track.masks]
-    known = [f for f in known if f.index not in track.opened_frames] or known  # opened, its front stands elsewhere
+    known = [f for f in known if f.index not in track.opened_frames] or known  # with the leaf open, its front is elsewhere
     largest = max((track.masks[f.index].area_px for f in known), default=0)
     known = [f for f in known if track.masks[f.index].area_px >= max(48.0, 0.08 * largest)]
     if not known:
@@ -106,7 +109,7 @@ def choose_frames(capture: Capture, track: MaskTrack, count: int) -> tuple[Frame
 
 
 def _in_one_state(found: dict[Frame, Points], track: MaskTrack) -> tuple[Frame, ...]:
-    """The frames that show a front where it was measured, not pulled or swung open; all, where none or no front does."""
+    """Frames that show a front where it was measured, not open; all frames, where none do or there is no front."""
     if track.front is None:
         return tuple(found)
     front_from_world = track.front.world_from_front.inverse
@@ -124,7 +127,7 @@ def masked_points(frame: Frame, depth: Depth, mask: Mask) -> Points:
         return np.zeros((0, 3))
     per_depth_px = mask.shape[1] / frame.depth_camera.width
     thickness = 2.0 * float(cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3).max())
-    margin = min(per_depth_px, 0.15 * thickness)  # a thin bottle must keep its middle
+    margin = min(per_depth_px, 0.15 * thickness)  # the centre of a thin bottle must remain
     inner = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1] > margin
     hit, within = sample_through(inner, frame.rgb_camera, frame.depth_camera)
     valid = hit & within & depth.valid & (depth.metres > 0)
@@ -132,7 +135,7 @@ def masked_points(frame: Frame, depth: Depth, mask: Mask) -> Points:
 
 
 def _rough_centre(capture: Capture, track: MaskTrack, frame: Frame) -> Vector3:
-    """Where the object is, before its points are gathered."""
+    """Initial estimate of the object's position, before its points are gathered."""
     known = known_corners(track)
     if len(known):
         return np.asarray(known.mean(axis=0))
@@ -143,7 +146,7 @@ def _rough_centre(capture: Capture, track: MaskTrack, frame: Frame) -> Vector3:
 
 
 def _centre(points: Points, track: MaskTrack) -> Vector3:
-    """The middle of the visible points, or of the measured box where there are none."""
+    """Centre of the visible points, or of the measured box without points."""
     if len(points):
         return np.asarray((np.quantile(points, 0.02, axis=0) + np.quantile(points, 0.98, axis=0)) / 2)
     known = known_corners(track)

@@ -1,4 +1,4 @@
-"""What a keypoint matcher must do, and the table of matchers."""
+"""Interface of keypoint matchers, and their registry."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ class Features(NamedTuple):
     """Keypoints of one image; pixel centres at i + 0.5."""
 
     uv_px: Pixels
-    descriptors: np.ndarray  # (n, d), the matcher's own
+    descriptors: np.ndarray  # (n, d), matcher-specific
 
 
 class Matches(NamedTuple):
@@ -28,7 +28,7 @@ NO_MATCH = Matches(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 class Matcher(Protocol):
-    """Finds the same spots in two images. Features are computed once an image and used in many pairs.
+    """Keypoint matcher of image pairs. Features are computed once per image and used in many pairs.
 
     A backend names this class as its base, so that the type checker compares them.
     """
@@ -39,11 +39,11 @@ class Matcher(Protocol):
 
     @abstractmethod
     def match(self, first: Features, second: Features) -> Matches:
-        """Pairs that look alike, one to one."""
+        """One-to-one pairs of similar keypoints."""
 
     @abstractmethod
     def match_many(self, first: Features, others: Sequence[Features]) -> list[Matches]:
-        """The pairs with each of the others; a slow matcher may give none for those that look least alike."""
+        """Pairs with each of the other images; a slow matcher may return none for the least similar ones."""
 
 
 MATCHERS: Registry[Matcher] = Registry(

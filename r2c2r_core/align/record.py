@@ -1,4 +1,4 @@
-"""The record of a chosen pose: the evidence for it, and the doubts about it in words."""
+"""Result record of a chosen pose: its evidence, and reasons for doubt in words."""
 
 from dataclasses import dataclass
 
@@ -18,13 +18,13 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which placements are doubted."""
+    """Tuned thresholds of doubtful placements."""
 
-    trusted_iou: float = param(0.6, "score", "IoU below which a placement is")
+    trusted_iou: float = param(0.6, "score", "Mask IoU below which a placement is doubtful")
 
 
 def record_placement(best: Trial, others: list[Trial], case: Case, votes: Votes, asset: MeshAsset, method: str) -> Placement:
-    """The placement of `asset` in the best pose; `others` were finished like it and lost, ordered by score."""
+    """Placement of `asset` at the best pose; `others` are the refined losing trials, ordered by score."""
     rival = next((t for t in others if turned_otherwise(t, best, case.shape)), None)
     other_size = next((t for t in others if resized(t, best)), None)
     matched = _matched(case, best.pose)
@@ -53,7 +53,7 @@ def record_placement(best: Trial, others: list[Trial], case: Case, votes: Votes,
 
 
 def _matched(case: Case, pose: Similarity3) -> MatchedPoints:
-    """All matches as one list of pairs, and which of them the pose explains."""
+    """All matches as one list of pairs, with a mask of the pose's inliers."""
     lifted = case.lifted
     if not lifted:
         return NO_MATCHES
@@ -69,7 +69,7 @@ def _matched(case: Case, pose: Similarity3) -> MatchedPoints:
 
 
 def _rms(pose: Similarity3, case: Case) -> float:
-    """Root mean square distance of the observed points to the placed mesh, without the farthest tenth (mask leaks)."""
+    """RMS distance of the observed points to the placed mesh, without the farthest tenth (mask leaks)."""
     if not len(case.observation.points_world):
         return float("nan")
     distance = np.sort(surface_distance(pose, case.shape, case.observation.points_world))
@@ -77,7 +77,7 @@ def _rms(pose: Similarity3, case: Case) -> float:
 
 
 def _doubts(best: Trial, rival: Trial | None, other_size: Trial | None, spread: Spread, case: Case) -> tuple[str, ...]:
-    """Why the pose may be wrong, a line each; none where it can be trusted."""
+    """Reasons why the pose may be wrong, a line each; empty for a trustworthy one."""
     lines = []
     if rival is not None and ties(best.judgement, rival.judgement):
         turn = angle_deg(best.pose, rival.pose)
@@ -93,7 +93,7 @@ def _doubts(best: Trial, rival: Trial | None, other_size: Trial | None, spread: 
 
 
 def _warnings(pose: Similarity3, rms_m: float, condition: float, case: Case) -> tuple[str, ...]:
-    """What else a person should know, a line each."""
+    """Further warnings for a person, a line each."""
     lines = []
     allowed = max(0.015, 0.03 * case.observation.size_m)
     if np.isnan(rms_m):

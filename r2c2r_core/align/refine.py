@@ -1,4 +1,4 @@
-"""Fine registration: one robust least-squares estimate over all frames and kinds of evidence (paper eq. 7, ICP)."""
+"""Fine registration: robust Gauss-Newton over all frames and kinds of evidence (paper eq. 7, ICP)."""
 
 from collections.abc import Sequence
 
@@ -25,7 +25,7 @@ def refine(
     iterations: int,
     loose: float,
 ) -> Similarity3:
-    """Damped Gauss-Newton over turn, shift and (when free) scale; gates shrink from `loose` (a share of the size) on."""
+    """Damped Gauss-Newton over rotation, translation and (if free) scale; gates shrink from `loose` (relative to the size)."""
     gate = loose * observation.size_m
     for _ in range(iterations):
         rows = all_rows(pose, shape, observation, anchors, lifted, gate)
@@ -38,7 +38,7 @@ def refine(
 def loosest_motion(
     pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted]
 ) -> tuple[np.ndarray, float]:
-    """The step (7,) of turn and shift that all the evidence together holds least, of a metre at the rim, and its spread (m)."""
+    """Least constrained step (7,) of rotation and translation, of one metre at the rim, and its standard deviation (m)."""
     normal = sum_rows(all_rows(pose, shape, observation, anchors, lifted, finest_gate(observation)))
     unit = rim_unit(observation.size_m)[:6]
     values, vectors = np.linalg.eigh(normal.information[:6, :6] * np.outer(unit, unit))
@@ -46,12 +46,12 @@ def loosest_motion(
 
 
 def sum_rows(rows: list[Rows]) -> Normal:
-    """Normal equations of all factors, over turn, shift and log scale."""
+    """Normal equations of all factors, over rotation, translation and log scale."""
     return sum((Normal.of(part.jacobian, part.residual, part.weight) for part in rows), Normal(np.zeros((7, 7)), np.zeros(7)))
 
 
 def rim_unit(size_m: float) -> np.ndarray:
-    """Turn, shift and log scale (7,) that move the object's rim by a metre each."""
+    """Steps of rotation, translation and log scale (7,) that each move the object's rim by one metre."""
     reach = 2.0 / max(size_m, 1e-3)
     return np.array([reach] * 3 + [1.0] * 3 + [reach])
 
@@ -60,7 +60,7 @@ def _solve(rows: list[Rows], size_m: float, free_scale: bool) -> np.ndarray:
     """The damped step (7,), bounded to 6 degrees, a tenth of the size and 8 % of scale."""
     normal, unit = sum_rows(rows), rim_unit(size_m)
     scaled, right = normal.information * np.outer(unit, unit), unit * normal.pull
-    # One observation of half a size stops directions that nothing holds.
+    # A weak prior, one observation of half the size, damps unconstrained directions.
     scaled += np.eye(7) * (1e-6 * np.trace(scaled) / 7 + 4.0 / max(size_m, 1e-3) ** 2)
     if not free_scale:
         scaled[6, :], scaled[:, 6] = 0.0, 0.0
@@ -72,7 +72,7 @@ def _solve(rows: list[Rows], size_m: float, free_scale: bool) -> np.ndarray:
 
 
 def moved(pose: Similarity3, step: np.ndarray, pivot: Vector3) -> Similarity3:
-    """The pose after a step of turn (rad), shift (m) and log scale about the pivot."""
+    """The pose after a step of rotation (rad), translation (m) and log scale about the pivot."""
     turn: Matrix3 = Rotation.from_rotvec(step[:3]).as_matrix()
     grow = float(np.exp(step[6]))
     translation = grow * turn @ (pose.translation - pivot) + pivot + step[3:6]
@@ -80,12 +80,12 @@ def moved(pose: Similarity3, step: np.ndarray, pivot: Vector3) -> Similarity3:
 
 
 def turned_about_middle(pose: Similarity3, turn: Matrix3, shape: Shape) -> Similarity3:
-    """The pose after a turn in the world that leaves the middle of the placed mesh where it is."""
+    """The pose after a rotation in the world that leaves the centre of the placed mesh fixed."""
     return moved(pose, np.append(Rotation.from_matrix(turn).as_rotvec(), np.zeros(4)), pivot_of(pose, shape))
 
 
 def point_condition(pose: Similarity3, shape: Shape, observation: Observation) -> float:
-    """Largest over smallest eigenvalue of the points' normal matrix in turn and shift: large = the surface slides."""
+    """Condition number of the points' normal matrix in rotation and translation: large where the surface can slide."""
     rows = point_rows(pose, shape, observation, pivot_of(pose, shape), 0.05 * observation.size_m)
     if len(rows.residual) < 6:
         return 1e9

@@ -1,4 +1,4 @@
-"""Photographs of a candidate from all around, to match against the recording's photos (paper §4.3)."""
+"""Rendering of a candidate from all directions, for keypoint matching with the photos (paper §4.3)."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from r2c2r_core.model.mesh import TexturedMesh
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MeshView:
-    """One rendered photo of the mesh; `depth` in units of the normalised mesh."""
+    """One rendered image of the mesh; `depth` in units of the normalised mesh."""
 
     image: Image
     depth: DepthMetres
@@ -24,7 +24,7 @@ class MeshView:
 def render_views(mesh: TexturedMesh, *, count: int, size_px: int) -> tuple[tuple[MeshView, ...], Points, float]:
     """`count` views from a sphere of directions, and the centre and scale that normalise the mesh to unit radius.
 
-    Fibonacci sphere and 40 degree lens as the authors' code; their distance of 2.7 unit-cube sides becomes 3.2 radii.
+    Fibonacci sphere and 40 degree lens as in the authors' code; their distance of 2.7 unit-cube sides becomes 3.2 radii.
     """
     centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     radius = float(np.linalg.norm(mesh.vertices - centre, axis=1).max()) or 1.0
@@ -35,7 +35,7 @@ def render_views(mesh: TexturedMesh, *, count: int, size_px: int) -> tuple[tuple
     for direction in fibonacci_sphere(count):
         pose = look_from(direction * 3.2)
         image, depth = render_textured(normalised, mesh.faces, mesh.uv, mesh.texture, camera, pose)
-        image[depth == 0] = 128  # a black ground would draw keypoints along every outline
+        image[depth == 0] = 128  # a black background would attract keypoints along every outline
         views.append(MeshView(image=image, depth=depth, camera=camera, camera_from_mesh=pose))
     return tuple(views), centre, radius
 

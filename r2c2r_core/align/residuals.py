@@ -1,6 +1,6 @@
-"""What a pose is held by, each as linearised residuals: observed points, outlines, keypoints, and what is known beforehand.
+"""Factors of the pose estimate, linearised for Gauss-Newton: point-to-plane, silhouette, keypoints, gravity, support.
 
-Closest points alone let a flat front slide in its plane, so mask outlines (and the measured panel's edges) hold it there.
+Closest points alone let a flat front slide in its plane; mask outlines (and the measured panel's edges) constrain it there.
 """
 
 from collections.abc import Sequence
@@ -28,55 +28,68 @@ _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How much each kind of evidence counts."""
+    """Tuned weights and noise levels of the factors."""
 
-    points: float = param(800.0, "count", "independent readings in all observed points: depth errors are correlated")
-    outline: float = param(200.0, "count", "independent readings in all silhouette pixels, at most")
-    keypoints: float = param(150.0, "count", "independent readings in all keypoints, at most")
-    upright: float = param(100.0, "count", "readings that the vertical counts as, of one degree each")
-    support: float = param(40.0, "count", "readings that the height of what a thing stands on counts as")
-    panel: tuple[float, float] = param((60.0, 6.0), "count", "readings of the panel's edges, at full confidence and at least")
-    finest: tuple[float, float] = param((0.012, 0.006), "m", "a settled pose's gate, for a size of 1 m, and at least")
-    away: float = param(-0.1, "cosine", "of a normal with the direction to the camera: a surface beyond faces away", ge=-1)
-    noise: float = param(3.0, "σ", "of depth along a keypoint's ray")
-    keypoint_px: float = param(1.5, "px", "a keypoint's own error", gt=0)
-    keypoint_m: float = param(0.001, "m", "a keypoint's error on the mesh", gt=0)
-    outline_m: float = param(0.002, "m", "an outline's error, at least", gt=0)
-    support_m: tuple[float, float] = param((0.008, 0.03), "m", "error of a support's height, and where it is another support")
-    edge_m: float = param(0.005, "m", "error of a panel's edge", gt=0)
-    edge_cut: float = param(0.01, "share", "of a face's points left out at either end: a spike is no edge", lt=0.5)
-    face_m: float = param(0.012, "m", "before and behind the front plane: the mesh's face")
-    face_cos: float = param(0.85, "cosine", "of a face's normal with the front's")
-    face_points: int = param(50, "count", "of a face that has edges", ge=1)
-    square_deg: float = param(8.0, "deg", "between the front and the mesh's nearest box axis: farther off is another axis")
-    axis_deg: float = param(3.0, "deg", "between up and a box axis that is known to be up")
-    base_deg: float = param(1.0, "deg", "between up and the base that it is square to")
+    points: float = param(
+        800.0, "count", "Effective number of independent readings in all observed points, as depth errors are correlated"
+    )
+    outline: float = param(200.0, "count", "Maximum effective number of independent readings in all silhouette pixels")
+    keypoints: float = param(150.0, "count", "Maximum effective number of independent readings in all keypoints")
+    upright: float = param(100.0, "count", "Number of readings, of one degree each, that the vertical counts as")
+    support: float = param(40.0, "count", "Number of readings that the support height counts as")
+    panel: tuple[float, float] = param(
+        (60.0, 6.0), "count", "Number of readings per panel edge: at full confidence, and minimum"
+    )
+    finest: tuple[float, float] = param((0.012, 0.006), "m", "Robust scale for a refined pose: per metre of size, and minimum")
+    away: float = param(
+        -0.1, "cosine", "Minimum cosine between normal and direction to the camera: surfaces facing away are ignored", ge=-1
+    )
+    noise: float = param(3.0, "σ", "Gate on the depth residual along a keypoint's ray, in standard deviations")
+    keypoint_px: float = param(1.5, "px", "Standard deviation of a keypoint in the image", gt=0)
+    keypoint_m: float = param(0.001, "m", "Standard deviation of a keypoint on the mesh", gt=0)
+    outline_m: float = param(0.002, "m", "Minimum standard deviation of an outline", gt=0)
+    support_m: tuple[float, float] = param(
+        (0.008, 0.03), "m", "Standard deviation of the support height, and gap above which the object has another support"
+    )
+    edge_m: float = param(0.005, "m", "Standard deviation of a panel's edge", gt=0)
+    edge_cut: float = param(
+        0.01, "share", "Fraction of a face's points ignored at either end, so that a spike is not an edge", lt=0.5
+    )
+    face_m: float = param(0.012, "m", "Half thickness of the mesh's face about the front plane")
+    face_cos: float = param(0.85, "cosine", "Minimum cosine between the normals of the mesh's face and the front")
+    face_points: int = param(50, "count", "Minimum number of points of a face with usable edges", ge=1)
+    square_deg: float = param(8.0, "deg", "Maximum angle between the front's normal and the mesh's nearest box axis")
+    axis_deg: float = param(3.0, "deg", "Maximum angle between up and a box axis for the axis to be vertical")
+    base_deg: float = param(1.0, "deg", "Maximum angle between up and a base's normal for the mesh to stand on it")
     held: tuple[float, float] = param(
-        (0.3, 0.01), "share", "of the vertical's weight, on a base and on none", source="leaves 0.2 degrees and one"
+        (0.3, 0.01),
+        "share",
+        "Weight of the vertical for an object on a base and without one",
+        source="leaves 0.2 and 1 degrees",
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Anchors:
-    """What is known besides points and masks."""
+    """Priors besides points and masks."""
 
-    up_mesh: Vector3 | None  # should be vertical
+    up_mesh: Vector3 | None  # mesh direction that should be vertical
     up_weight: float  # 0..1
     front: FrontPanel | None
     support_z_m: float | None
 
 
 class Rows(NamedTuple):
-    """Linearised residuals: `jacobian` (n, 7) over turn, shift, log scale; residuals in the unit of `weight` ** -0.5."""
+    """Linearised residuals: `jacobian` (n, 7) over rotation, translation, log scale; residuals in units of `weight` ** -0.5."""
 
     jacobian: np.ndarray
     residual: np.ndarray
     weight: np.ndarray
-    frame_index: np.ndarray  # (n,) int, of the frame it was seen in; -1 where it is of none
+    frame_index: np.ndarray  # (n,) int, frame of the observation; -1 for priors
 
 
 def anchors_for(track: MaskTrack, shape: Shape, up_mesh: Vector3 | None) -> Anchors:
-    """What holds for this kind of object."""
+    """Priors that apply to this kind of object."""
     return Anchors(
         up_mesh=up_mesh,
         up_weight=0.0 if up_mesh is None else _up_weight(track, shape, up_mesh),
@@ -86,7 +99,7 @@ def anchors_for(track: MaskTrack, shape: Shape, up_mesh: Vector3 | None) -> Anch
 
 
 def _up_weight(track: MaskTrack, shape: Shape, up_mesh: Vector3) -> float:
-    """How firmly a direction of the mesh is held upright."""
+    """Weight of the upright prior of a mesh direction."""
     params = tuned(Params)
     axis = float(np.abs(shape.frames[0].T @ up_mesh).max()) > np.cos(np.radians(params.axis_deg))
     base = any(float(b @ up_mesh) > np.cos(np.radians(params.base_deg)) for b in shape.bases)
@@ -99,7 +112,7 @@ def _up_weight(track: MaskTrack, shape: Shape, up_mesh: Vector3) -> float:
 def all_rows(
     pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted], gate: float
 ) -> list[Rows]:
-    """Every kind of evidence at a pose."""
+    """Linearised residuals of every factor at a pose."""
     pivot = pivot_of(pose, shape)
     return [
         point_rows(pose, shape, observation, pivot, gate),
@@ -110,13 +123,13 @@ def all_rows(
 
 
 def finest_gate(observation: Observation) -> float:
-    """Half the distance (m) at which evidence stops counting once a pose has settled."""
+    """Scale (m) of the Geman-McClure kernel for a refined pose, half the distance at which evidence stops counting."""
     per_metre, least = tuned(Params).finest
     return max(per_metre * observation.size_m, least)
 
 
 def point_rows(pose: Similarity3, shape: Shape, observation: Observation, pivot: Vector3, gate: float) -> Rows:
-    """Each observed point to the tangent plane of the nearest mesh point that faces the cameras."""
+    """Point-to-plane residuals from observed points to the nearest mesh points that face the cameras (Geman-McClure)."""
     params, observed = tuned(Params), observation.points_world
     if not len(observed):
         return _no_rows()
@@ -135,7 +148,7 @@ def point_rows(pose: Similarity3, shape: Shape, observation: Observation, pivot:
 def outline_rows(
     pose: Similarity3, shape: Shape, views: tuple[View, ...], front: FrontPanel | None, pivot: Vector3, gate: float
 ) -> Rows:
-    """Each silhouette pixel of the placed mesh to the mask's outline, in metres across the line of sight."""
+    """Distances from the placed mesh's silhouette pixels to the mask's outline, in metres across the line of sight."""
     vertices = pose.apply(shape.vertices)
     behind = behind_face(pose, shape, vertices, front)
     parts = [_outline_of_view(shape, vertices, behind, view, pivot, gate) for view in views]
@@ -148,9 +161,9 @@ def outline_rows(
 
 
 def keypoint_rows(pose: Similarity3, lifted: Sequence[Lifted], pivot: Vector3, gate: float) -> Rows:
-    """Each keypoint's spot on the mesh to the ray it was seen along: what is painted holds where shape and outline do not.
+    """Point-to-ray residuals of keypoints: texture constrains the pose where shape and silhouette do not.
 
-    Only across the ray, where a pixel is finer than depth; the depth there is among the observed points already.
+    Only across the ray, where a pixel is finer than depth; the depth there is already among the observed points.
     """
     matched = [m for m in lifted if len(m.points_mesh)]
     if not matched:
@@ -177,7 +190,7 @@ def keypoint_rows(pose: Similarity3, lifted: Sequence[Lifted], pivot: Vector3, g
 
 
 def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector3) -> Rows:
-    """Uprightness, the measured panel's edges and direction, and the height of what the thing stands on."""
+    """Priors: uprightness, the measured panel's edges and direction, and the support height."""
     params, rows = tuned(Params), list[tuple[np.ndarray, float, float]]()
     if anchors.up_mesh is not None:
         up = pose.rotation @ anchors.up_mesh
@@ -200,7 +213,7 @@ def anchor_rows(pose: Similarity3, shape: Shape, anchors: Anchors, pivot: Vector
 
 
 def pivot_of(pose: Similarity3, shape: Shape) -> Vector3:
-    """The middle of the placed mesh."""
+    """Centre of the placed mesh."""
     return np.asarray(pose.apply((shape.points.min(axis=0) + shape.points.max(axis=0)) / 2))
 
 
@@ -227,7 +240,7 @@ def _outline_of_view(shape: Shape, vertices: Points, behind: np.ndarray, view: V
 
 
 def _nearer(view: View, rendered_depth: np.ndarray) -> np.ndarray:
-    """Pixels just outside the mesh where the photo shows something in front of the mesh's nearby surface."""
+    """Pixels just outside the mesh where the photo shows an occluder in front of the mesh's nearby surface."""
     grown = cv2.dilate(rendered_depth, np.ones((5, 5), np.uint8))
     return np.asarray(
         (rendered_depth == 0)
@@ -238,7 +251,7 @@ def _nearer(view: View, rendered_depth: np.ndarray) -> np.ndarray:
 
 
 def _panel_rows(pose: Similarity3, shape: Shape, front: FrontPanel, pivot: Vector3) -> list[tuple[np.ndarray, float, float]]:
-    """The mesh's front face to the measured rectangle: four edges, and the facing direction."""
+    """Residuals of the mesh's front face against the measured rectangle: four edges, and the facing direction."""
     params = tuned(Params)
     to_front = front.world_from_front.inverse
     axes = front.world_from_front.rotation
@@ -254,7 +267,7 @@ def _panel_rows(pose: Similarity3, shape: Shape, front: FrontPanel, pivot: Vecto
         inner_low, inner_high = np.quantile(face[:, axis], [params.edge_cut, 1 - params.edge_cut])
         overhang = (
             params.edge_cut / (1 - 2 * params.edge_cut) * (inner_high - inner_low)
-        )  # what the quantiles cut from an evenly sampled face
+        )  # part of an evenly sampled face cut off by the quantiles
         for edge, wanted in ((inner_low - overhang, -size / 2), (inner_high + overhang, size / 2)):
             middle = np.median(face, axis=0)
             middle[axis] = edge
@@ -269,19 +282,19 @@ def _panel_rows(pose: Similarity3, shape: Shape, front: FrontPanel, pivot: Vecto
 
 
 def _nearest_axis(shape: Shape, direction: Vector3) -> Vector3:
-    """The box axis of the mesh nearest to a direction, signed along it."""
+    """Box axis of the mesh nearest to a direction, with that sign."""
     along = shape.frames[0].T @ direction
     k = int(np.argmax(np.abs(along)))
     return np.asarray(shape.frames[0][:, k] * np.sign(along[k]))
 
 
 def _turn_row(direction: Vector3, axis: Vector3) -> np.ndarray:
-    """How `direction @ axis` changes with a turn of `direction`."""
+    """Derivative of `direction @ axis` by a rotation of `direction`."""
     return np.concatenate([np.cross(direction, axis), np.zeros(4)])
 
 
 def _jacobian(arms: Points, directions: Points) -> np.ndarray:
-    """How points at `arms` from the pivot move along `directions`, by turn (rad), shift (m) and log scale."""
+    """Derivative of points at `arms` from the pivot along `directions`, by rotation (rad), translation (m) and log scale."""
     return np.column_stack([np.cross(arms, directions), directions, np.einsum("nj,nj->n", arms, directions)])
 
 

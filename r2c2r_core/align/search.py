@@ -1,4 +1,4 @@
-"""The contest of poses: all are compared roughly, the best refined, and those that could win finished alike and compared."""
+"""Pose search: coarse scoring of all hypotheses, refinement of the best, and a final comparison of the contenders."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,20 +26,23 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When poses are told apart."""
+    """Tuned thresholds between different poses."""
 
-    turned_deg: float = param(20.0, "deg", "between two poses that are told apart by their turn")
-    resized: float = param(0.04, "log", "of two scales that are told apart", source="twice what a placement may be off")
-    upright_deg: float = param(
-        3.0, "deg", "of leaning: what leans less is upright", source="bases of generated meshes are bumpy"
+    turned_deg: float = param(20.0, "deg", "Minimum rotation between two poses that count as different")
+    resized: float = param(
+        0.04,
+        "log",
+        "Minimum log ratio between two scales that count as different",
+        source="twice the tolerance of a placement",
     )
-    scatter: float = param(0.01, "score", "by which scores of one pose, a pixel this way or that, differ")
-    toppled_deg: float = param(30.0, "deg", "of leaning: what leans more does not stand there by mistake")
+    upright_deg: float = param(3.0, "deg", "Maximum tilt of an upright pose", source="bases of generated meshes are bumpy")
+    scatter: float = param(0.01, "score", "Random variation of the scores of one pose under sub-pixel shifts")
+    toppled_deg: float = param(30.0, "deg", "Tilt above which a pose is not a slightly tilted standing pose")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Case:
-    """What a pose has to explain."""
+    """Data that a pose must explain."""
 
     shape: Shape
     observation: Observation
@@ -48,7 +51,7 @@ class Case:
 
     @property
     def front(self) -> FrontPanel | None:
-        """The measured panel of what is a front."""
+        """The measured panel, if the object is a front."""
         return self.track.front if self.track.kind == "front" else None
 
 
@@ -68,7 +71,7 @@ class Trial:
 def try_poses(
     proposals: list[Hypothesis], case: Case, scale_range: tuple[float, float], refined: int, progress: Progress
 ) -> list[Trial]:
-    """Render and compare all proposals in some views, refine the best different ones, and order them by score."""
+    """Trials of the best distinct proposals, refined and ordered by score; all proposals are first scored in some views."""
     views = case.observation.views
     few = views[::2] if len(views) > 5 else views
     rough = []
@@ -87,9 +90,9 @@ def try_poses(
 
 
 def finish_contenders(trials: list[Trial], case: Case) -> list[Trial]:
-    """The best trial and those that could rival it (`trials` are ordered by score), all finished alike; the winner first.
+    """The best trial and its possible rivals (`trials` are ordered by score), equally refined, the winner first.
 
-    A thing that would topple as it is placed wins only where it fits better than one that stands.
+    An object that would topple at its pose wins only where it fits better than one that stands.
     """
     params = tuned(Params)
     finished = [_finish(t, case) for t in _contenders(trials, case)]
@@ -97,12 +100,12 @@ def finish_contenders(trials: list[Trial], case: Case) -> list[Trial]:
 
 
 def finish_known(hypothesis: Hypothesis, case: Case) -> Trial:
-    """A pose that is known, finished as a contender is: it stays where nothing better is near."""
+    """A known pose, refined as a contender is: unchanged where no better one is near."""
     return _finish(_judged(hypothesis, case, case.observation.views), case)
 
 
 def turned_otherwise(trial: Trial, best: Trial, shape: Shape) -> bool:
-    """Whether it is turned differently; a turn about the axis of a round thing is no difference."""
+    """Whether it has a different orientation; rotations about an axis of revolution do not count."""
     if angle_deg(best.pose, trial.pose) < tuned(Params).turned_deg:
         return False
     turn = trial.pose.rotation.T @ best.pose.rotation
@@ -110,14 +113,14 @@ def turned_otherwise(trial: Trial, best: Trial, shape: Shape) -> bool:
 
 
 def resized(trial: Trial, best: Trial) -> bool:
-    """Whether it is turned alike, but of another size."""
+    """Whether it has the same orientation, but another scale."""
     params = tuned(Params)
     alike = angle_deg(best.pose, trial.pose) < params.turned_deg
     return alike and abs(float(np.log(trial.pose.scale / best.pose.scale))) > params.resized
 
 
 def lean_deg(pose: Similarity3, case: Case) -> float:
-    """How far a thing is from the nearest way it could stand; 0 where it stands, and where no such way is known."""
+    """Tilt from the nearest stable standing pose, degrees; 0 where it stands, and where no such pose is known."""
     if case.track.kind != "thing" or not case.shape.bases:
         return 0.0
     lean = _angle_to_base(pose, _nearest_base(pose, case.shape))
@@ -131,7 +134,7 @@ def angle_deg(a: Similarity3, b: Similarity3) -> float:
 
 
 def _contenders(trials: list[Trial], case: Case) -> list[Trial]:
-    """The best, the best turned otherwise, the best of another size; and of those that lean a little, them stood upright."""
+    """The best trial, the best of another orientation and of another size, and upright versions of those slightly tilted."""
     params = tuned(Params)
     best = trials[0]
     different: tuple[Callable[[Trial], bool], ...] = (
@@ -144,7 +147,7 @@ def _contenders(trials: list[Trial], case: Case) -> list[Trial]:
 
 
 def _stood_upright(trial: Trial, case: Case) -> Trial:
-    """The trial turned the short way onto the nearest side it can stand on."""
+    """The trial rotated by the smallest angle onto the nearest side it can stand on."""
     base = _nearest_base(trial.pose, case.shape)
     turn = rotation_between(trial.pose.rotation @ base, _UP)
     upright = Hypothesis(turned_about_middle(trial.pose, turn, case.shape), base, trial.hypothesis.source)
@@ -152,7 +155,7 @@ def _stood_upright(trial: Trial, case: Case) -> Trial:
 
 
 def _finish(trial: Trial, case: Case) -> Trial:
-    """Joint refit with scale free, closest points with scale frozen, and colours for what is still loose."""
+    """Refinement of a trial: joint fit with free scale, closest points with fixed scale, then a photometric sweep."""
     evidence = (case.shape, case.observation, anchors_for(case.track, case.shape, trial.hypothesis.up_mesh), case.lifted)
     pose = refine(trial.pose, *evidence, free_scale=True, iterations=10, loose=0.02)
     pose = refine(pose, *evidence, free_scale=False, iterations=4, loose=0.012)

@@ -1,4 +1,4 @@
-"""A candidate mesh prepared for alignment: sampled surface, colours, box axes, a light copy to render."""
+"""Candidate mesh prepared for alignment: sampled surface, colours, box axes, and a simplified copy for rendering."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,29 +13,29 @@ from r2c2r_core.errors import PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3, nearest_rotation, rotation_between
 from r2c2r_core.model.mesh import TexturedMesh
 
-_HULL_SIDES = 40  # that a box may stand on
+_HULL_SIDES = 40  # number of hull sides on which a box may stand
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Shape:
-    """All in the mesh frame and the mesh's own unit."""
+    """A mesh prepared for alignment, in its own frame and unit."""
 
     points: Points  # area-uniform samples of the outer surface
     normals: Points  # unit, smoothed over flat parts
     colours: np.ndarray  # (n, 3) float32 RGB 0..255
     tree: cKDTree  # over points
-    vertices: Points  # light copy, at most `face_limit` faces
+    vertices: Points  # simplified copy, at most `face_limit` faces
     faces: Faces
     diameter: float
     frames: tuple[Matrix3, ...]  # columns: candidate box axes of the mesh, right-handed, best first
     boxiness: float  # 0..1: share of the surface facing along the first frame's axes
     ups: tuple[Vector3, ...]  # directions that may point up (standing.py)
-    bases: tuple[Vector3, ...]  # those of them along which the thing stands without toppling
+    bases: tuple[Vector3, ...]  # those along which the object stands stably
     oriented: bool  # faces wind outwards
 
 
 def prepare_shape(mesh: TexturedMesh, *, point_count: int, face_limit: int, rng: np.random.Generator) -> Shape:
-    """Sample, colour and measure a mesh of unknown pose and unit; raises PlacementFailed when it has no surface."""
+    """A mesh of unknown pose and unit, sampled, coloured and measured; raises PlacementFailed when it has no surface."""
     triangles = mesh.vertices[mesh.faces]
     doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(doubled, axis=1) / 2
@@ -50,7 +50,7 @@ def prepare_shape(mesh: TexturedMesh, *, point_count: int, face_limit: int, rng:
     boxes = [manhattan, *least_volume_axes(points, sides)]
     frames = _distinct_frames(boxes)
     volume = float((triangles[:, 0] * np.cross(triangles[:, 1], triangles[:, 2])).sum() / 6)
-    diameter = float(np.linalg.norm(np.ptp(points @ frames[0], axis=0)))  # of its own box: the frame's is arbitrary
+    diameter = float(np.linalg.norm(np.ptp(points @ frames[0], axis=0)))  # of its own box: the mesh's frame is arbitrary
     ups, bases = standing_directions(points, frames, boxiness, sides)
     return Shape(
         points=points,
@@ -69,7 +69,7 @@ def prepare_shape(mesh: TexturedMesh, *, point_count: int, face_limit: int, rng:
 
 
 def surface_distance(pose: Similarity3, shape: Shape, points_world: Points) -> np.ndarray:
-    """Distance of points to the placed surface, metres; the spacing of the samples it is known by is allowed for."""
+    """Distance of points to the placed surface, metres, corrected for the spacing of the samples that represent it."""
     local = pose.inverse.apply(points_world)
     distance, nearest = shape.tree.query(local)
     away = np.abs(np.einsum("nj,nj->n", shape.normals[nearest], local - shape.points[nearest]))
@@ -79,9 +79,9 @@ def surface_distance(pose: Similarity3, shape: Shape, points_world: Points) -> n
 
 
 def spins_alike(shape: Shape, axis_mesh: Vector3) -> bool:
-    """Whether any turn about the axis (of any length) leaves the shape as it is."""
+    """Whether the shape is invariant under rotation about the axis (of any length)."""
     axis_mesh = axis_mesh / np.linalg.norm(axis_mesh)
-    middle = shape.points.mean(axis=0)  # of an even sample: on the axis, where there is one
+    middle = shape.points.mean(axis=0)  # of an even sample: on the axis of revolution, if there is one
     sample = shape.points[:: max(len(shape.points) // 400, 1)] - middle
     radius = float(np.median(np.linalg.norm(np.cross(sample, axis_mesh), axis=1)))
     worst = 0.0
@@ -93,10 +93,10 @@ def spins_alike(shape: Shape, axis_mesh: Vector3) -> bool:
 
 
 def manhattan_axes(normals: Points, rng: np.random.Generator) -> tuple[Matrix3, float]:
-    """Axes most of the surface faces along (columns), and that share of it; several starts, polar iteration.
+    """Dominant surface axes (columns) and the fraction of the surface along them; several starts, polar iteration.
 
-    Maximises the sum of |R n|_4^4, which signed permutations leave alone; 2-3 times closer than the least-volume box on
-    noisy meshes.
+    Maximises the sum of |R n|_4^4, which is invariant under signed permutations; 2-3 times more accurate than the least-volume
+    box on noisy meshes.
     """
     n = normals[:: max(1, len(normals) // 1500)]
     best_value, best = -1.0, np.eye(3)
@@ -137,7 +137,7 @@ def least_volume_axes(points: Points, sides: Sequence[Vector3]) -> list[Matrix3]
 
 
 def _polish_axes(normals: Points, axes: Matrix3) -> Matrix3:
-    """Average the normals near each axis, narrowing from 20 to 8 degrees."""
+    """Axes averaged from the normals near each, within an angle narrowing from 20 to 8 degrees."""
     for angle in (20.0, 12.0, 8.0):
         along = normals @ axes.T
         gathered = np.zeros((3, 3))
@@ -149,7 +149,7 @@ def _polish_axes(normals: Points, axes: Matrix3) -> Matrix3:
 
 
 def _distinct_frames(frames: list[Matrix3]) -> tuple[Matrix3, ...]:
-    """The frames that differ by more than 4 degrees once signed permutations are ignored."""
+    """The frames that differ by more than 4 degrees modulo signed permutations."""
     kept: list[Matrix3] = []
     for frame in frames:
         frame = frame * np.array([1.0, 1.0, np.sign(np.linalg.det(frame))])
@@ -176,7 +176,7 @@ def _sample(
 
 
 def _smooth_normals(tree: cKDTree, points: Points, normals: Points) -> Points:
-    """Average each normal with its neighbours' that face the same way: marching cubes leaves stairs."""
+    """Normals averaged with similar neighbours: marching cubes leaves stairs."""
     _, near = tree.query(points, k=min(12, len(points)))
     around = normals[near]
     alike = (np.einsum("nkj,nj->nk", around, normals) > np.cos(np.radians(40))).astype(np.float64)
@@ -185,7 +185,7 @@ def _smooth_normals(tree: cKDTree, points: Points, normals: Points) -> Points:
 
 
 def _lighten(mesh: TexturedMesh, face_limit: int) -> tuple[Points, Faces]:
-    """The mesh without texture seams, and with few enough faces to be rendered hundreds of times."""
+    """The mesh without texture seams, simplified so that it can be rendered hundreds of times."""
     merged, where = np.unique(np.round(mesh.vertices, 7), axis=0, return_inverse=True)
     faces = where.ravel()[mesh.faces]
     proper = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 0] != faces[:, 2])

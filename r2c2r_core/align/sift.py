@@ -14,13 +14,15 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where keypoints are looked for."""
+    """Tuned parameters of SIFT detection."""
 
-    margin_px: int = param(12, "px", "kept around the mask", source="beyond it is background, of which the renders have none")
+    margin_px: int = param(
+        12, "px", "Margin kept around the mask", source="beyond it is background, which the renders do not have"
+    )
 
 
 class SiftMatcher(Matcher):
-    """The weight-free matcher."""
+    """Weight-free matcher: RootSIFT with ratio and mutual test."""
 
     def __init__(self, *, keypoints: int = 250, ratio: float = 0.85, contrast: float = 0.02) -> None:
         self._ratio = ratio
@@ -40,16 +42,16 @@ class SiftMatcher(Matcher):
         found, descriptors = self._sift.detectAndCompute(grey, mask[part].astype(np.uint8) * 255)
         if descriptors is None or not len(found):
             return Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
-        # OpenCV's own limit counts keypoints beside the mask.
+        # OpenCV's own limit counts keypoints outside the mask.
         strongest = np.argsort([-k.response for k in found], kind="stable")[: self._keypoints]
         uv = np.array([found[k].pt for k in strongest], dtype=np.float64) + low + 0.5
         chosen = descriptors[strongest]
         return Features(uv, np.sqrt(chosen / np.maximum(chosen.sum(axis=1, keepdims=True), 1e-6)).astype(np.float32))
 
     def match(self, first: Features, second: Features) -> Matches:
-        """Pairs that are each other's best and clearly better than the second best."""
+        """Mutual nearest neighbours that pass the ratio test."""
         return Matches(*mutual_pairs(first.descriptors, second.descriptors, self._ratio))
 
     def match_many(self, first: Features, others: Sequence[Features]) -> list[Matches]:
-        """The pairs with each of the others."""
+        """Pairs with each of the other images."""
         return [self.match(first, other) for other in others]

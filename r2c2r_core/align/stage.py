@@ -1,8 +1,7 @@
-"""Place a candidate in the scan (paper §4.3, mended by method.md rows 1-7): refined where its generator made it in the room,
-searched for where it comes from elsewhere.
+"""Placement of a candidate in the scan (paper §4.3, corrected by method.md rows 1-7): refinement of a known pose or search.
 
-The search: geometry proposes (all turns of the mesh's box onto the measured box), features add proposals, and one score
-decides: rendered masks, depth and colours against the photos. It uses nothing but the mesh's surface and texture.
+The search: geometry proposes (all rotations of the mesh's box onto the measured box), features add proposals, and one score
+decides: rendered masks, depth and colours against the photos. It uses only the mesh's surface and texture.
 """
 
 from dataclasses import dataclass
@@ -33,7 +32,7 @@ from r2c2r_core.tuning import Changes
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlignConfig:
-    """Sizes of the search. Pixel sizes are of our own small views, not of a camera."""
+    """Sizes of the pose search. Pixel sizes are of our own small views, not of a camera."""
 
     views: int = setting(9, "photos compared with", ge=1, le=200)
     view_px: int = setting(128, "side of the compared views, in px", ge=16, le=1024)
@@ -54,21 +53,21 @@ class AlignConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placer:
-    """Places any candidate, with these settings."""
+    """Placement of any candidate with these settings."""
 
     matcher: str
     config: AlignConfig
     seed: int = 0
 
     def __call__(self, capture: Capture, track: MaskTrack, asset: MeshAsset, *, progress: Progress = SILENT) -> Placement:
-        """As place_mesh does."""
+        """Placement as by place_mesh."""
         return place_mesh(capture, track, asset, self.matcher, self.config, seed=self.seed, progress=progress)
 
 
 def place_candidate(
     capture: Capture, track: MaskTrack, found: CandidateSet, candidate_id: str, place: Placer, *, progress: Progress = SILENT
 ) -> Placement:
-    """One of an object's candidates in the room; raises PlacementFailed."""
+    """Placement of one of an object's candidates; raises PlacementFailed."""
     return place(capture, track, found.candidate(candidate_id), progress=progress)
 
 
@@ -82,7 +81,7 @@ def place_mesh(
     seed: int = 0,
     progress: Progress = SILENT,
 ) -> Placement:
-    """The similarity that takes the candidate's frame to the world, with its evidence; raises PlacementFailed."""
+    """Placement of a candidate with its evidence; raises PlacementFailed."""
     rng = np.random.default_rng(seed)
     progress.at(0.0, f"{asset.object_name}: gathering views")
     observation = observe(capture, track, view_count=config.views, size_px=config.view_px, point_count=config.points)
@@ -114,14 +113,14 @@ def place_mesh(
 
 
 def _refined(asset: MeshAsset, pose: Similarity3, case: Case, config: AlignConfig) -> Placement:
-    """The candidate where its generator made it, moved as little as masks, depth and colours ask."""
+    """Placement refined from the generator's own pose."""
     best = finish_known(Hypothesis(pose, _upright_axis(case.shape, pose), "generator"), case)
     _require_cover(best, asset, config)
     return record_placement(best, [], case, Votes((), {}), asset, "generator's pose, refined")
 
 
 def _require_cover(best: Trial, asset: MeshAsset, config: AlignConfig) -> None:
-    """Raise where even the best pose does not show what the masks show."""
+    """Raise if even the best pose does not cover the masks."""
     if best.judgement.iou < config.least_iou:
         raise PlacementFailed(
             f"{asset.object_name}: the best pose of {asset.candidate_id} covers the mask with IoU {best.judgement.iou:.2f}, "
@@ -132,12 +131,12 @@ def _require_cover(best: Trial, asset: MeshAsset, config: AlignConfig) -> None:
 
 @cache
 def _loaded(matcher: str, weights: str) -> Matcher:
-    """The matcher, kept for the next object: learned ones take seconds to load."""
+    """The matcher, cached for the next object: learned ones take seconds to load."""
     return MATCHERS.load(matcher, weights=weights)
 
 
 def _require_evidence(observation: Observation, track: MaskTrack) -> None:
-    """Raise where there is nothing to place against."""
+    """Raise if there is no evidence to place against."""
     if not observation.views:
         raise PlacementFailed(f"{track.name}: no frame shows enough of the object", hint="add a click on a nearer frame")
     if len(observation.points_world) < 30 and not len(known_corners(track)):
@@ -158,7 +157,7 @@ def _match(
 
 
 def _larger_views(capture: Capture, track: MaskTrack, observation: Observation, config: AlignConfig) -> tuple[View, ...]:
-    """The views with the largest masks again, at the size keypoints need."""
+    """The views with the largest masks again, at the size that keypoints need."""
     order = sorted(observation.views, key=lambda v: -int(np.count_nonzero(v.mask)))[: config.match_photos]
     return tuple(
         look_at(capture, track, capture.frame(v.frame_index), observation.centre_world, config.match_px) for v in order
@@ -166,13 +165,13 @@ def _larger_views(capture: Capture, track: MaskTrack, observation: Observation, 
 
 
 def _scale_range(shape: Shape, observation: Observation) -> tuple[float, float]:
-    """Scales at which the mesh is as large as what is seen, to three times that (the rest may be hidden)."""
+    """Scales at which the mesh is about as large as the visible part, up to three times that (the rest may be hidden)."""
     likely = observation.size_m / shape.diameter
     return 0.65 * likely, 3.0 * likely
 
 
 def _upright_axis(shape: Shape, pose: Similarity3) -> np.ndarray | None:
-    """The mesh direction that a pose nearly makes vertical, if it is one the thing may stand along."""
+    """Mesh direction that a pose makes nearly vertical, if the object may stand along it."""
     up = pose.rotation.T @ np.array([0.0, 0.0, 1.0])
     nearest = max(shape.ups, key=lambda u: float(u @ up))
     return nearest if nearest @ up > np.cos(np.radians(5)) else None

@@ -1,4 +1,4 @@
-"""Which ways up a mesh can stand: gravity is known, so of two poses that fit alike the one that would topple is wrong."""
+"""Stable standing directions of a mesh: of two poses that fit equally well, the one that would topple is wrong."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,28 +12,34 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which ways up a mesh can stand."""
+    """Tuned parameters of stable standing."""
 
     touching: tuple[float, float, float] = param(
         (0.03, 0.02, 0.02),
         "ratio",
-        "to the diameter of what counts as touching the support, pass by pass",
+        "Height of the contact zone relative to the diameter, pass by pass",
         source="generated bases are bumpy",
     )
-    flat: float = param(1 / 9, "ratio", "of a foot's thickness to its width, at most: on a round side a thing rocks")
-    settled_deg: float = param(12.0, "deg", "from square to its base: a direction farther off belongs to another base")
-    most: int = param(14, "count", "directions tried", ge=1)
-    sides: int = param(8, "count", "of them flat sides of the hull, at most: a mug's base is among its smaller ones", ge=1)
+    flat: float = param(
+        1 / 9, "ratio", "Maximum ratio of the contact zone's thickness to its width: an object rocks on a round side"
+    )
+    settled_deg: float = param(
+        12.0, "deg", "Maximum angle between a direction and its base's normal: beyond it, it belongs to another base"
+    )
+    most: int = param(14, "count", "Maximum number of directions", ge=1)
+    sides: int = param(
+        8, "count", "Maximum number of them from flat sides of the hull: a mug's base is among its smaller ones", ge=1
+    )
 
 
 def standing_directions(
     points: Points, frames: tuple[Matrix3, ...], boxiness: float, sides: Sequence[Vector3]
 ) -> tuple[tuple[Vector3, ...], tuple[Vector3, ...]]:
-    """Directions that may point up (stable ones first, 10 degrees apart at least), and those of them that are stable.
+    """Directions that may point up (stable ones first, at least 10 degrees apart), and the stable ones of them.
 
-    They come from the box axes and the flat `sides` of the hull, outward normals, largest first. A box's own axes are known
-    by all of its sides; anything else stands square to its base, which its box axes miss by some degrees where a handle
-    sticks out.
+    They come from the box axes and the flat `sides` of the hull, outward normals, largest first. A box's own axes are
+    determined by all of its sides; anything else stands perpendicular to its base, from which its box axes deviate by some
+    degrees where a handle sticks out.
     """
     params = tuned(Params)
     axes = [sign * frame[:, k] for frame in frames for k in range(3) for sign in (1.0, -1.0)]
@@ -53,7 +59,7 @@ def standing_directions(
 
 
 def settled_on_base(points: Points, up: Vector3) -> Vector3 | None:
-    """`up` turned square to the side that `points` (an even sample) would rest on; None where they would topple or rock."""
+    """`up` made normal to the side on which `points` (an even sample) would rest; None if they would topple or rock."""
     params = tuned(Params)
     start = up
     for touching in params.touching:
@@ -93,13 +99,13 @@ def hull_directions(points: Points, count: int) -> list[Vector3]:
 
 
 def _foot(points: Points, up: Vector3, touching: float) -> Points:
-    """The lowest points, up to that share of the size above the lowest half percent (one spike is no foot)."""
+    """Contact points: the lowest, up to that fraction of the size above the lowest half percent (ignoring single spikes)."""
     height = points @ up
     return points[height < np.quantile(height, 0.005) + touching * float(np.linalg.norm(np.ptp(points, axis=0)))]
 
 
 def _carries(foot: Points, points: Points, up: Vector3) -> bool:
-    """Whether the middle of the points lies above the foot's outline."""
+    """Whether the mean of the points lies above the contact polygon."""
     plan = np.linalg.svd(up[None])[2][1:]
     try:
         outline = ConvexHull(foot @ plan.T)
@@ -109,6 +115,6 @@ def _carries(foot: Points, points: Points, up: Vector3) -> bool:
 
 
 def _add(directions: list[Vector3], new: Vector3) -> None:
-    """Append a direction unless one within 10 degrees is there already."""
+    """Append a direction unless one within 10 degrees is already there."""
     if all(new @ known < np.cos(np.radians(10)) for known in directions):
         directions.append(new)

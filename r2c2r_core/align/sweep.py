@@ -1,4 +1,4 @@
-"""What neither surface nor outline holds, the colours may: the yaw of a bottle is where its label shows."""
+"""Photometric yaw search for poses that geometry leaves unconstrained (bodies of revolution)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,26 +17,29 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When colours turn an object."""
+    """Tuned parameters of the photometric sweep."""
 
     loose: float = param(
-        0.01, "ratio", "to the size, of a turn's spread at the rim that is worth a sweep", source="half a degree"
+        0.01,
+        "ratio",
+        "Minimum standard deviation of the least constrained motion at the rim, relative to the size, for a sweep",
+        source="half a degree",
     )
     spans: tuple[float, float] = param(
         (0.075, 0.02),
         "ratio",
-        "to the size at the rim, half widths of the sweeps",
-        source="8 degrees, as far as tried turns are apart; 2",
+        "Half widths of the successive sweeps at the rim, relative to the size",
+        source="8 degrees, the spacing of the rotation hypotheses; 2 degrees",
     )
-    steps: int = param(9, "count", "places of a sweep", ge=3)
+    steps: int = param(9, "count", "Number of poses per sweep", ge=3)
 
 
 def sweep_loosest(
     pose: Similarity3, shape: Shape, observation: Observation, anchors: Anchors, lifted: Sequence[Lifted]
 ) -> Similarity3:
-    """The pose moved along the one motion the evidence hardly holds, to where masks, depth and colours agree best.
+    """The pose moved along its least constrained motion to the best agreement of masks, depth and colours.
 
-    Unchanged where everything is held, and where no place along the way is better.
+    Unchanged where every motion is constrained, and where no pose along the motion scores better.
     """
     params = tuned(Params)
     motion, spread_m = loosest_motion(pose, shape, observation, anchors, lifted)
@@ -53,7 +56,7 @@ def sweep_loosest(
         places = at + np.linspace(-span, span, params.steps) * observation.size_m
         found = scores(places)
         at = float(places[int(np.argmax(found))])
-    bend, slope, _ = np.polyfit(places - at, found, 2)  # single scores are noisy: pixels
+    bend, slope, _ = np.polyfit(places - at, found, 2)  # single scores are noisy because of pixel sampling
     if bend < 0 and abs(0.5 * slope / bend) < params.spans[-1] * observation.size_m:
         at -= float(0.5 * slope / bend)
     before, after = scores(np.array([0.0, at]))

@@ -1,4 +1,4 @@
-"""One photo of an object turned to look straight at it: colours, mask, depth and the mask's outline."""
+"""Square view of an object, resampled from one photo: colours, mask, depth and the mask's outline."""
 
 from dataclasses import dataclass
 
@@ -18,16 +18,14 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What hides an object."""
+    """Tuned parameters of occlusion."""
 
-    occluder_gap_m: float = param(
-        0.03, "m", "nearer than the object by more, beyond the noise, a pixel belongs to something in front of it"
-    )
+    occluder_gap_m: float = param(0.03, "m", "Minimum depth difference, beyond the noise, for a nearer pixel to be an occluder")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class View:
-    """One photo turned to look at the object and cut out square: a pure rotation, so exact for a pinhole."""
+    """One photo rotated to look at the object and cropped to a square: a pure rotation, hence exact for a pinhole camera."""
 
     frame_index: int
     camera: Intrinsics
@@ -39,12 +37,14 @@ class View:
     noise: DepthNoise
     depth_px: float  # width of one depth pixel, in pixels of this view
     signed_px: np.ndarray  # (h, w) float32, distance to the mask's outline, negative inside
-    outwards: np.ndarray  # (h, w, 2) float32, unit direction away from the mask; 0 where the outline is as near on both sides
+    outwards: (
+        np.ndarray
+    )  # (h, w, 2) float32, unit direction away from the mask; 0 where the outline is equally near on both sides
     trusted: Mask  # the nearest outline pixel is the object's own edge, not an occluder's or the photo's
 
 
 def look_at(capture: Capture, track: MaskTrack, frame: Frame, centre_world: Vector3, size_px: int) -> View:
-    """The view of one frame that is centred on the object and just holds its mask."""
+    """Square view of one frame, centred on the object and just containing its mask."""
     mask = unpack_mask(track.masks[frame.index])
     camera, turned = _aim(frame, track, mask, centre_world, size_px)
     new_from_old = turned.inverse.rotation @ frame.world_from_camera.rotation
@@ -80,9 +80,9 @@ def look_at(capture: Capture, track: MaskTrack, frame: Frame, centre_world: Vect
 
 
 def outline(mask: Mask, inside: Mask, depth_m: DepthMetres, noise: DepthNoise) -> tuple[np.ndarray, Mask]:
-    """Signed distance to the mask's outline, and where the nearest outline pixel is the object's own edge.
+    """Signed distance to the mask's outline, and a mask of pixels whose nearest outline pixel is the object's own edge.
 
-    An outline pixel beside the photo's border, or beside something that stands in front, says nothing about the object.
+    An outline pixel next to the photo's border, or next to an occluder, carries no information on the object.
     """
     if not mask.any() or mask.all():
         return np.zeros(mask.shape, np.float32), np.zeros(mask.shape, dtype=bool)
@@ -102,7 +102,7 @@ def outline(mask: Mask, inside: Mask, depth_m: DepthMetres, noise: DepthNoise) -
 
 
 def outward_direction(signed_px: np.ndarray) -> np.ndarray:
-    """Unit direction (h, w, 2) in which a smoothed signed distance grows; 0 where it hardly does."""
+    """Unit direction (h, w, 2) in which a smoothed signed distance grows; 0 where its gradient is small."""
     smooth = cv2.GaussianBlur(signed_px, (0, 0), 1.0, borderType=cv2.BORDER_REFLECT)
     slope_v, slope_u = np.gradient(smooth)
     slope = np.stack([slope_u, slope_v], axis=-1)
@@ -111,7 +111,7 @@ def outward_direction(signed_px: np.ndarray) -> np.ndarray:
 
 
 def _aim(frame: Frame, track: MaskTrack, mask: Mask, centre_world: Vector3, size_px: int) -> tuple[Intrinsics, Rigid3]:
-    """A square camera at the same place that looks at the middle of the mask and of the object's known box."""
+    """Square camera at the same position, aimed at the centre of the mask and of the object's known box."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     corners_px = np.array([[c, r] for c in (columns[0], columns[-1] + 1) for r in (rows[0], rows[-1] + 1)], dtype=np.float64)
     corners = unproject(corners_px, np.ones(4), frame.rgb_camera)
@@ -130,7 +130,7 @@ def _aim(frame: Frame, track: MaskTrack, mask: Mask, centre_world: Vector3, size
 
 
 def _resample(rgb: np.ndarray, mask: Mask, rgb_px: np.ndarray, zoom: float) -> tuple[np.ndarray, Mask]:
-    """Photo and mask at the turned camera's pixels; averaged first where the view is smaller, so that nothing aliases."""
+    """Photo and mask at the rotated camera's pixels, area-averaged first where the view is smaller, to avoid aliasing."""
     height, width = rgb.shape[:2]
     shrink = min(1.0, 1.25 * zoom)
     size = (max(int(width * shrink), 1), max(int(height * shrink), 1))
@@ -144,7 +144,7 @@ def _resample(rgb: np.ndarray, mask: Mask, rgb_px: np.ndarray, zoom: float) -> t
 
 
 def _turn_depth(frame: Frame, depth: Depth, old_rays: np.ndarray, new_from_old: np.ndarray) -> DepthMetres:
-    """Depth of the nearest depth pixel, expressed along the turned camera's axis."""
+    """Depth of the nearest depth pixel, expressed along the rotated camera's axis."""
     uv = project(old_rays, frame.depth_camera)
     known = np.where(depth.valid, depth.metres, 0.0)
     value, within = sample_nearest(known, uv.reshape(-1, 2))
@@ -153,7 +153,7 @@ def _turn_depth(frame: Frame, depth: Depth, old_rays: np.ndarray, new_from_old: 
 
 
 def mask_box(view: View) -> np.ndarray:
-    """Left, top, right, bottom of the mask, as tangents of the viewing angle; zeros where it is empty."""
+    """Left, top, right, bottom of the mask, as tangents of the viewing angle; zeros for an empty mask."""
     rows, columns = np.flatnonzero(view.mask.any(axis=1)), np.flatnonzero(view.mask.any(axis=0))
     if not len(rows):
         return np.zeros(4)
@@ -162,7 +162,7 @@ def mask_box(view: View) -> np.ndarray:
 
 
 def known_corners(track: MaskTrack) -> Points:
-    """World corners of the measured front or box; none when the segmenter measured neither."""
+    """World corners of the measured front or box; empty when the segmenter measured neither."""
     signs = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     corners = [np.zeros((0, 3))]
     if track.front is not None:
@@ -174,5 +174,5 @@ def known_corners(track: MaskTrack) -> Points:
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """The same directions with length one."""
+    """Vectors normalised to length one."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))

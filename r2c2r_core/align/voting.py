@@ -1,4 +1,4 @@
-"""Scale and pose voted over frames from matched points (paper eq. 2-7, mended by method.md rows 1-7)."""
+"""Scale and pose hypotheses from matched points, voted over frames (paper eq. 2-7, corrected by method.md rows 1-7)."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -20,29 +20,29 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which votes agree."""
+    """Tuned inlier thresholds of the vote."""
 
     relative: float = param(
         0.05,
         "ratio",
-        "to the scaled mesh's size, of a vote's distance",
-        source="with an absolute limit alone a tiny scale wins",
+        "Maximum distance of an inlier relative to the scaled mesh's size",
+        source="with an absolute limit alone, a tiny scale wins",
     )
 
 
 class Votes(NamedTuple):
-    """What the features say."""
+    """Pose hypotheses from features and their inlier counts."""
 
     hypotheses: tuple[Similarity3, ...]  # world_from_mesh, best first
     by_frame: dict[int, int]  # Frame.index -> inliers of that frame's hypothesis over all frames
 
 
 def vote(lifted: list[Lifted], size: float, scale_range: tuple[float, float], rng: np.random.Generator) -> Votes:
-    """A hypothesis of each frame and one of all together, judged on the matches of all and refitted on them with scale free.
+    """RANSAC hypotheses of each frame and of all together, scored by the inliers of all and refitted on them with free scale.
 
-    `size` is the mesh's diagonal in its own unit. Departs from eq. 2-7: scale, rotation and translation are solved
-    together (errors of a scale fixed first leak into the rest), frames are summed, where eq. 7 leaves its index, and
-    frames too poor to vote alone still count in the joint estimate.
+    `size` is the mesh's diagonal in its own unit. Departs from eq. 2-7: scale, rotation and translation are estimated together
+    (errors of a scale fixed first leak into the rest), frames are summed, where eq. 7 leaves its index, and frames too poor to
+    vote alone still count in the joint estimate.
     """
     params = tuned(Params)
     by_frame = {m.frame_index: 0 for m in lifted}
@@ -72,7 +72,7 @@ def vote(lifted: list[Lifted], size: float, scale_range: tuple[float, float], rn
 
 
 def inliers_of(pose: Similarity3, mesh: Points, world: Points, limit: np.ndarray, size: float) -> np.ndarray:
-    """Which matches agree with a pose, within the depth noise and a share of the placed size."""
+    """Inlier mask of a pose's matches, within the depth noise and a fraction of the placed size."""
     residual = np.linalg.norm(pose.apply(mesh) - world, axis=1)
     return np.asarray(residual < np.minimum(limit, tuned(Params).relative * size * pose.scale))
 
@@ -87,7 +87,7 @@ def match_views(
     *,
     best_views: int = 5,
 ) -> list[Lifted]:
-    """Each photo's matches with the rendered views it has most in common with, lifted to points."""
+    """Each photo's matches with the rendered views that share the most matches, lifted to points."""
     return [_lift_photo(p, renders, render_features, matcher, centre, radius, best_views) for p in photos]
 
 
@@ -100,7 +100,7 @@ def _lift_photo(
     radius: float,
     best_views: int,
 ) -> Lifted:
-    """The matches of one photo."""
+    """Lifted matches of one photo."""
     own = matcher.describe(photo.colour.clip(0, 255).astype(np.uint8), photo.mask)
     depth = depth_at(own.uv_px, photo.depth_m)
     points_world = photo.world_from_camera.apply(unproject(own.uv_px, depth, photo.camera))
