@@ -1,4 +1,4 @@
-"""How far each joint opens before something that stands still is in its way."""
+"""Free travel of each joint before its leaf collides with static geometry."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,29 +14,31 @@ from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.scene import Box, Joint, Link, SceneObject
 from r2c2r_core.tuning import param, tuned
 
-_LEAST = {"revolute": 1e-3, "prismatic": 1e-3}  # a jammed joint keeps a range that simulators accept
+_LEAST = {"revolute": 1e-3, "prismatic": 1e-3}  # minimum range of a jammed joint that simulators accept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a joint is stopped by what stands still."""
+    """Tuned parameters of collision-free joint travel."""
 
-    touch_m: float = param(0.0005, "m", "penetration from which two objects are said to be in each other")
+    touch_m: float = param(0.0005, "m", "Penetration above which two objects collide")
     wall_touch_m: float = param(
         0.01,
         "m",
-        "by which an opening front may come deeper behind a wall's plane",
+        "Maximum additional penetration of an opening front behind a wall's plane",
         source="a wall is a plane through a centimetre of uneven plaster, and a front's edge is known to 8 mm",
     )
-    steps: int = param(36, "count", "positions of a joint that are looked at", ge=2)
-    behind_m: float = param(0.05, "m", "behind a wall's plane: a closed front further back is not in front of that wall")
-    turn_spare_rad: float = param(float(np.deg2rad(1.0)), "rad", "of a door's travel kept free before the obstacle")
-    slide_spare_m: float = param(0.003, "m", "of a drawer's travel kept free before the obstacle")
+    steps: int = param(36, "count", "Number of joint positions that are tested", ge=2)
+    behind_m: float = param(
+        0.05, "m", "Distance behind a wall's plane beyond which a closed front is not in front of that wall"
+    )
+    turn_spare_rad: float = param(float(np.deg2rad(1.0)), "rad", "Clearance of a door's travel before the obstacle")
+    slide_spare_m: float = param(0.003, "m", "Clearance of a drawer's travel before the obstacle")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Obstacles:
-    """Boxes in the world that stand still, with the object each belongs to."""
+    """Static boxes in the world, with the object each belongs to."""
 
     boxes: Boxes
     owner: np.ndarray  # (n,) index of the object
@@ -44,7 +46,7 @@ class Obstacles:
 
 
 def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: frozenset[str]) -> list[SceneObject]:
-    """The objects, each joint's upper limit lowered to where its free sweep ends; joints in `kept` are a person's."""
+    """The objects with each joint's upper limit reduced to its collision-free travel; joints in `kept` are a person's."""
     obstacles = gathered(objects)
     result = []
     for index, item in enumerate(objects):
@@ -56,7 +58,7 @@ def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: fro
             free, blocker = joint.upper, None
             with spared(f"how far {joint.name} opens was not looked at", warnings):
                 free, blocker = free_travel(item, joint, index, objects, obstacles, walls)
-            if joint.motion is not None:  # it was filmed to get this far: what seems to stand in its way is measured wrong
+            if joint.motion is not None:  # filmed to open this far, so the apparent obstacle is a measurement error
                 free = max(free, min(joint.motion.largest, joint.upper))
             if blocker is None or free >= joint.upper:
                 joints.append(joint)
@@ -77,7 +79,7 @@ def free_travel(
     obstacles: Obstacles,
     walls: Sequence[Wall],
 ) -> tuple[float, str | None]:
-    """How far a joint opens with all others closed, and the name of what stops it short of its limit."""
+    """Collision-free travel of a joint with all others closed, and the name of the obstacle that limits it."""
     params = tuned(Params)
     child_index = next(i for i, link in enumerate(item.links) if link.name == joint.child)
     child = item.links[child_index]
@@ -110,7 +112,7 @@ def free_travel(
 
 
 def _last_free(free: float, blocked: float, blockers_at: Callable[[np.ndarray], list[str | None]]) -> float:
-    """The furthest free position between a free and a blocked one, to a 64th of the step."""
+    """The last free position between a free and a blocked one by bisection, to a 64th of the step."""
     for _ in range(6):
         middle = (free + blocked) / 2
         free, blocked = (middle, blocked) if blockers_at(np.array([middle])) == [None] else (free, middle)
@@ -118,14 +120,14 @@ def _last_free(free: float, blocked: float, blockers_at: Callable[[np.ndarray], 
 
 
 def _shortened(free: float, joint: Joint) -> float:
-    """A limit that stays clear of the obstacle, and above zero so that the joint keeps a range."""
+    """A limit clear of the obstacle, and above zero so that the joint keeps a range."""
     params = tuned(Params)
     spare = params.turn_spare_rad if joint.type == "revolute" else params.slide_spare_m
     return max(free - spare, 0.5 * free, _LEAST[joint.type])
 
 
 def motion_at(item: SceneObject, joint: Joint, position: float) -> Rigid3:
-    """The world motion of the joint's child from closed to `position`."""
+    """World motion of the joint's child from closed to `position`."""
     axis = item.world_from_object.rotation @ joint.axis_object
     if joint.type == "prismatic":
         return Rigid3(np.eye(3), axis * position)
@@ -144,11 +146,11 @@ def rotation_about(axis: Vector3, angle_rad: float) -> np.ndarray:
 def _blockers(
     moved: Sequence[Boxes], obstacles: Obstacles, near: np.ndarray, objects: Sequence[SceneObject]
 ) -> list[str | None]:
-    """At each place of what moves: the object that it is deepest in, if it is in any."""
+    """For each pose of the moving boxes: the object with the deepest penetration, if any."""
     moving, still = Boxes(*(np.stack(part) for part in zip(*moved, strict=True))), Boxes(*(v[near] for v in obstacles.boxes))
     reach = np.linalg.norm(moving.halves, axis=-1)[..., None] + np.linalg.norm(still.halves, axis=-1)
     apart = np.linalg.norm(moving.centres[:, :, None] - still.centres, axis=-1)
-    place, i, j = np.nonzero(apart < reach)  # the others' spheres do not even meet
+    place, i, j = np.nonzero(apart < reach)  # broad phase: the other bounding spheres do not intersect
     depth = box_penetration(Boxes(*(v[place, i] for v in moving)), Boxes(*(v[j] for v in still)))
     names: list[str | None] = [None] * len(moved)
     for k in np.argsort(depth, kind="stable"):
@@ -158,7 +160,7 @@ def _blockers(
 
 
 def _within_reach(boxes: Boxes, item: SceneObject, joint: Joint, moving: Boxes) -> np.ndarray:
-    """Obstacles near enough to the sweep to be worth testing."""
+    """Mask of obstacles near enough to the swept volume to be tested."""
     centre = moving.centres.mean(axis=0)
     size = float(np.linalg.norm(np.ptp(_corners(moving), axis=0)))
     reach = size * 1.6 if joint.type == "revolute" else size + joint.upper
@@ -166,7 +168,7 @@ def _within_reach(boxes: Boxes, item: SceneObject, joint: Joint, moving: Boxes) 
 
 
 def gathered(objects: Sequence[SceneObject]) -> Obstacles:
-    """Boxes of everything that stands still; things that can be pushed aside do not limit a hinge."""
+    """Boxes of all static geometry; movable objects do not limit a hinge."""
     parts: list[Boxes] = []
     owner: list[int] = []
     number: list[int] = []
@@ -188,7 +190,7 @@ def gathered(objects: Sequence[SceneObject]) -> Obstacles:
 
 
 def link_boxes(item: SceneObject, link: Link) -> Boxes:
-    """A link's boxes in the world, closed."""
+    """A link's boxes in the world, with the joint closed."""
     world_from_link = item.world_from_object @ link.object_from_link
     return _stacked([_in_world(box, world_from_link) for box in link.boxes])
 

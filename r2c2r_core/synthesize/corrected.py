@@ -1,6 +1,6 @@
-"""What geometry alone shows of a correction, on an object that was built without it: no stage runs, nothing is certified.
+"""Preview of a person's corrections by geometry alone, on an object built without them: no stage runs, nothing is certified.
 
-What a run makes of the same correction may differ: its neighbours make room, its boards are cut anew, obstacles cut limits.
+A full run may differ: neighbours are moved, boards are cut again, obstacles reduce limits.
 """
 
 from collections.abc import Sequence
@@ -17,13 +17,13 @@ from r2c2r_core.synthesize.fixtures.doors import hinge_motion
 from r2c2r_core.synthesize.fixtures.sliding_door import TOWARDS
 from r2c2r_core.synthesize.marked import part_of, remarked
 
-_SAME = 1e-3  # m and rad: what files round away
+_SAME = 1e-3  # m and rad: rounding of files
 
 
 def corrected(item: SceneObject, said: ObjectOverride, motions: Sequence[JointMotion]) -> SceneObject:
-    """The object with the size, place, hinge, limits, colour and states that a person said; itself where they said nothing new.
+    """The object with a person's size, pose, hinge, limits, colour and states; unchanged without new ones.
 
-    `motions` are what its track measured, without what anybody said of them.
+    `motions` are the track's measurements, without a person's corrections.
     """
     item = remarked(item, said.states, motions)
     sized = item if said.dimensions_m is None else _sized(item, said.dimensions_m)
@@ -34,7 +34,7 @@ def corrected(item: SceneObject, said: ObjectOverride, motions: Sequence[JointMo
 
 
 def differs(before: SceneObject, after: SceneObject) -> bool:
-    """Whether the same object was sized, moved, painted, or opens otherwise, by more than rounding."""
+    """Whether the object's size, pose, colours or joints changed by more than rounding."""
 
     def numbers(item: SceneObject) -> np.ndarray:
         joints = [[*j.origin_object, *j.axis_object, j.lower, j.upper] for j in item.joints]
@@ -45,7 +45,7 @@ def differs(before: SceneObject, after: SceneObject) -> bool:
 
 
 def _sized(item: SceneObject, dimensions_m: Vector3) -> SceneObject:
-    """All of it stretched along the object's axes, which are its links' too."""
+    """The object stretched along its axes, which are also its links' axes."""
     share = np.asarray(dimensions_m) / item.dimensions_m
     return replace(
         item,
@@ -70,7 +70,7 @@ def _shared(pose: Rigid3, share: Vector3) -> Rigid3:
 
 
 def _hinged(item: SceneObject, side: HingeSide) -> SceneObject:
-    """Its only leaf on another side; what has several, or a drawer, has no side to be said."""
+    """The object with its only leaf on another side; unchanged with several leaves or a drawer."""
     if len(item.joints) != 1:
         return item
     (joint,) = item.joints

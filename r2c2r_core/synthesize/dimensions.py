@@ -1,9 +1,9 @@
-"""How large an object is and how it stands (paper eq. 8-10, mended).
+"""Size and orientation of an object from its placed mesh (paper eq. 8-10, corrected).
 
-Departures from the paper (method.md rows 17, 18): the box is measured on the *placed* mesh, in metres; gravity is known,
-so only the plan is searched (exactly); width, depth and height are named by the side the cameras saw; the handle is kept
-apart; what the segmenter measured over all frames (a front's rectangle, a thing's box) replaces the mesh's word on the
-axes it saw.
+Departures from the paper (method.md rows 17, 18): the box is measured on the *placed* mesh, in metres; gravity is known, so
+only the plan is searched (exactly); width, depth and height are assigned by the side that the cameras saw; the handle is
+measured separately; the segmenter's measurements over all frames (a front's rectangle, an object's box) replace the mesh's on
+the axes they cover.
 """
 
 from dataclasses import dataclass, replace
@@ -31,41 +31,41 @@ from r2c2r_core.synthesize.surface import SurfaceSamples, sampled
 from r2c2r_core.tuning import param, tuned
 
 BoxSearch = Literal["upright", "hull", "powell"]
-"""How a mesh's own axes are found: calipers in plan, where gravity is known; the hull's faces, where it was only assumed; or
+"""Search for a mesh's own axes: rotating calipers in plan, where gravity is known; the hull's faces, where it is assumed; or
 the paper's Powell search (eq. 8-9), for comparison."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How large an object is and how it stands."""
+    """Tuned parameters of size and orientation."""
 
-    samples: int = param(6000, "count", "points drawn on a mesh's surface", ge=100)
-    level: float = param(0.7, "cosine", "rise of an axis, from which on it is the one that points up")
-    sure_share: float = param(0.08, "share", "of a depth: one that is known this well was measured")
-    sure_m: float = param(0.004, "m", "of a depth: one that is known this well was measured")
+    samples: int = param(6000, "count", "Number of points sampled on a mesh's surface", ge=100)
+    level: float = param(0.7, "cosine", "Minimum vertical component of an axis for it to be the one that points up")
+    sure_share: float = param(0.08, "share", "Standard deviation relative to the depth below which a depth counts as measured")
+    sure_m: float = param(0.004, "m", "Standard deviation below which a depth counts as measured")
     as_tight: float = param(
         1.03,
         "ratio",
-        "of plan areas, within which two turns of a thing are as tight",
-        source="a square is as tight as this when turned by 0.9 degrees, a round thing however it is turned",
+        "Maximum ratio of plan areas at which two yaws of an object's box fit equally tightly",
+        source="a square rotated by 0.9 degrees reaches this ratio, a round object at any yaw",
     )
     edge_share: float = param(
         0.25,
         "share",
-        "of the width, from the middle, beyond which a handle is at an edge",
+        "Distance of a handle from the middle, relative to the width, above which it is at an edge",
         source="handles of two doors meet in the middle",
     )
-    slides: float = param(0.7, "share", "probability that a door slides, from which it is built so", gt=0, lt=1)
+    slides: float = param(0.7, "share", "Minimum probability of a sliding door for it to be built as one", gt=0, lt=1)
     foot_m: float = param(
         0.035,
         "m",
-        "above the floor, of a lower end that is not told from it",
+        "Height above the floor below which a lower end cannot be distinguished from it",
         source="sample kitchens of both generators: of 6 refrigerators 4 ended 18-22 mm off there, on either side of the truth",
     )
     trim: float = param(
         0.001,
         "share",
-        "of the surface left out at either end of an axis: less than any real face, more than a spike",
+        "Fraction of the surface ignored at either end of an axis: less than any real face, more than a spike",
         ge=0,
         lt=0.5,
     )
@@ -82,19 +82,19 @@ class MeasuredObject:
     dimensions_m: Vector3
     sources: tuple[Source, Source, Source]
     handle: FrontHandle | None
-    handles: tuple[FrontHandle, ...] = ()  # all of them, where several fronts may be one object
-    motions: tuple[JointMotion, ...] = ()  # of each leaf that was filmed open: where it was placed, before the layout
+    handles: tuple[FrontHandle, ...] = ()  # all handles, where several fronts may be one object
+    motions: tuple[JointMotion, ...] = ()  # of each leaf filmed open, at its placed pose before the layout
     support_z_m: float | None
     front_measured: bool  # the front plane and its rectangle come from all frames, not from the mesh
     confidence: float
     fixed_by_person: bool  # a person gave pose or size: the layout leaves it where it is
-    laps: tuple[Lap, ...] = ()  # with the leaves that it slides past, once everything stands
+    laps: tuple[Lap, ...] = ()  # with the leaves that it slides past, set after the layout
     placed_pose: Rigid3  # world_from_object as the mesh was placed, before person and layout
     warnings: tuple[str, ...]
 
     @property
     def outward(self) -> Vector3:
-        """The horizontal direction its front faces."""
+        """Horizontal direction that its front faces."""
         return -self.world_from_object.rotation[:, 1]
 
     @property
@@ -114,7 +114,7 @@ def measure_object(
     seed: int = 0,
     box_search: BoxSearch = "upright",
 ) -> MeasuredObject:
-    """Size, pose and handle of one object; every axis says where its number comes from."""
+    """Size, pose and handle of one object; every axis states the source of its number."""
     vertices_world = placement.world_from_mesh.apply(asset.mesh.vertices)
     samples = sampled(vertices_world, asset.mesh.faces, tuned(Params).samples, seed)
     warnings: list[str] = []
@@ -167,13 +167,13 @@ def measure_object(
 
 
 def _at_width(spec: Category, width_m: float, handle: FrontHandle | None) -> Category:
-    """What a category is at a width: a wide refrigerator has two doors, unless its handle is at one edge."""
+    """Category at a width: a wide refrigerator has two doors, unless its handle is at one edge."""
     at_edge = handle is not None and abs(handle.centre[0]) > tuned(Params).edge_share * width_m
     return category_of(spec.wider[1]) if spec.wider is not None and width_m >= spec.wider[0] and not at_edge else spec
 
 
 def facing(capture: Capture, track: MaskTrack, samples: SurfaceSamples) -> tuple[Vector3, bool]:
-    """The horizontal direction the object faces, and whether its exact yaw is known; else only the side the cameras saw."""
+    """Horizontal direction that the object faces, and whether its yaw is exact; else only the side that the cameras saw."""
     if track.front is not None:
         return -track.front.world_from_front.rotation[:, 1], True
     if track.box is not None and track.kind == "appliance":
@@ -186,7 +186,7 @@ def facing(capture: Capture, track: MaskTrack, samples: SurfaceSamples) -> tuple
 
 
 def mesh_range(samples: SurfaceSamples, rotation: np.ndarray, *, with_front: bool) -> tuple[Vector3, Vector3]:
-    """Low and high ends along the object's axes; with a front, its plane is the low end of y and the handle is left out."""
+    """Low and high ends along the object's axes; with a front, its plane is the low end of y and the handle is excluded."""
     params = tuned(Params)
     points = samples.points @ rotation
     if with_front:
@@ -200,9 +200,9 @@ def mesh_range(samples: SurfaceSamples, rotation: np.ndarray, *, with_front: boo
 
 
 def _mesh_rotation(samples: SurfaceSamples, outward: Vector3, search: BoxSearch) -> np.ndarray:
-    """Upright axes along the mesh's own box, turned by the quarter turn whose front is nearest to `outward`.
+    """Upright axes along the mesh's own box, with the quarter turn whose front is nearest to `outward`.
 
-    A round thing has no such box: any is as tight, and it faces `outward`.
+    A round object has no such box: any yaw is equally tight, and it faces `outward`.
     """
     params = tuned(Params)
     if search == "upright":
@@ -237,7 +237,7 @@ def _fits(front: FrontPanel, mesh_size: Vector3, warnings: list[str]) -> bool:
 
 
 def _with_front(low: Vector3, high: Vector3, front: FrontPanel, rotation: np.ndarray) -> tuple[Vector3, Vector3]:
-    """The front's rectangle and plane in place of the mesh's; the back stays the mesh's."""
+    """The range with the front's rectangle and plane; the back remains the mesh's."""
     centre = front.world_from_front.translation @ rotation
     half = np.array([front.width_m, 0.0, front.height_m]) / 2
     new_low, new_high = centre - half, centre + half
@@ -246,7 +246,7 @@ def _with_front(low: Vector3, high: Vector3, front: FrontPanel, rotation: np.nda
 
 
 def _with_box(low: Vector3, high: Vector3, track: MaskTrack, rotation: np.ndarray) -> tuple[Vector3, Vector3]:
-    """The box measured on the visible points in place of the mesh's, for an appliance without a front."""
+    """The range of the box measured on the visible points, for an appliance without a front."""
     assert track.box is not None
     centre = track.box.world_from_object.translation @ rotation
     return centre - track.box.dimensions_m / 2, centre + track.box.dimensions_m / 2
@@ -255,14 +255,14 @@ def _with_box(low: Vector3, high: Vector3, track: MaskTrack, rotation: np.ndarra
 def _believable_depth(
     capture: Capture, track: MaskTrack, spec: Category, low: Vector3, high: Vector3, rotation: np.ndarray
 ) -> tuple[Vector3, Vector3, Source]:
-    """The box as deep as can be, and whether that is more than a usual depth."""
+    """The range with a plausible depth, and its source."""
     behind = depth_behind(capture, rotation, low, high, spec.depth)
     depth, usual = believable(float(high[1] - low[1]), behind, spec.depth, seen_apart=track.kind != "front")
     return low, np.array([high[0], low[1] + depth, high[2]]), "default" if usual else "inferred"
 
 
 def depth_behind(capture: Capture, rotation: np.ndarray, low: Vector3, high: Vector3, depth: Size) -> FrontDepth:
-    """How deep a thing is behind the front of its box along the columns of `rotation`, as far as its room tells."""
+    """Depth available behind the front of a box along the columns of `rotation`, limited by the room's walls."""
     front_centre = rotation @ np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     return front_depth(capture.room.walls, front_centre, -rotation[:, 1], depth)
 
@@ -270,7 +270,7 @@ def depth_behind(capture: Capture, rotation: np.ndarray, low: Vector3, high: Vec
 def _depth_source(
     capture: Capture, asset: MeshAsset, low: Vector3, high: Vector3, rotation: np.ndarray, warnings: list[str]
 ) -> Source:
-    """Whether a thing's depth was seen: on a face that shows it, or in outlines; a round thing's follows from its width."""
+    """Whether an object's depth was observed, on a face that shows it or in outlines; a round one's follows from its width."""
     params = tuned(Params)
     if asset.parameters.get("revolved"):
         return "inferred"
@@ -298,12 +298,12 @@ def _face_seen(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarr
 
 
 def _foot_hidden(capture: Capture, low: Vector3) -> bool:
-    """Whether its lower end is too near to the floor to be told from it: feet lift an appliance by a dark gap or by none."""
+    """Whether its lower end is too near the floor to be distinguished: feet lift an appliance by a dark gap or none."""
     return capture.room.floor_found and bool(low[2] < tuned(Params).foot_m)
 
 
 def _corrected(measured: MeasuredObject, override: ObjectOverride) -> MeasuredObject:
-    """What a person gave, in place of what was measured; the front face stays where it is when only the size is given."""
+    """The object with a person's values; the front face stays in place when only the size is given."""
     if override.dimensions_m is not None:
         grown = np.asarray(override.dimensions_m, dtype=np.float64)
         into = measured.world_from_object.rotation[:, 1]

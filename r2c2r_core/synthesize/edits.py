@@ -1,4 +1,4 @@
-"""Small corrections of a measured object: the layout is made of these."""
+"""Elementary edits of a measured object, from which the layout is composed."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ def moved(item: MeasuredObject, shift: Vector3) -> MeasuredObject:
 
 
 def trimmed(item: MeasuredObject, axis: int, sign: float, amount_m: float) -> MeasuredObject:
-    """The object with one face drawn in: `axis` and `sign` name the face in the object frame."""
+    """The object with one face moved inwards: `axis` and `sign` name the face in the object frame."""
     size = item.dimensions_m.copy()
     size[axis] -= amount_m
     shift = -sign * amount_m / 2 * item.world_from_object.rotation[:, axis]
@@ -22,12 +22,12 @@ def trimmed(item: MeasuredObject, axis: int, sign: float, amount_m: float) -> Me
 
 
 def edge_moved(item: MeasuredObject, axis: int, sign: float, inwards_m: float) -> MeasuredObject:
-    """The front with one edge drawn in, or let out where negative; its handle stays in the room.
+    """The front with one edge moved inwards, or outwards where negative; its handle stays fixed in the world.
 
     `axis` and `sign` name the edge in the object frame: 0 left (-1) or right (+1), 2 bottom or top.
     """
     handle, shift = item.handle, sign * inwards_m / 2
-    if handle is not None:  # while the front's centre moves
+    if handle is not None:  # although the front's centre moves
         ends = ("left_m", "right_m") if axis == 0 else ("bottom_m", "top_m")
         handle = replace(handle, **{end: getattr(handle, end) + shift for end in ends})
     return replace(trimmed(item, axis, sign, inwards_m), handle=handle)

@@ -1,4 +1,4 @@
-"""The scan as faces to be counted by area: where surface of a direction lies, how much of it, in what colour."""
+"""Triangles of the scan as area-weighted samples: position, direction, area and colour of its surfaces."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,14 @@ Colour = tuple[float, float, float]  # 0..1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which surface of the scan is one plane."""
+    """Tuned parameters of planar surfaces."""
 
-    band_m: float = param(0.01, "m", "from where most of a surface lies, within which it is one plane")
+    band_m: float = param(0.01, "m", "Distance from the most common position within which surface belongs to one plane")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Facets:
-    """Middles and unit normals (n, 3), areas (n,), colours (n, 3) 0..1, of faces; in one frame."""
+    """Centres and unit normals (n, 3), areas (n,), colours (n, 3) 0..1, of triangles; in one frame."""
 
     middles: Points
     normals: Points
@@ -30,30 +30,30 @@ class Facets:
 
     @property
     def area_m2(self) -> float:
-        """All of it."""
+        """Total area."""
         return float(self.areas.sum())
 
     @property
     def colour(self) -> Colour:
-        """The middle of each channel."""
+        """Median of each channel."""
         red, green, blue = np.median(self.colours, axis=0)
         return float(red), float(green), float(blue)
 
     def where(self, chosen: np.ndarray) -> "Facets":
-        """Those of a mask."""
+        """The facets selected by a mask."""
         return Facets(self.middles[chosen], self.normals[chosen], self.areas[chosen], self.colours[chosen])
 
     def turned(self, world_from_new: Matrix3) -> "Facets":
-        """The same faces, of the world, in a frame that is turned against it."""
+        """The same facets, given in the world, in a rotated frame."""
         return Facets(self.middles @ world_from_new, self.normals @ world_from_new, self.areas, self.colours)
 
     def within(self, axis: int, low: float, high: float) -> np.ndarray:
-        """Which of them lie between two values of an axis."""
+        """Mask of the facets that lie between two values along an axis."""
         return np.asarray((self.middles[:, axis] > low) & (self.middles[:, axis] < high))
 
 
 def facets_of(surface: SceneSurface) -> Facets:
-    """The scan's faces, in the world."""
+    """The scan's triangles, in the world."""
     if len(surface.faces) == 0:
         return Facets(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
     vertices = np.asarray(surface.vertices_world, dtype=np.float64)
@@ -66,7 +66,7 @@ def facets_of(surface: SceneSurface) -> Facets:
 
 
 def most_common(values: np.ndarray, areas: np.ndarray, *, least: float) -> float | None:
-    """The value with most area within BAND_M of it, as the median of that; None where that is too little."""
+    """Area-weighted mode of the values, refined by the median within `band_m` of it; None if its area is too small."""
     params = tuned(Params)
     if len(values) == 0:
         return None

@@ -1,4 +1,4 @@
-"""Fillers given back: segmentation tends to count the filler at an inside corner to the door beside it."""
+"""Fillers at inside corners, which segmentation tends to assign to the door beside them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,14 +12,14 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What may be a filler that was counted to a door."""
+    """Tuned limits of fillers assigned to a door."""
 
-    most_m: float = param(0.10, "m", "widest that is given back")
-    most_share: float = param(0.2, "share", "of the width that is given back: more would be another mistake than a filler")
+    most_m: float = param(0.10, "m", "Maximum width of a filler")
+    most_share: float = param(0.2, "share", "Maximum fraction of the width that may be a filler: more would be another error")
 
 
 def leave_fillers(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
-    """The objects, side edges of fronts drawn back from the front plane of a perpendicular run they run into."""
+    """The objects with side edges of fronts moved back from the front plane of a perpendicular run that they reach."""
     result = []
     for item in objects:
         said: list[str] = []
@@ -40,7 +40,7 @@ def _without_fillers(item: MeasuredObject, objects: Sequence[MeasuredObject]) ->
 
 
 def _excess(item: MeasuredObject, sign: float, other: MeasuredObject) -> float:
-    """By how much the edge on one side comes nearer to the other's front plane than a filler; 0 where they do not meet."""
+    """Width by which an edge violates the filler at the other's front plane; 0 where they do not meet."""
     if item is other or not (_is_front(item) and _is_front(other)) or item.fixed_by_person:
         return 0.0
     unit, beside = (FrontBox(each.world_from_object, each.dimensions_m) for each in (item, other))
@@ -59,7 +59,7 @@ def _drawn_in(item: MeasuredObject, sign: float, amount_m: float, other: str) ->
 
 
 def _without_handle_beside(item: MeasuredObject) -> MeasuredObject:
-    """The door without a handle on its filler: the shadow in a corner looks like an upright bar."""
+    """The door without a handle that lies on its filler: the shadow in a corner resembles a vertical bar."""
     if item.handle is None or abs(item.handle.centre[0]) < item.dimensions_m[0] / 2:
         return item
     return replace(item, handle=None, warnings=(*item.warnings, "what looked like its handle is on the filler: left out"))

@@ -1,4 +1,4 @@
-"""What was filmed of an object's joints, as its fixture takes it: what it is, on which side, about which line and how far."""
+"""Joint parameters from motions in the recording: joint type, hinge side, axis and limits."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,28 +19,31 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When what was filmed and what is usual are the same."""
+    """Tuned parameters for fusing filmed joints with the usual ones."""
 
     same_line: float = param(
-        3.1, "σ", "from its front's edge, within which a hinge is at it", source="19 of 20 lie within, of four numbers"
+        3.1,
+        "σ",
+        "Maximum Mahalanobis distance of a hinge from its front's edge for it to be at the edge",
+        source="95 % quantile of four degrees of freedom",
     )
     hinge_m: float = param(
         0.006,
         "m",
-        "standard deviation of a hinge from its front's measured edge",
+        "Standard deviation of a hinge from its front's measured edge",
         source="between an edge's own error, 3-5 mm, and concealed hinges, 5-20 mm inside; least error on eleven sample doors",
     )
     spare_m: float = param(
         0.001,
         "m",
-        "by which a leaf may swing beyond its edge: a rigid one about a fixed line has its gap",
+        "Maximum distance that a leaf may swing beyond its edge, within the gap around it",
         source="2-4 mm gaps",
     )
-    face_rad: float = param(float(np.deg2rad(0.3)), "rad", "standard deviation of a front's direction")
+    face_rad: float = param(float(np.deg2rad(0.3)), "rad", "Standard deviation of a front's direction")
 
 
 def opened_as(spec: Category, motions: tuple[JointMotion, ...], world_from_object: Rigid3) -> tuple[Category, str | None]:
-    """What a front is by how it was filmed to open, and what a person should know where it was called something else."""
+    """Category of a front by its filmed motion, and a notice for a person if it was labelled otherwise."""
     if spec.over_drawer is not None and _drawer(motions) is not None:
         return replace(spec, fixture=spec.over_drawer), None
     if spec.kind != "front" or spec.several_fronts or len(motions) != 1:
@@ -54,7 +57,7 @@ def opened_as(spec: Category, motions: tuple[JointMotion, ...], world_from_objec
 
 
 def side_filmed(item: MeasuredObject) -> HingeSide | None:
-    """The edge that its one leaf was filmed to hang on, or to slide to."""
+    """The edge on which its only leaf is hinged, or towards which it slides, according to the recording."""
     leaves = [motion for motion in item.motions if motion.part != DRAWER]
     if len(leaves) != 1:
         return None
@@ -66,7 +69,7 @@ def side_filmed(item: MeasuredObject) -> HingeSide | None:
 
 
 def filmed(motions: Sequence[JointMotion], placed_pose: Rigid3, motion: Motion) -> JointMotion | None:
-    """What was filmed of a part; None where nothing was, or its joint is another one: a person may have said so."""
+    """Filmed motion of a part; None without one, or if its joint is of another kind: a person may have changed it."""
     found = next((one for one in motions if is_of(one.part, motion.part)), None)
     if found is None or found.kind != motion.type:
         return None
@@ -74,12 +77,12 @@ def filmed(motions: Sequence[JointMotion], placed_pose: Rigid3, motion: Motion) 
 
 
 def is_of(leaf: str, part: str) -> bool:
-    """Whether a leaf, as its motion names it, is that part of its object."""
+    """Whether a leaf, as named by its motion, is that part of its object."""
     return leaf in ("", part.partition("_")[0])
 
 
 def inside_seen(item: MeasuredObject) -> Inside | None:
-    """What was seen behind its open leaves, which close one compartment; the leaf that showed more shelves tells them."""
+    """Observed interior of its leaves' common compartment; shelves are taken from the leaf that showed most."""
     seen = [motion.inside for motion in item.motions if motion.inside is not None and motion.part != DRAWER]
     if not seen:
         return None
@@ -91,7 +94,7 @@ def inside_seen(item: MeasuredObject) -> Inside | None:
 
 
 def drawer_below(item: MeasuredObject) -> Below | None:
-    """The drawer below its doors, from the object's lower edge to as far above the drawer's middle."""
+    """The drawer below its doors, from the object's lower edge to as far above the drawer's centre."""
     drawer = _drawer(item.motions)
     if drawer is None or drawer.pivot_world is None:
         return None
@@ -100,9 +103,9 @@ def drawer_below(item: MeasuredObject) -> Below | None:
 
 
 def as_filmed(motion: Motion, found: JointMotion | None, placed_pose: Rigid3) -> Motion:
-    """The joint about the line that was filmed, where that differs from its front's edge by more than either is known to.
+    """The joint about the filmed line where that differs significantly from its front's edge.
 
-    Else along that edge, and through the mean of both, each by what it is known to.
+    Otherwise along that edge, and through the mean of both, weighted by their covariances.
     """
     if found is None or found.covariance is None or found.pivot_world is None:
         return motion
@@ -124,7 +127,7 @@ def as_filmed(motion: Motion, found: JointMotion | None, placed_pose: Rigid3) ->
 
 
 def _clearing(shift: Vector3, axis: Vector3) -> Vector3:
-    """A hinge's shift from its leaf's edge (object frame), no deeper than lets that edge swing clear of what is beside it."""
+    """A hinge's shift from its leaf's edge (object frame), limited in depth so that the edge swings clear of its neighbours."""
     depth = np.array([0.0, 1.0, 0.0])
     inwards = max(float(shift @ np.cross(-depth, axis)), 0.0)
     spare = tuned(Params).spare_m
@@ -133,8 +136,8 @@ def _clearing(shift: Vector3, axis: Vector3) -> Vector3:
 
 
 def opening(motion: Motion, found: JointMotion | None, most: float) -> tuple[float, Source]:
-    """How far a part opens: to the stop that was filmed, at least as far as it was seen, or as its category does."""
-    if found is None or found.largest > most:  # further than it can: an error
+    """Upper limit of a part and its source: the filmed stop, at least the filmed maximum, or the category's default."""
+    if found is None or found.largest > most:  # beyond the possible range: a measurement error
         return motion.upper, "default"
     if found.stop_seen:
         return found.largest, "measured"
@@ -142,7 +145,7 @@ def opening(motion: Motion, found: JointMotion | None, most: float) -> tuple[flo
 
 
 def widest(axis_object: Vector3, kind: JointType, dimensions_m: Vector3) -> float:
-    """How far a part can open at all: a drawer as deep as its unit, a leaf that slides its own length, a door half a turn."""
+    """Maximum possible travel: a drawer its unit's depth, a sliding leaf its own length, a door half a turn."""
     return np.pi if kind == "revolute" else float(np.abs(axis_object) @ dimensions_m)
 
 
@@ -151,7 +154,7 @@ def _drawer(motions: tuple[JointMotion, ...]) -> JointMotion | None:
 
 
 def _axis(motion: JointMotion, world_from_object: Rigid3) -> np.ndarray:
-    assert motion.axis_world is not None  # what is fixed is no motion of a leaf
+    assert motion.axis_world is not None  # a fixed part has no motion
     return np.asarray(world_from_object.inverse.turn(motion.axis_world))
 
 

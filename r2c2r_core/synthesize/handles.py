@@ -1,4 +1,4 @@
-"""The handle of a placed mesh: what stands out of its front."""
+"""Handle detection on a placed mesh: surface that protrudes from its front."""
 
 from dataclasses import dataclass
 
@@ -12,17 +12,17 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What of a mesh is a handle."""
+    """Tuned parameters of handle detection."""
 
     stands_out_m: tuple[float, float] = param(
         (0.008, 0.10),
         "m",
-        "nearest and farthest that a handle stands out of a front",
+        "Minimum and maximum protrusion of a handle",
         source="nearer is the front's own relief, farther is another object",
     )
-    cell_m: float = param(0.02, "m", "side of the cells by which what stands out is parted into handles", gt=0)
-    fewest_points: int = param(12, "count", "of a handle")
-    largest_share: float = param(0.35, "share", "of the front that a handle may cover: more is a second front")
+    cell_m: float = param(0.02, "m", "Side of the cells whose connected components separate handles", gt=0)
+    fewest_points: int = param(12, "count", "Minimum number of surface points of a handle")
+    largest_share: float = param(0.35, "share", "Maximum fraction of the front that a handle covers: more is a second front")
 
 
 def handle_of_mesh(samples: SurfaceSamples, world_from_axes: np.ndarray, low: Vector3, high: Vector3) -> FrontHandle | None:

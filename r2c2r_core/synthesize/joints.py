@@ -1,6 +1,7 @@
-"""How each fixture opens: the hinge side from the handle, the neighbours or the category; a person's word wins.
+"""Hinge side of each fixture from the handle, the neighbours or the category; a person's choice takes precedence.
 
-Of a leaf that slides, its side is where it slides to: away from its pull as a hinge is, or over the one leaf that it passes.
+For a sliding leaf the side is the direction it slides to: away from its pull as for a hinge, or over the only leaf that it
+passes.
 """
 
 from collections.abc import Sequence
@@ -20,44 +21,48 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How the side of a hinge is told."""
+    """Tuned parameters of the choice of hinge sides."""
 
     off_centre: float = param(
         0.2,
         "share",
-        "of half the width: a handle nearer to the middle does not tell its side",
-        source="backends.md 2.8: handles at 0.38-0.56 did not",
+        "Minimum offset of a handle from the middle, relative to half the width, for it to indicate a side",
+        source="backends.md 2.8: handles at 0.38-0.56 were ambiguous",
     )
-    flap_wide: float = param(1.15, "ratio", "of width to height, from where a front may be a flap")
-    flap_low: float = param(0.4, "share", "of half the height, below which a flap's handle is")
-    adjacent_m: float = param(0.06, "m", "between two doors that may open as a pair")
+    flap_wide: float = param(1.15, "ratio", "Minimum ratio of width to height of a flap")
+    flap_low: float = param(0.4, "share", "Minimum offset of a flap's handle below the middle, relative to half the height")
+    adjacent_m: float = param(0.06, "m", "Maximum gap between two doors that may open as a pair")
     certain_off_centre: float = param(
-        0.6, "share", "of half the width: a handle this far out is at the door's edge", gt=0, le=1
+        0.6,
+        "share",
+        "Offset of a handle from the middle, relative to half the width, above which its side is certain",
+        gt=0,
+        le=1,
     )
-    slope: float = param(0.92, "ratio", "of log-odds to what they are worth", source=FITTED, gt=0)
-    offset: float = param(1.53, "log", "that log-odds are worth more", source=FITTED, ge=-10, le=10)
-    seen_open: float = param(0.98, "score", "confidence, 0 to 1, in the side of a leaf that several frames show open")
+    slope: float = param(0.92, "ratio", "Slope of the Platt calibration of log-odds", source=FITTED, gt=0)
+    offset: float = param(1.53, "log", "Offset of the Platt calibration of log-odds", source=FITTED, ge=-10, le=10)
+    seen_open: float = param(0.98, "score", "Confidence, 0 to 1, in the side of a leaf that several frames show open")
     in_pairs: float = param(
-        0.75, "score", "confidence, 0 to 1, that doors without a telling handle open as a pair", source="a guess, stated as one"
+        0.75, "score", "Confidence, 0 to 1, that doors without an informative handle open as a pair", source="a stated guess"
     )
 
     past_leaf: float = param(
         0.95,
         "score",
-        "confidence, 0 to 1, that a leaf slides past the only one beside it",
-        source="a guess, stated as one: no unit gives it another way, if both are leaves",
+        "Confidence, 0 to 1, that a leaf slides past the only one beside it",
+        source="a stated guess: its unit leaves no other direction, if both are leaves",
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hinge:
-    """The hinge side of a single door, where that comes from, and why in one phrase."""
+    """The hinge side of a single door, its source, and a reason in one phrase."""
 
     side: HingeSide
     source: Source
     reason: str
     confidence: float | None  # 0..1; None where the category leaves no choice
-    by_handle: bool = False  # its handle was seen on the other side, or the door open: no neighbour says otherwise
+    by_handle: bool = False  # observed from its handle or from the open door: neighbours do not override it
 
 
 def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> dict[str, Hinge]:
@@ -97,14 +102,14 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
 
 
 def _side_seen(item: MeasuredObject) -> Hinge | None:
-    """What the object itself shows of its side; None where nothing does, or it has no choice."""
+    """Hinge from observations of the object itself; None without any, or where there is no choice."""
     if item.spec.opens == "bottom":
         return None
     return _past_leaf(item) or handle_hinge(item)
 
 
 def _past_leaf(item: MeasuredObject) -> Hinge | None:
-    """Over the leaf that it passes, where that is on one side only: on the other one its unit ends."""
+    """Sliding direction over the only neighbouring leaf: on the other side its unit ends."""
     others = {lap.side: lap.other for lap in item.laps}
     if len(others) != 1:
         return None
@@ -115,7 +120,7 @@ def _past_leaf(item: MeasuredObject) -> Hinge | None:
 
 
 def handle_hinge(item: MeasuredObject) -> Hinge | None:
-    """The hinge opposite the handle, where the handle is clearly on one side; a low centred bar on a wall flap means top."""
+    """The hinge opposite a handle that is clearly on one side; a low centred bar on a wall flap means top."""
     params = tuned(Params)
     handle = item.handle
     if handle is None:
@@ -138,13 +143,13 @@ def handle_hinge(item: MeasuredObject) -> Hinge | None:
 
 
 def _worth(trust: float) -> float:
-    """The share of sides that a handle trusted so (0..1) tells right; one that says nothing leaves two sides."""
+    """Calibrated probability that the side indicated by a handle is right; its confidence (0..1) is mapped to 0.5..1 first."""
     params = tuned(Params)
     return calibrated(0.5 + 0.5 * trust, params.slope, params.offset)
 
 
 def _of_its_kind(item: MeasuredObject, side: HingeSide, seen: float) -> float:
-    """The probability of a side that what was seen gives (0..1), with how often its kind is hinged there (Bayes' rule)."""
+    """Posterior probability of a side from the observation (0..1) and the category's prior (Bayes' rule)."""
     usual = item.spec.hinge_share if side == item.spec.hinge else 1 - item.spec.hinge_share
     return calibrated(seen, 1.0, log(usual / (1 - usual)))
 
@@ -180,7 +185,7 @@ def _side(item: MeasuredObject, hinges: dict[str, Hinge]) -> HingeSide | None:
 
 
 def _neighbour(item: MeasuredObject, objects: Sequence[MeasuredObject], sign: float) -> MeasuredObject | None:
-    """The single-door front that touches on one side (+1 right, -1 left): same plane, same height, within 6 cm."""
+    """The adjacent single-door front on one side (+1 right, -1 left): same plane, same height, within 6 cm."""
     params = tuned(Params)
     for other in objects:
         if other is item or other.spec is not item.spec or float(other.outward @ item.outward) < 0.97:

@@ -1,4 +1,4 @@
-"""Leaves that slide sideways: which pass each other, where they cover each other, and how much of the rear one that hides."""
+"""Overlap of sliding leaves: which pass each other, where they overlap, and how much of the rear one is hidden."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,38 +13,40 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Leaves on tracks one behind the other."""
+    """Tuned parameters of leaves on parallel tracks."""
 
     overlap_m: tuple[float, float] = param(
         (0.015, 0.05),
         "m",
-        "least and most by which leaves cover each other, whatever their widths say",
+        "Minimum and maximum overlap of leaves, regardless of their measured widths",
         source="makers of sliding doors: 20 mm at each joint of two, three or four doors, more where stiles meet",
     )
     step_m: tuple[float, float] = param(
         (0.008, 0.07),
         "m",
-        "least and most from the face of one leaf to the next one's: less is one track",
+        "Minimum and maximum offset between the faces of two leaves: less is a single track",
         source="panes of glass of 5 mm in one profile; double tracks of wardrobes are 80 mm deep in all",
     )
     apart_m: float = param(
         0.09,
         "m",
-        "between what was cut of two leaves that cover each other",
-        source="a cut that ends at the sunk panel of a framed leaf leaves out its stile of 50-90 mm",
+        "Maximum gap between the segmented parts of two leaves that overlap",
+        source="a mask that ends at the recessed panel of a framed leaf misses its stile of 50-90 mm",
     )
     level_m: float = param(
-        0.02, "m", "between their tops, or bottoms, from which on the front one's holds for both: the rear one is in its shadow"
+        0.02,
+        "m",
+        "Height difference of tops, or bottoms, above which the front leaf's replaces the rear one's, which it shades",
     )
 
 
 def lapped(objects: Sequence[MeasuredObject]) -> tuple[MeasuredObject, ...]:
-    """The objects, every sliding leaf with the leaves that it passes, as they stand."""
+    """The objects, every sliding leaf with the leaves that it passes at their final poses."""
     return tuple(replace(item, laps=_laps(item, objects)) for item in objects)
 
 
 def lap_of(item: MeasuredObject, other: MeasuredObject) -> Lap | None:
-    """Where two leaves of one unit cover each other, as the first one sees it; None where they do not pass each other."""
+    """Overlap of two leaves of one unit as seen from the first; None if they do not pass each other."""
     params = tuned(Params)
     sideways = item.spec.opens == other.spec.opens == "sideways"
     if item is other or not sideways or float(item.outward @ other.outward) < 0.99:
@@ -66,10 +68,10 @@ def lap_of(item: MeasuredObject, other: MeasuredObject) -> Lap | None:
 
 
 def with_hidden_edges(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
-    """The objects, rear leaves as wide as those in front of them, and level with them.
+    """The objects, with rear leaves as wide as those in front of them and level with them.
 
-    Leaves of one unit are; an edge behind another leaf is not seen, and a top that ends elsewhere was cut wrongly. One that
-    reaches behind the other already stays as it is.
+    Leaves of one unit are; an edge behind another leaf is hidden, and a top that ends elsewhere was segmented wrongly. A leaf
+    that already reaches behind the other is unchanged.
     """
     return [_with_hidden_edges(item, objects) for item in objects]
 
@@ -81,7 +83,7 @@ def _laps(item: MeasuredObject, objects: Sequence[MeasuredObject]) -> tuple[Lap,
 def _with_hidden_edges(item: MeasuredObject, objects: Sequence[MeasuredObject]) -> MeasuredObject:
     params = tuned(Params)
     hidden = [lap for lap in _laps(item, objects) if lap.behind_m < 0]
-    cut_short = any(lap.overlap_m < params.overlap_m[0] for lap in hidden)  # as a camera sees it; a person draws all of it
+    cut_short = any(lap.overlap_m < params.overlap_m[0] for lap in hidden)  # as seen by a camera; a person draws the whole leaf
     if not cut_short or item.fixed_by_person:
         return item
     names = {lap.other for lap in hidden}

@@ -1,8 +1,8 @@
-"""Where everything stands, from the scan alone (the paper places it by hand; method.md row 30).
+"""Layout of all objects from the scan alone (the paper arranges them by hand; method.md row 30).
 
-Fronts of one run become parallel and coplanar, things rest on what is below them, and one small optimisation (solve.py)
-gives runs their shared lines and seams and takes overlaps apart with the least change of what was measured. Each change is
-bounded by what measuring can be wrong by; how far each object moved is reported.
+Fronts of one run become parallel and coplanar, objects rest on what is below them, and one small optimisation (solve.py) gives
+runs their shared lines and seams and resolves overlaps with the least change of the measurements. Each change is bounded by the
+measurement uncertainty; the displacement of each object is reported.
 """
 
 import logging
@@ -28,34 +28,34 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What stays between objects, and what is too far a move."""
+    """Tuned gaps and limits of the layout."""
 
-    gap_m: float = param(0.002, "m", "left between neighbours")
-    rest_gap_m: float = param(0.0005, "m", "under a thing that stands on something: no contact at rest, no visible fall")
-    drop_m: float = param(0.015, "m", "between a thing's underside and what it is taken to stand on")
+    gap_m: float = param(0.002, "m", "Gap between neighbours")
+    rest_gap_m: float = param(0.0005, "m", "Gap under a standing object: no contact at rest, no visible fall")
+    drop_m: float = param(0.015, "m", "Maximum distance between an object's underside and its support")
     far_m: float = param(
-        0.035, "m", "moved by more, an object is pointed out: more than fillers and errors of measuring explain"
+        0.035, "m", "Displacement above which an object is reported: more than fillers and measurement errors explain"
     )
-    rounds: int = param(6, "count", "of parting what overlaps", ge=1)
+    rounds: int = param(6, "count", "Maximum number of rounds that add overlapping pairs", ge=1)
     outlier: float = param(
-        12.0, "σ", "of measuring, by which an overlap shows that one of the two is not what it was taken for", gt=0
+        12.0, "σ", "Overlap in standard deviations of measurement above which one of the two objects is an outlier", gt=0
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layout:
-    """Objects where they stand, how far each was moved, and what a person should know."""
+    """Objects at their final poses, how far each was moved, and warnings for a person."""
 
     objects: tuple[MeasuredObject, ...]
     moves_m: dict[str, float]
     warnings: tuple[str, ...]
-    outliers: dict[str, str]  # by object, in one line: what cannot be there beside the others; it moved none of them
+    outliers: dict[str, str]  # by object, the reason in one line: objects incompatible with the others, which they did not move
 
 
 def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floor_found: bool) -> Layout:
-    """Align the runs, settle what stands, solve for shared lines without overlaps.
+    """Layout with aligned runs, supported objects, and shared lines without overlaps.
 
-    Outliers are not among the layout's objects: they stand as they were measured, and change nothing.
+    Outliers are not among the layout's objects: they remain as measured and have no effect.
     """
     params, outliers, unseen = tuned(Params), dict[str, str](), list[str]()
     with spared("what cannot be there was not looked for", unseen):
@@ -76,7 +76,7 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
 
 
 def with_outliers(layout: Layout, measured: Sequence[MeasuredObject]) -> Layout:
-    """The layout with its outliers among its objects, where they were measured, each with its warning."""
+    """The layout with its outliers included as measured, each with its warning."""
     kept = [item for item in measured if item.name in layout.outliers]
     return Layout(
         objects=(*layout.objects, *kept),
@@ -87,10 +87,10 @@ def with_outliers(layout: Layout, measured: Sequence[MeasuredObject]) -> Layout:
 
 
 def outliers_of(objects: Sequence[MeasuredObject]) -> dict[str, str]:
-    """Of objects that overlap by more than errors of measuring explain, those that must go for the rest to agree, and why.
+    """Objects to remove so that the rest are compatible, with reasons, among those that overlap beyond measurement errors.
 
-    The one in most such overlaps goes first; of equals the one whose size and front are less likely. What a person placed
-    stays.
+    The one in most such overlaps is removed first; among equals the one whose size and front are less likely. Objects that a
+    person placed are kept.
     """
     params, found = tuned(Params), dict[str, str]()
     clashes = {
@@ -113,20 +113,20 @@ def outliers_of(objects: Sequence[MeasuredObject]) -> dict[str, str]:
 
 
 def _likely(item: MeasuredObject) -> float:
-    """How far a measurement is to be believed; infinitely where a person gave it."""
+    """Likelihood score of a measurement; infinite if a person gave it."""
     width, _, height = item.dimensions_m
     fit = item.spec.width.fit(float(width)) * item.spec.height.fit(float(height))
     return float("inf") if item.fixed_by_person else float(item.confidence * fit)
 
 
 def anchor(item: MeasuredObject) -> Vector3:
-    """The point whose move counts: the front's centre for furniture (its depth is often inferred), else the box centre."""
+    """Reference point of a displacement: the front's centre for furniture (its depth is often inferred), else the box's."""
     rigid = item.spec.opens in ("rigid", "fixed")
     return item.world_from_object.translation if rigid else item.front_centre
 
 
 def settled(item: MeasuredObject, others: Sequence[MeasuredObject], *, floor_found: bool) -> MeasuredObject:
-    """The object lowered or raised onto its support: the top of an object below it, the scanned surface, or the floor."""
+    """The object moved vertically onto its support: the top of an object below it, the scanned surface, or the floor."""
     if not item.spec.stands or item.fixed_by_person:
         return item
     said: list[str] = []
@@ -142,7 +142,7 @@ def _on_support(item: MeasuredObject, others: Sequence[MeasuredObject], *, floor
     if floor_found:
         tops.append(0.0)
     near = [top for top in tops if abs(top + params.rest_gap_m - bottom) <= params.drop_m]
-    if floor_found and bottom < 0.0:  # however far: nothing stands below the floor
+    if floor_found and bottom < 0.0:  # at any distance: nothing stands below the floor
         near.append(0.0)
     if not near and item.support_z_m is not None and abs(item.support_z_m - bottom) <= params.drop_m:
         near = [item.support_z_m]
@@ -152,12 +152,12 @@ def _on_support(item: MeasuredObject, others: Sequence[MeasuredObject], *, floor
 
 
 def solved_apart(objects: Sequence[MeasuredObject]) -> tuple[list[MeasuredObject], list[str]]:
-    """Objects with their ties kept and at least GAP_M between any two boxes: pairs are added until none overlaps."""
+    """Objects that satisfy their ties with at least `gap_m` between any two boxes; pairs are added until none overlaps."""
     params = tuned(Params)
     items, warnings = list(objects), []
     try:
         items = _solved_in_rounds(objects)
-    except OBJECT_FAILS as error:  # one bad box must not cost the kitchen
+    except OBJECT_FAILS as error:  # one bad box must not fail the kitchen
         _log.warning("the layout was not solved", exc_info=error)
         warnings.append(f"the layout was not solved ({error}): everything stands where it was measured; check sizes and poses")
     with spared("what overlaps was not looked for", warnings):
@@ -182,9 +182,9 @@ def _solved_in_rounds(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]
 
 
 def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, float]]:
-    """Index pairs whose boxes come nearer than GAP_M (REST_GAP_M vertically, for what stands on the other), and by how much.
+    """Index pairs whose boxes are closer than `gap_m` (`rest_gap_m` vertically on a support), and by how much.
 
-    Leaves that pass each other have one body, and each its own track: they part nothing.
+    Leaves that pass each other share one body but have their own tracks: they are not separated.
     """
     if len(items) < 2:
         return []
@@ -202,13 +202,13 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
 
 
 def _rests_on(top: MeasuredObject, below: MeasuredObject) -> bool:
-    """Whether `top` stands on `below` with the clearance it should have."""
+    """Whether `top` stands on `below` with the specified clearance."""
     gap = top.world_from_object.translation[2] - top.dimensions_m[2] / 2 - _top(below)
     return top.spec.stands and _carries(below, top) and abs(gap - tuned(Params).rest_gap_m) < 1e-4
 
 
 def _carries(below: MeasuredObject, item: MeasuredObject) -> bool:
-    """Whether the item's middle stands over `below`, or a third of its plan does."""
+    """Whether `below` is lower than the item and supports at least a third of its plan."""
     corners = np.array([[x, y] for x in np.linspace(-0.5, 0.5, 5) for y in np.linspace(-0.5, 0.5, 5)])
     plan = np.column_stack([corners * item.dimensions_m[:2], np.zeros(len(corners))])
     inside = (

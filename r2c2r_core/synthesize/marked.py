@@ -1,4 +1,4 @@
-"""States of a joint that a person marked in frames: closed here, open by so much there."""
+"""Joint states marked by a person in frames: closed here, open by a given amount there."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,35 +13,36 @@ from r2c2r_core.synthesize.fixtures.spec import Motion
 from r2c2r_core.tuning import param, tuned
 
 Marks = Mapping[int, float]
-"""How far a joint stands open, rad or m, by Frame.index."""
+"""Joint state, rad or m, by Frame.index."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What is known of the errors of states that were measured, before a person marks any."""
+    """Tuned priors on the errors of measured joint states."""
 
     zero: float = param(
-        0.3, "rad", "(m, of what slides) standard deviation of the closed state, of a front that was not filmed closed", gt=0
+        0.3,
+        "rad",
+        "Standard deviation of the closed state, in m for sliding parts, of a front that was not filmed closed",
+        gt=0,
     )
     scale: float = param(
         0.03,
         "ratio",
-        "standard deviation of states to true ones",
+        "Standard deviation of the ratio of measured to true states",
         source="a hinge 12 mm off moves the edge of a 0.4 m leaf by 3 %",
     )
-    mark: float = param(
-        0.01, "rad", "(m, of what slides) standard deviation of a measured state where a person marked another", gt=0
-    )
+    mark: float = param(0.01, "rad", "Standard deviation of a measured state in a marked frame, in m for sliding parts", gt=0)
     misread: float = param(
-        3.0, "σ", "beyond which a mark says that its frame was misread, and nothing of the others", gt=0, source="1 in 370"
+        3.0, "σ", "Residual above which a mark shows that only its frame was misread", gt=0, source="1 in 370"
     )
 
 
 def remarked(item: SceneObject, said: Mapping[str, Marks], motions: Sequence[JointMotion]) -> SceneObject:
-    """The object with what its joints did by these marks in place of those that it was built with.
+    """The object with joints re-estimated from these marks.
 
-    `said` has them by joint or its part, `motions` are what its track measured. A run says the same of states, and of limits
-    that were seen; other limits stay as they were built.
+    `said` has them by joint or its part, `motions` are what its track measured. A run gives the same states, and the same
+    limits where they were observed; other limits stay as they were built.
     """
     placed_pose = item.final_from_placed.inverse @ item.world_from_object
 
@@ -64,17 +65,17 @@ def remarked(item: SceneObject, said: Mapping[str, Marks], motions: Sequence[Joi
 
 
 def part_of(joint: Joint, object_name: str) -> str:
-    """Which part of its object the joint moves."""
+    """Name of the part of its object that the joint moves."""
     return joint.child.removeprefix(f"{object_name}_")
 
 
 def marks_of(joint: Joint, object_name: str, said: Mapping[str, Marks]) -> Marks:
-    """What was marked of a joint, by its name or its part's."""
+    """Marks of a joint, by its name or its part's."""
     return said.get(joint.name) or said.get(part_of(joint, object_name)) or {}
 
 
 def _opened(joint: Joint, before: JointMotion | None, motion: Motion, most: float) -> Joint:
-    """With the limit that follows from what was seen, where that is another than before."""
+    """The joint with the limit that follows from its observed motion, where that has changed."""
     seen = joint.motion
     if seen is None or joint.sources["limits"] == "person" or (before is not None and np.isclose(before.largest, seen.largest)):
         return joint
@@ -83,9 +84,9 @@ def _opened(joint: Joint, before: JointMotion | None, motion: Motion, most: floa
 
 
 def as_marked(found: JointMotion | None, marks: Marks, motion: Motion, world_from_object: Rigid3) -> JointMotion | None:
-    """The joint with a person's states (rad or m, by Frame.index), and the measured ones moved along with them.
+    """The joint's motion with a person's states (rad or m, by Frame.index), and the measured ones corrected accordingly.
 
-    Of a joint that was not measured, what was marked is all that is known.
+    For a joint that was not measured, the marks are the only data.
     """
     if not marks:
         return found
@@ -105,10 +106,10 @@ def as_marked(found: JointMotion | None, marks: Marks, motion: Motion, world_fro
 
 
 def moved(found: JointMotion, marks: Marks) -> JointMotion:
-    """What was measured of a joint, with a person's states in their frames and those of other frames moved along.
+    """A joint's measured motion, with a person's states in their frames and corrected states in the others.
 
-    Measured states s become a + b s by least squares: a person who says "closed here" moves the zero of all of them, two marks
-    also their scale (a ~ N(0, zero), b ~ N(1, scale)). Nothing is further shut than closed.
+    Measured states s become a + b s by least squares: a mark "closed here" shifts the zero of all of them, two marks also
+    change their scale (a ~ N(0, zero), b ~ N(1, scale)). No state is below closed.
     """
     zero, scale = _correction(found, marks)
     along = {
@@ -124,9 +125,9 @@ def _said(marks: Marks) -> dict[int, State]:
 
 
 def _correction(found: JointMotion, marks: Marks) -> tuple[float, float]:
-    """Shift and scale of the measured states that meet the marks best.
+    """Offset and scale of the measured states that best fit the marks.
 
-    A mark that the others and what is known beforehand do not foresee says that its frame was misread: it moves no other.
+    A mark that the others and the prior do not predict shows that its frame was misread: it is rejected as an outlier.
     """
     params = tuned(Params)
     states = {frame: state.value for frame, state in found.states.items() if state.value is not None}
@@ -149,6 +150,6 @@ def _correction(found: JointMotion, marks: Marks) -> tuple[float, float]:
 
 
 def _was_closed(states: Marks, marks: Marks, within: float) -> bool:
-    """Whether frames show it closed, and nobody says otherwise of one of them."""
+    """Whether frames show it closed, and no mark contradicts one of them."""
     closed = {frame for frame, value in states.items() if value <= within}
     return bool(closed - marks.keys()) and all(marks[frame] <= within for frame in closed & marks.keys())

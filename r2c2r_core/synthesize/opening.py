@@ -1,4 +1,4 @@
-"""Which side a door opens, once its surroundings are known: real doors open, so a blocked hinge is on the other side."""
+"""Correction of hinge sides by clearance: real doors open, so a blocked hinge is on the other side."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,21 +18,21 @@ _OTHER: dict[HingeSide, HingeSide] = {"left": "right", "right": "left"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a hinge is on the other side."""
+    """Tuned parameters of hinge-side correction."""
 
     blocked_rad: float = param(
         float(np.deg2rad(30.0)),
         "rad",
-        "travel up to which a door counts as blocked",
-        source="no one hangs a door that opens less",
+        "Travel up to which a door counts as blocked",
+        source="no real door opens less",
     )
     opens: float = param(
         0.8,
         "score",
-        "confidence, 0 to 1, in a side chosen because the door then opens",
+        "Confidence, 0 to 1, in a side chosen because the door then opens",
         source="above a guess, below a handle at the edge",
     )
-    gain_rad: float = param(float(np.deg2rad(30.0)), "rad", "of travel that the other side must give")
+    gain_rad: float = param(float(np.deg2rad(30.0)), "rad", "Minimum additional travel that the other side must give")
 
 
 def open_all(
@@ -42,10 +42,10 @@ def open_all(
     walls: Sequence[Wall],
     kept: frozenset[str],
 ) -> list[SceneObject]:
-    """The objects with free upper limits; a door that cannot open is hung on its other side where that one opens.
+    """The objects with collision-free upper limits; a blocked door is hinged on its other side where that one opens.
 
-    `rebuild` makes an object anew with another hinge. A person's hinge stays, and one that a handle told: there something
-    else was measured wrong. Every turned one carries a warning.
+    `rebuild` builds an object with another hinge. A person's hinge is kept, and one inferred from a handle: there another
+    measurement is wrong. Every changed object carries a warning.
     """
     params = tuned(Params)
     fixtures = list(built)
@@ -76,5 +76,5 @@ def open_all(
 
 
 def _travel(item: SceneObject) -> float:
-    """The joint's free range; infinite for what has none, or slides."""
+    """Smallest upper limit of its revolute joints; infinite without any."""
     return min((joint.upper for joint in item.joints if joint.type == "revolute"), default=np.inf)

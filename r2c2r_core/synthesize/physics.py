@@ -15,13 +15,13 @@ _GRAVITY = 9.81  # m/s2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Bounds of masses."""
+    """Tuned bounds of masses and friction."""
 
-    lightest_kg: float = param(0.01, "kg", "of a body", source="lighter bodies make contact solvers stiff", gt=0)
+    lightest_kg: float = param(0.01, "kg", "Minimum mass of a body", source="lighter bodies make contact solvers stiff", gt=0)
     shut: float = param(
         2.0,
         "ratio",
-        "of the friction of a hinge to the torque by which its leaf's weight would open it",
+        "Ratio of a hinge's friction to the torque by which its leaf's weight would open it",
         source="own choice: springs and stays of lift-up doors keep them shut",
         ge=1,
     )
@@ -50,7 +50,7 @@ def inertial_of_pieces(pieces: Sequence[ConvexPiece], density_kg_m3: float) -> I
 
 
 def weighing(inertial: Inertial, usual_kg: tuple[float, float] | None) -> Inertial:
-    """The same body scaled into the weight that its kind usually has: a coarse mesh's colliders hold air, or lack a handle."""
+    """The same body with its mass scaled into its kind's usual range: coarse colliders enclose air or lack a handle."""
     if usual_kg is None:
         return inertial
     scale = min(max(inertial.mass_kg, usual_kg[0]), usual_kg[1]) / inertial.mass_kg
@@ -58,7 +58,7 @@ def weighing(inertial: Inertial, usual_kg: tuple[float, float] | None) -> Inerti
 
 
 def friction_shut(friction: float, axis: Vector3, leaf: Inertial) -> float:
-    """A hinge's friction (N m) that keeps its closed leaf where it is: a leaf hung on its upper outer edge would swing open.
+    """Hinge friction (N m) that keeps a leaf closed: a leaf hung on its upper outer edge would swing open.
 
     `axis` is that of opening, the leaf's frame has its origin on it and +Z up.
     """
@@ -73,7 +73,7 @@ def _box_inertia(mass_kg: float, size_m: Vector3, rotation: np.ndarray) -> np.nd
 
 
 def _combined(masses: np.ndarray, centres: Points, own: np.ndarray) -> Inertial:
-    """Bodies joined into one: parallel axes onto the common centre of mass; scaled up if lighter than 10 g."""
+    """Bodies joined into one by the parallel axis theorem; scaled up below the minimum mass."""
     total = float(masses.sum())
     centre = masses @ centres / total
     arms = centres - centre

@@ -17,28 +17,30 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a plinth is."""
+    """Tuned parameters of plinths."""
 
     undersides_m: tuple[float, float] = param(
         (0.03, 0.25),
         "m",
-        "least and most height of the undersides above it",
-        source="lower there is no plinth; higher something is missing that nobody clicked",
+        "Minimum and maximum height of the undersides above a plinth",
+        source="lower there is no plinth; higher an object is missing that was not clicked",
     )
-    thick_m: float = param(0.016, "m", "thickness of its board")
+    thick_m: float = param(0.016, "m", "Thickness of its board")
     set_back_m: float = param(
-        0.05, "m", "behind the fronts, where the scan does not show it", source="kitchens leave 40-80 mm for the toes"
+        0.05, "m", "Distance behind the fronts, where the scan does not show it", source="kitchens leave 40-80 mm for the toes"
     )
-    set_backs_m: tuple[float, float] = param((0.005, 0.12), "m", "least and most set back at which it is looked for")
-    evidence: float = param(0.25, "share", "of its face that the scan must show")
-    facing: float = param(0.9, "cosine", "with the fronts' direction, from which surface looks as it does")
-    seam_m: float = param(0.03, "m", "between units that stand on one board")
-    dull: float = param(0.6, "ratio", "of the fronts' colour: a plinth that no camera saw is in the shade")
-    unseen: tuple[float, float, float] = param((0.8, 0.8, 0.8), "colour", "of fronts of which the scan has nothing either")
+    set_backs_m: tuple[float, float] = param(
+        (0.005, 0.12), "m", "Minimum and maximum distance behind the fronts at which it is searched"
+    )
+    evidence: float = param(0.25, "share", "Minimum fraction of its face that the scan must show")
+    facing: float = param(0.9, "cosine", "Minimum cosine between a surface normal and the fronts' direction")
+    seam_m: float = param(0.03, "m", "Maximum gap between units on one board")
+    dull: float = param(0.6, "ratio", "Brightness of an unobserved plinth relative to the fronts, as it is in the shade")
+    unseen: tuple[float, float, float] = param((0.8, 0.8, 0.8), "colour", "Colour of fronts that the scan does not show either")
 
 
 class _Face(NamedTuple):
-    """What the scan shows of a plinth."""
+    """Position and colour of a plinth's face."""
 
     set_back_m: float
     source: Source
@@ -52,7 +54,7 @@ def plinth_runs(objects: Sequence[MeasuredObject]) -> list[UnitRun]:
 
 
 def plinths(facets: Facets, run: UnitRun, objects: Sequence[MeasuredObject], taken: Sequence[Slab]) -> list[Slab]:
-    """A board under every row of a run; `facets` are of the world."""
+    """A board under every row of a run; `facets` are in the world."""
     slabs_params = tuned(SlabsParams)
     params = tuned(Params)
     local, front, top = facets.turned(run.rotation), run.least(1), run.least(2) - slabs_params.clear_m
@@ -88,7 +90,7 @@ def _rows(run: UnitRun) -> Iterator[Interval]:
 
 
 def _face(facets: Facets, run: UnitRun, top: float, length: float) -> _Face:
-    """Where the scan shows upright surface behind the front plane, below the units; else what kitchens usually leave.
+    """Face of a plinth from upright surface behind the front plane, below the units; else at the usual distance.
 
     `facets` are those along the row, in the run's frame.
     """

@@ -16,38 +16,38 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What makes fronts one run."""
+    """Tuned tolerances of runs."""
 
-    same_direction_rad: float = param(float(np.deg2rad(7.0)), "rad", "between fronts of one direction")
-    coplanar_m: float = param(0.015, "m", "between fronts of one plane")
+    same_direction_rad: float = param(float(np.deg2rad(7.0)), "rad", "Maximum angle between fronts of one direction")
+    coplanar_m: float = param(0.015, "m", "Maximum distance between fronts of one plane")
     manhattan_rad: float = param(
         float(np.deg2rad(1.0)),
         "rad",
-        "from the room's right angle, within which that is the better word",
+        "Maximum deviation from the room's dominant direction for that direction to be used instead",
         source="it is measured on all walls",
     )
     parallel_rad: float = param(
         float(np.deg2rad(0.6)),
         "rad",
-        "between a front and a known direction, within which it takes that",
-        source="the yaw of a 0.5 m wide front, its ends known to about 5 mm",
+        "Maximum angle between a free-standing front and a known direction for it to take that direction",
+        source="yaw accuracy of a 0.5 m wide front whose ends are known to about 5 mm",
     )
-    long_run_m: float = param(0.8, "m", "length from which a run's own line decides")
+    long_run_m: float = param(0.8, "m", "Minimum length of a run for a line fit to determine its direction")
 
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """A direction that fronts face."""
+    """A common direction of fronts."""
 
     members: list[int]
     yaw_rad: float  # of the outward normal
 
 
 def align_runs(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float) -> tuple[MeasuredObject, ...]:
-    """Built-in fronts that face one way turned parallel; those within 1.5 cm of one plane moved onto it.
+    """Built-in fronts of one direction made parallel; those within 1.5 cm of one plane moved onto it.
 
-    A free-standing appliance stands as someone put it: it turns only where it is parallel to within what its own narrow
-    front tells.
+    A free-standing appliance may have any yaw: it is rotated only where it is parallel within the accuracy of its own narrow
+    front.
     """
     params = tuned(Params)
     items = list(objects)
@@ -69,7 +69,7 @@ def align_runs(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float) -> t
 
 
 def _straightened(objects: Sequence[MeasuredObject], line: _Line, yaw_rad: float) -> list[MeasuredObject]:
-    """All objects, those of the line turned to face `yaw_rad`, and the built-in ones of a plane moved onto it."""
+    """All objects, those of the line rotated to face `yaw_rad`, and the built-in ones of a plane moved onto it."""
     items = list(objects)
     for i in line.members:
         items[i] = _facing(items[i], yaw_rad)
@@ -84,7 +84,7 @@ def _straightened(objects: Sequence[MeasuredObject], line: _Line, yaw_rad: float
 
 
 def _directions(items: Sequence[MeasuredObject], fronts: Sequence[int]) -> list[_Line]:
-    """Fronts grouped by the way they face; the widest and surest front leads each group."""
+    """Fronts grouped by direction; the widest and most confident front leads each group."""
     params = tuned(Params)
     left = sorted(fronts, key=lambda i: -weight(items[i]))
     lines: list[_Line] = []
@@ -99,7 +99,7 @@ def _directions(items: Sequence[MeasuredObject], fronts: Sequence[int]) -> list[
 
 
 def _run_yaw(items: Sequence[MeasuredObject], line: _Line, manhattan_yaw_rad: float) -> float:
-    """The direction a group faces: a line through its coplanar fronts where the run is long, else their weighted mean."""
+    """Direction of a group: a line fit through its coplanar fronts where the run is long, else their weighted mean."""
     params = tuned(Params)
     weights = np.array([weight(items[i]) * items[i].dimensions_m[0] ** 2 for i in line.members])
     turns = np.array([_wrapped(_yaw(items[i]) - line.yaw_rad) for i in line.members])
@@ -145,12 +145,12 @@ def _length(items: Sequence[MeasuredObject], plane: Sequence[int], outward: Vect
 
 
 def built_in(item: MeasuredObject) -> bool:
-    """Whether the object's front belongs to a run: worktops overhang it, free-standing appliances stand as they like."""
+    """Whether the object's front belongs to a run: worktops overhang it, free-standing appliances stand independently."""
     return not item.spec.stands and item.spec.opens != "fixed"
 
 
 def _facing(item: MeasuredObject, yaw_rad: float) -> MeasuredObject:
-    """The object turned about its front's centre so that it faces `yaw_rad`."""
+    """The object rotated about its front's centre to face `yaw_rad`."""
     pivot = item.front_centre
     rotation = rotation_about_z(_wrapped(yaw_rad - _yaw(item)))
     centre = pivot + rotation @ (item.world_from_object.translation - pivot)
@@ -165,7 +165,7 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
 
 
 def weight(item: MeasuredObject) -> float:
-    """How much a front's word counts: its area, its confidence, and whether the frames or only the mesh measured it."""
+    """Weight of a front: its area, its confidence, and whether the frames or only the mesh measured it."""
     area = float(item.dimensions_m[0] * item.dimensions_m[2])
     return area * max(item.confidence, 0.05) * (1.0 if item.front_measured else 0.2)
 

@@ -1,4 +1,4 @@
-"""Upright boxes that follow a run of base units: what worktops and plinths are made of."""
+"""Boards along a run of base units, from which worktops and plinths are made."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,15 +15,15 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Boards that follow a run."""
+    """Tuned dimensions of boards along a run."""
 
-    clear_m: float = param(0.002, "m", "left to what stands beside, below and on it")
-    shortest_m: float = param(0.10, "m", "length of a piece that is kept")
+    clear_m: float = param(0.002, "m", "Gap to objects beside, below and above the board")
+    shortest_m: float = param(0.10, "m", "Minimum length of a piece")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slab:
-    """An upright box in a run's frame, what measured its width, depth and height, and its colour."""
+    """An upright box in a run's frame, with the sources of its width, depth and height, and its colour."""
 
     rotation: Matrix3
     low: Vector3
@@ -31,11 +31,11 @@ class Slab:
     sources: tuple[Source, Source, Source]
     colour: Colour
     notes: tuple[str, ...] = ()
-    flush_m: float | None = None  # y of the fronts, where it goes on before them
+    flush_m: float | None = None  # y of the fronts, if it overhangs them
 
     @property
     def flush(self) -> "Slab":
-        """The same without what hangs over the fronts."""
+        """The slab without its overhang over the fronts."""
         low = self.low if self.flush_m is None else np.array([self.low[0], self.flush_m, self.low[2]])
         return replace(self, low=low, flush_m=None)
 
@@ -46,7 +46,7 @@ class Slab:
 
     @property
     def along(self) -> Interval:
-        """From where to where it lies along the run."""
+        """Interval along the run."""
         return float(self.low[0]), float(self.high[0])
 
     def corners(self, rotation: Matrix3) -> Points:
@@ -58,7 +58,7 @@ class Slab:
         return bool(corners[:, axis].min() < self.high[axis] and corners[:, axis].max() > self.low[axis])
 
     def cut(self, obstacles: Sequence[Points], replaced_by: Sequence[Points] = ()) -> list["Slab"]:
-        """What is left of it along its run beside obstacles (corners in its frame), and away from what replaces it."""
+        """Pieces of the slab along its run beside obstacles (corners in its frame), and away from replacements."""
         params = tuned(Params)
         gone = [corners for corners in obstacles if self.meets(corners, 1) and self.meets(corners, 2)]
         gone += [corners for corners in replaced_by if self.meets(corners, 1)]

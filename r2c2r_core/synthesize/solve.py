@@ -1,8 +1,8 @@
-"""The layout as one small optimisation: the least change of all faces together that meets what furniture must.
+"""Layout as a constrained least-squares problem: the minimum change of all faces that satisfies the furniture constraints.
 
-Unknowns are the six faces of every object along its own axes; each counts in units of what measuring it can be wrong by.
-Hard: faces that are one line, plane or seam (ties), what a person fixed, how much a size may change, the floor; overlapping
-pairs keep their gap along the axis on which that is cheapest, to a tenth of a millimetre.
+Unknowns are the six faces of every object along its own axes; each counts in units of its measurement uncertainty. Hard
+constraints: faces on one line, plane or seam (ties), what a person fixed, limits on size changes, the floor; overlapping pairs
+keep their gap along the axis on which that is cheapest, to a tenth of a millimetre.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,31 +19,29 @@ from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.tuning import param, tuned
 
 _FIXED_M = 1e-6
-_SOFT_M = 1e-5  # what a bound may give where it must
+_SOFT_M = 1e-5  # slack of an infeasible bound
 _SPARE_M = 1e-4
 _UPRIGHT = 0.9999  # cosine of a tilt of 0.8 degrees
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How well each face is known, for the layout's least change."""
+    """Tuned uncertainties of faces for the layout."""
 
     measured_edge_m: float = param(
         0.005,
         "m",
-        "of a front's edges, measured over all frames",
+        "Standard deviation of a front's edges, measured over all frames",
     )
-    mesh_edge_m: float = param(0.012, "m", "of a front's edges, measured on the mesh alone")
-    plane_m: float = param(0.003, "m", "of a front's plane")
-    unseen_m: float = param(0.15, "m", "of a back that nobody saw")
-    appliance_m: float = param(
-        0.05, "m", "of where an appliance stands: what was put there gives way, furniture that is built in does not"
-    )
-    thing_m: float = param(0.15, "m", "of where a thing stands")
-    appliance_trim_m: float = param(0.004, "m", "by which an appliance's size may change: it moves rather than shrinks")
-    trim_m: float = param(0.012, "m", "by which a size may change", source="backends.md 2.9: an edge is measured to about 8 mm")
-    trim_share: float = param(0.025, "share", "of a size by which it may change")
-    least_depth_share: float = param(0.6, "share", "of an unseen depth that must remain")
+    mesh_edge_m: float = param(0.012, "m", "Standard deviation of a front's edges, measured on the mesh alone")
+    plane_m: float = param(0.003, "m", "Standard deviation of a front's plane")
+    unseen_m: float = param(0.15, "m", "Standard deviation of an unobserved back")
+    appliance_m: float = param(0.05, "m", "Standard deviation of an appliance's position: it yields to built-in furniture")
+    thing_m: float = param(0.15, "m", "Standard deviation of a free object's position")
+    appliance_trim_m: float = param(0.004, "m", "Maximum change of an appliance's size: it moves rather than shrinks")
+    trim_m: float = param(0.012, "m", "Maximum change of a size", source="backends.md 2.9: an edge is measured to about 8 mm")
+    trim_share: float = param(0.025, "share", "Maximum change of a size relative to it")
+    least_depth_share: float = param(0.6, "share", "Minimum fraction of an unobserved depth that must remain")
 
 
 class Face(NamedTuple):
@@ -56,7 +54,7 @@ class Face(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tie:
-    """Two faces of equally turned objects that are one line: the second lies `gap_m` beyond the first, along the axis."""
+    """Equality of two faces of objects with equal orientation: the second lies `gap_m` beyond the first, along the axis."""
 
     first: Face
     second: Face
@@ -66,7 +64,7 @@ class Tie:
 def solved(
     measured: Sequence[MeasuredObject], ties: Sequence[Tie], apart: Sequence[tuple[int, int]], gap_m: float
 ) -> list[MeasuredObject]:
-    """The objects after the least change that keeps `ties`, and leaves a gap between the pairs that must stand apart."""
+    """The objects after the minimum change that satisfies `ties`, with a gap between the pairs in `apart`."""
     items = list(measured)
     for group in _groups(len(items), [*((t.first.item, t.second.item) for t in ties), *apart]):
         place = {item: k for k, item in enumerate(group)}
@@ -81,7 +79,7 @@ def solved(
 
 
 def strain(items: Sequence[MeasuredObject], pair: tuple[int, int], gap_m: float) -> float:
-    """By how many standard deviations of measuring two objects overlap, along the axis on which that is least."""
+    """Overlap of two objects in standard deviations of measurement, along the axis on which that is least."""
     faces = np.concatenate([_faces(item) for item in items])
     sigma = np.concatenate([_measured_sigmas(item) for item in items])
     row, overlap = _separation(items, pair, faces, sigma, gap_m)
@@ -91,7 +89,7 @@ def strain(items: Sequence[MeasuredObject], pair: tuple[int, int], gap_m: float)
 def _solved(
     items: Sequence[MeasuredObject], ties: Sequence[Tie], apart: Sequence[tuple[int, int]], gap_m: float
 ) -> list[MeasuredObject]:
-    """The same for objects that hang together."""
+    """The solution for one connected group of objects."""
     sigma = np.concatenate([_sigmas(item) for item in items])
     faces = np.concatenate([_faces(item) for item in items])
     equal, equal_to = np.zeros((len(ties), len(sigma))), np.zeros(len(ties))
@@ -111,7 +109,7 @@ def _solved(
 
 
 def _groups(count: int, links: Sequence[tuple[int, int]]) -> list[list[int]]:
-    """Objects that ties or overlaps connect; what stands alone is left out."""
+    """Connected components of ties and overlaps; isolated objects are left out."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -141,7 +139,7 @@ def _with_faces(item: MeasuredObject, faces: np.ndarray) -> MeasuredObject:
 
 
 def _sigmas(item: MeasuredObject) -> np.ndarray:
-    """What measuring each face can be wrong by, one sigma."""
+    """Standard deviation of each face for the solver."""
     params = tuned(Params)
     if item.fixed_by_person:
         return np.full(6, _FIXED_M)
@@ -153,7 +151,7 @@ def _sigmas(item: MeasuredObject) -> np.ndarray:
 
 
 def _measured_sigmas(item: MeasuredObject) -> np.ndarray:
-    """The same of what is measured, whatever gives way more easily."""
+    """Measurement standard deviation of each face, regardless of what yields more easily."""
     params = tuned(Params)
     if item.spec.opens == "rigid":
         return np.full(6, params.thing_m)
@@ -163,7 +161,7 @@ def _measured_sigmas(item: MeasuredObject) -> np.ndarray:
 
 
 def _size_bounds(index: int, item: MeasuredObject, unknowns: int) -> list[tuple[np.ndarray, float]]:
-    """Rows and bounds that keep each size near what was measured; an unseen depth may shrink, and nothing unseen grows."""
+    """Rows and bounds that keep each size near its measurement; an unobserved depth may shrink but not grow."""
     bounds = []
     for axis in range(3):
         row = np.zeros(unknowns)
@@ -177,14 +175,14 @@ def _is_upright(item: MeasuredObject) -> bool:
 
 
 def _floor_bound(index: int, faces: np.ndarray) -> tuple[np.ndarray, float]:
-    """Row and bound that keep an upright object's underside above the floor, or where it was measured below it."""
+    """Row and bound that keep an upright object's underside above the floor, or above its measured height below it."""
     row, underside = np.zeros(len(faces)), 6 * index + 4
     row[underside] = 1.0
     return row, -max(float(faces[underside]), 0.0)
 
 
 def _trim(item: MeasuredObject, axis: int) -> float:
-    """How much a measured size may be wrong by."""
+    """Maximum error of a measured size."""
     params = tuned(Params)
     if item.spec.opens == "rigid" or item.fixed_by_person:
         return 0.0
@@ -194,7 +192,7 @@ def _trim(item: MeasuredObject, axis: int) -> float:
 
 
 def _shrink(item: MeasuredObject, axis: int) -> float:
-    """How much a size may be given up."""
+    """Maximum reduction of a size."""
     size = float(item.dimensions_m[axis])
     if axis == 1 and _unseen_back(item):
         return max(size - max(tuned(Params).least_depth_share * size, min(item.spec.depth.low, size)), _trim(item, axis))
@@ -208,7 +206,7 @@ def _unseen_back(item: MeasuredObject) -> bool:
 def _separation(
     items: Sequence[MeasuredObject], pair: tuple[int, int], faces: np.ndarray, sigma: np.ndarray, gap_m: float
 ) -> tuple[np.ndarray, float]:
-    """The row that keeps two objects apart along the direction in which that changes least of what is known."""
+    """The row that separates two objects along the direction of least cost in standard deviations."""
     first, second = pair
     options = []
     for a, b in ((first, second), (second, first)):
@@ -224,7 +222,7 @@ def _separation(
 
 
 def _cost(items: Sequence[MeasuredObject], row: np.ndarray, overlap_m: float, sigma: np.ndarray) -> float:
-    """How many sigmas it takes to clear an overlap: unseen backs give way first, but only so far; then the fronts must move."""
+    """Standard deviations needed to resolve an overlap: unobserved backs yield first, up to their limit; then fronts move."""
     backs = 6 * np.arange(len(items)) + 3
     spare = np.array([_shrink(item, 1) if _unseen_back(item) else 0.0 for item in items])
     beyond = max(overlap_m - float(np.abs(row[backs]) @ spare), 0.0)
@@ -234,7 +232,7 @@ def _cost(items: Sequence[MeasuredObject], row: np.ndarray, overlap_m: float, si
 
 
 def _reach(index: int, item: MeasuredObject, direction: Vector3, unknowns: int) -> np.ndarray:
-    """The row that gives how far an object reaches along a world direction: the support of its box, linear in its faces."""
+    """Row of the support function of an object's box along a world direction, linear in its faces."""
     row = np.zeros(unknowns)
     along = item.world_from_object.rotation.T @ direction
     for axis in range(3):

@@ -1,4 +1,4 @@
-"""Placements to an articulated scene of primitives (paper sections 4.4-4.5)."""
+"""Synthesis of an articulated scene of primitives from placements (paper sections 4.4-4.5)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -69,9 +69,9 @@ def build_scene(
     *,
     progress: Progress = SILENT,
 ) -> ArticulatedScene:
-    """Measure every object, arrange them, and build each as a fixture that opens.
+    """Articulated scene: every object measured, arranged, and built as a fixture that opens.
 
-    One that cannot be measured or built is left out, and why is said; raises StageError where none can.
+    One that cannot be measured or built is left out, with the reason; raises StageError if none can.
     """
     carcass = CARCASSES.load(config.fixtures)
     measured: list[MeasuredObject] = []
@@ -114,7 +114,7 @@ def build_scene(
     made = surroundings_of(capture, list(arranged.values()), said) if config.surroundings else []
     found, sized = as_said(made, overrides)
     opened += standing_clear(opened, found, _painted, capture.room.walls, kept, said)
-    opened += [_painted(item.measured(item.slab), item.slab) for item in sized]  # as a person said, whatever it touches
+    opened += [_painted(item.measured(item.slab), item.slab) for item in sized]  # as a person specified, even where it collides
     return ArticulatedScene(
         name=capture.name,
         objects=tuple(opened),
@@ -132,7 +132,7 @@ def _measured(
     override: ObjectOverride,
     config: SynthesizeConfig,
 ) -> MeasuredObject:
-    """Its size and pose, and what a person should know of it so far."""
+    """Size and pose of an object, with warnings so far."""
     spec, notice = named(override.built_as or track.category)
     item = measure_object(capture, track, placement, asset, spec, override, seed=config.seed, box_search=config.box)
     spec, moved = opened_as(item.spec, item.motions, item.placed_pose)
@@ -143,7 +143,7 @@ def _measured(
 def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride, carcass: CarcassBuilder) -> SceneObject:
     """A category's fixture as links and joints."""
     fixture = fixture_of(item.spec)
-    assert fixture is not None  # things are built from their mesh
+    assert fixture is not None  # rigid objects are built from their mesh
     order = Order(
         dimensions_m=item.dimensions_m,
         material=item.spec.material,
@@ -193,13 +193,13 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
 
 
 def _inside_sources(build: Build) -> dict[InsidePart, Source]:
-    """Of what opens: whether the depth and the shelves behind its front were seen."""
+    """Sources of the interior depth and shelves of an object that opens."""
     parts: tuple[InsidePart, ...] = get_args(InsidePart) if build.motions else ()
     return {part: "measured" if part in build.as_seen else "default" for part in parts}
 
 
 def _painted(item: MeasuredObject, slab: Slab) -> SceneObject:
-    """A fixture of one board, in its colour in the scan: no mesh will dress it."""
+    """A fixture of one board, in its colour in the scan, as it will get no textured mesh."""
     board = _fixture(item, None, ObjectOverride(), Boards())
     return replace(board, links=tuple(replace(link, colour=slab.colour) for link in board.links))
 
@@ -237,7 +237,7 @@ def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: i
 
 
 def _link(object_name: str, part: Part, origin: Vector3) -> Link:
-    """A link whose frame has the object's axes and its origin at `origin`."""
+    """A link with the object's axes and its origin at `origin`."""
     object_from_link = Rigid3(np.eye(3), origin)
     boxes = moved_boxes(part.boxes, object_from_link.inverse)
     return Link(
@@ -256,7 +256,7 @@ def _link_origin(motion: Motion) -> Vector3:
 
 
 def _limits_said(name: str, parts: Sequence[str], override: ObjectOverride) -> tuple[dict[str, JointLimits], tuple[str, ...]]:
-    """What a person said about the joint of each part, and what no joint could take."""
+    """A person's limits for the joint of each part, and notices of limits that match no joint."""
     said, unheard = {}, []
     if override.joint_lower is not None or override.joint_upper is not None:
         if len(parts) == 1:
@@ -269,7 +269,7 @@ def _limits_said(name: str, parts: Sequence[str], override: ObjectOverride) -> t
 
 
 def _by_part(name: str, parts: Sequence[str], said: Mapping[str, Said]) -> tuple[dict[str, Said], tuple[str, ...]]:
-    """What a person said of joints, each by its own name or its part's, by part; and what no joint could take."""
+    """A person's values for joints, given by joint or part name, by part; and notices of values that match no joint."""
     meant = {joint: next((part for part in parts if joint in (part, _joint_name(name, part))), None) for joint in said}
     there = ", ".join(parts) or "none"
     unheard = [
@@ -297,7 +297,7 @@ def _joint(
     said: JointLimits | None,
     seen: JointMotion | None,
 ) -> Joint:
-    """The joint of one moving part; what a person gave, or the scan showed, replaces the category's."""
+    """The joint of one moving part; a person's or observed values replace the category's."""
     axis: Source = hinge.source if hinge is not None else "inferred" if seen is None else seen.source
     lower, upper, limits = _limits(item, motion, said or JointLimits(None, None), seen)
     return Joint(
@@ -337,7 +337,7 @@ def _limits(
 
 
 def _open_ended(joint: Joint) -> str | None:
-    """How far the scan shows a joint open that it does not show to stop."""
+    """Warning that a joint was observed open to a state that need not be its limit."""
     if joint.motion is None or joint.sources["limits"] in ("measured", "person"):
         return None
     seen = joint.motion.largest

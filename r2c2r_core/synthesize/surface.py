@@ -1,4 +1,4 @@
-"""Evenly spread points of a mesh, with normals: what every measurement looks at."""
+"""Uniform surface samples of a mesh with normals, the basis of every measurement."""
 
 from typing import NamedTuple
 
@@ -9,13 +9,13 @@ from r2c2r_core.geometry.meshes import face_normals, sample_surface
 
 
 class SurfaceSamples(NamedTuple):
-    """Points spread over a surface by area, with the unit normals of their faces."""
+    """Points distributed over a surface by area, with the unit normals of their faces."""
 
     points: Points
     normals: Points
 
 
 def sampled(vertices: Points, faces: Faces, count: int, seed: int) -> SurfaceSamples:
-    """`count` points of a surface; the same for the same seed."""
+    """`count` points of a surface; deterministic in the seed."""
     points, chosen = sample_surface(vertices, faces, count, np.random.default_rng(seed))
     return SurfaceSamples(points, face_normals(vertices, faces)[chosen])

@@ -1,4 +1,4 @@
-"""What closes a kitchen and nobody clicks: worktops and plinths, from the scan, in the way of nothing."""
+"""Worktops and plinths added from the scan, collision-free: they are part of a kitchen but are not clicked."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -28,21 +28,21 @@ MADE = "made from the scan: nobody clicked it"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Room that worktops and plinths leave."""
+    """Tuned clearance of worktops and plinths."""
 
-    apart_m: float = param(0.0004, "m", "from all that stands still, and from every closed front")
+    apart_m: float = param(0.0004, "m", "Minimum distance from static geometry and from every closed front")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Surrounding:
-    """A counter or a plinth that is to be built."""
+    """A worktop or a plinth to be built."""
 
     name: str
     category: str
     slab: Slab
 
     def measured(self, slab: Slab) -> MeasuredObject:
-        """It as if it had been clicked, with its slab or a smaller one."""
+        """The surrounding as a measured object, with its slab or a smaller one."""
         pose = Rigid3(slab.rotation, slab.rotation @ ((slab.low + slab.high) / 2))
         return MeasuredObject(
             name=self.name,
@@ -62,10 +62,10 @@ class Surrounding:
 
 
 def surroundings_of(capture: Capture, objects: Sequence[MeasuredObject], said: list[str]) -> list[Surrounding]:
-    """Counters over the runs of base units and plinths below them; none where a person clicked one.
+    """Worktops over the runs of base units and plinths below them; none where a person clicked one.
 
-    None without a floor either: by their height above it base units are known. `said` gets a line for every run where one
-    could not be made.
+    None without a floor either, since base units are identified by their height above it. `said` gets a line for every run
+    where one could not be made.
     """
     if not capture.room.floor_found:
         return []
@@ -83,7 +83,7 @@ def surroundings_of(capture: Capture, objects: Sequence[MeasuredObject], said: l
 
 
 def as_said(made: Sequence[Surrounding], overrides: Overrides) -> tuple[list[Surrounding], list[Surrounding]]:
-    """What stands where it was found, and what a person sized or moved; what they left out is in neither."""
+    """Surroundings as found, and those that a person sized or moved; those a person removed are in neither."""
     kept = [_corrected(item, overrides.of(item.name)) for item in made if not overrides.of(item.name).left_out]
     moved = {item.name for item in kept if _is_placed(overrides.of(item.name))}
     return [item for item in kept if item.name not in moved], [item for item in kept if item.name in moved]
@@ -114,13 +114,13 @@ def standing_clear(
     kept: frozenset[str],
     said: list[str],
 ) -> list[SceneObject]:
-    """The surroundings, built, that touch nothing and shorten no joint; a counter that would tries it without overhang.
+    """The surroundings, built, that touch nothing and shorten no joint; otherwise a worktop is tried without overhang.
 
     `said` gets a line for every one that could not be built.
     """
     with apart("synthesize", "worktops and plinths", {}):  # else piece by piece
         standing = [build(item.measured(item.slab), item.slab) for item in made]
-        if _clear(opened, standing, walls, kept):  # nearly always: one look at every joint instead of one a piece
+        if _clear(opened, standing, walls, kept):  # the usual case: one test of every joint instead of one per piece
             return standing
     clear: list[SceneObject] = []
     for item in made:
@@ -136,7 +136,7 @@ def _names(run: UnitRun) -> str:
 
 
 def _clear(opened: Sequence[SceneObject], pieces: Sequence[SceneObject], walls: Sequence[Wall], kept: frozenset[str]) -> bool:
-    """Whether the pieces touch nothing of the scene, and every joint opens as far beside them as without them."""
+    """Whether the pieces touch nothing in the scene, and every joint opens as far as without them."""
     params = tuned(Params)
     boxes = gathered(opened).boxes
     for own in (link_boxes(piece, link) for piece in pieces for link in piece.links):
@@ -149,6 +149,6 @@ def _clear(opened: Sequence[SceneObject], pieces: Sequence[SceneObject], walls: 
 
 
 def _named(category: str, slabs: Sequence[Slab], taken: set[str]) -> list[Surrounding]:
-    """The slabs with the first numbers that no object has."""
+    """The slabs with the first free numbers as names."""
     free = (name for number in count(1) if (name := f"{category}_{number}") not in taken)
     return [Surrounding(name=name, category=category, slab=slab) for name, slab in zip(free, slabs, strict=False)]

@@ -1,4 +1,4 @@
-"""Free-standing rigid things: convex colliders from the placed mesh."""
+"""Convex colliders of free-standing rigid objects from the placed mesh."""
 
 from dataclasses import dataclass
 
@@ -12,15 +12,15 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When a thing is more than its hull."""
+    """Tuned parameters of convex decomposition."""
 
     openness: float = param(
-        1.35, "ratio", "of hull volume to solid volume, above which it has a cavity or legs that a gripper needs", ge=1
+        1.35, "ratio", "Ratio of hull to solid volume above which an object has a cavity or legs that a gripper needs", ge=1
     )
     flat_m: float = param(
-        0.006, "m", "from the underside, within which a point belongs to it", source="reconstructed feet are uneven"
+        0.006, "m", "Distance from the underside within which a point belongs to it", source="reconstructed feet are uneven"
     )
-    most_pieces: int = param(16, "count", "convex pieces of a thing", ge=1)
+    most_pieces: int = param(16, "count", "Maximum number of convex pieces of an object", ge=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,7 +32,7 @@ class Solid:
 
 
 def convex_pieces(solid: Solid, dimensions_m: Vector3, *, seed: int = 0) -> tuple[ConvexPiece, ...]:
-    """The hull, or where it would fill a cavity staves round it or a convex decomposition; all with one flat underside."""
+    """The hull, or staves or a convex decomposition where the hull would fill a cavity; all with one flat underside."""
     from trimesh import Trimesh
 
     shape = Trimesh(solid.vertices, solid.faces, process=True)
@@ -50,7 +50,7 @@ def convex_pieces(solid: Solid, dimensions_m: Vector3, *, seed: int = 0) -> tupl
 
 
 def _decomposed(shape: object, seed: int) -> list[Points]:
-    """CoACD parts; decimated first, or it takes minutes (stack.md section 1)."""
+    """CoACD parts; the mesh is decimated first, or it takes minutes (stack.md section 1)."""
     import coacd
     import fast_simplification
 
@@ -72,14 +72,14 @@ def _decomposed(shape: object, seed: int) -> list[Points]:
 
 
 def _flat_below(points: Points, underside_m: float) -> Points:
-    """The points with those near the underside put onto it."""
+    """The points, with those near the underside projected onto it."""
     flat = points.copy()
     flat[:, 2] = np.where(points[:, 2] < underside_m + tuned(Params).flat_m, underside_m, points[:, 2])
     return flat
 
 
 def _simplified(points: Points) -> Points | None:
-    """The hull's extreme points in directions all round; None for a sliver without volume (simulators refuse flat hulls).
+    """Extreme points of the hull over a set of directions; None for a sliver without volume (simulators refuse flat hulls).
 
     Points are chosen, never moved: the piece stays inside its shape and touches it along its axes.
     """

@@ -1,7 +1,7 @@
-"""What the fronts of a run share: their plane, their tops and bottoms, and the seams between them.
+"""Equality constraints of a run's fronts: their common plane, tops and bottoms, and the seams between them.
 
-A seam measured from both sides is known better than either edge: n + 1 seams instead of 2 n edges take the width error
-from 1.7 to 1.4 % and overlaps to nothing (backends.md 2.9). Only what measuring can be wrong by is tied.
+A seam measured from both sides is known better than either edge: n + 1 seams instead of 2 n edges reduce the width error from
+1.7 to 1.4 % and overlaps to zero (backends.md 2.9). Only faces within the measurement error are tied.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,22 +20,22 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What the fronts of a run share."""
+    """Tuned tolerances of ties."""
 
     seam_m: tuple[float, float] = param(
         (-0.012, 0.015),
         "m",
-        "past (negative) and short of each other, within which edges are one seam",
+        "Range of the gap (negative: overlap) within which two edges form one seam",
         source="gaps are 2-4 mm, end panels 16-19 mm",
     )
-    coplanar_m: float = param(0.002, "m", "between fronts of one plane")
-    line_m: float = param(0.02, "m", "to the next top of one line", source="a scan sags along a run")
-    lines_m: float = param(0.04, "m", "between all tops of one line", source="a scan sags along a run")
-    slit_m: float = param(0.02, "m", "between a unit and what closes it above or below: more is a real step")
+    coplanar_m: float = param(0.002, "m", "Maximum distance between fronts of one plane")
+    line_m: float = param(0.02, "m", "Maximum height step to the next top of one line", source="a scan sags along a run")
+    lines_m: float = param(0.04, "m", "Maximum height range of all tops of one line", source="a scan sags along a run")
+    slit_m: float = param(0.02, "m", "Maximum gap between a unit and the board above or below it: more is a real step")
 
 
 def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
-    """Every plane, line and seam that built-in fronts share; `items` are aligned in runs already."""
+    """Ties for every plane, line and seam that built-in fronts share; `items` are already aligned in runs."""
     ties: list[Tie] = []
     for plane in _coplanar(items):
         ties += [Tie(first=Face(a, 1, -1.0), second=Face(b, 1, -1.0)) for a, b in pairwise(plane)]
@@ -47,7 +47,7 @@ def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
 
 
 def _tracks(items: Sequence[MeasuredObject]) -> Iterator[Tie]:
-    """Leaves that pass each other hang in one pair of profiles: their tops and their bottoms are level."""
+    """Ties of leaves that pass each other in one pair of profiles: their tops and their bottoms are level."""
     for (i, a), (j, b) in combinations(enumerate(items), 2):
         if lap_of(a, b) is not None and not (a.fixed_by_person or b.fixed_by_person):
             near = (sign for sign in (1.0, -1.0) if abs(_edge(a, 2, sign) - _edge(b, 2, sign)) < tuned(Params).line_m)
@@ -55,7 +55,7 @@ def _tracks(items: Sequence[MeasuredObject]) -> Iterator[Tie]:
 
 
 def _closed(items: Sequence[MeasuredObject]) -> Iterator[Tie]:
-    """Worktops lie on the highest unit below them, and plinths end under the lowest one above: no slit in between."""
+    """Ties of worktops to the highest unit below them, and of plinths to the lowest one above: no slit between."""
     params = tuned(Params)
     carcass_params = tuned(CarcassParams)
     units = [i for i, item in enumerate(items) if built_in(item) and item.spec.opens != "rigid"]
@@ -82,7 +82,7 @@ def _one_above_the_other(a: MeasuredObject, b: MeasuredObject) -> bool:
 
 
 def _coplanar(items: Sequence[MeasuredObject]) -> list[list[int]]:
-    """Built-in fronts in one plane, as the runs left them."""
+    """Built-in fronts grouped by plane, after alignment in runs."""
     planes: list[list[int]] = []
     for i, item in enumerate(items):
         if not built_in(item) or item.spec.opens == "rigid" or item.fixed_by_person:
@@ -101,7 +101,7 @@ def _same_plane(a: MeasuredObject, b: MeasuredObject) -> bool:
 
 
 def _levels(items: Sequence[MeasuredObject], plane: Sequence[int], sign: float) -> Iterator[Tie]:
-    """Tops (+1) or bottoms (-1) that follow each other closely are on one line."""
+    """Ties of closely spaced tops (+1) or bottoms (-1) to one line."""
     left = sorted(plane, key=lambda i: _edge(items[i], 2, sign))
     params = tuned(Params)
     while left:
@@ -115,7 +115,7 @@ def _levels(items: Sequence[MeasuredObject], plane: Sequence[int], sign: float) 
 
 
 def _seams(items: Sequence[MeasuredObject], plane: Sequence[int], axis: int) -> Iterator[Tie]:
-    """One gap of 3 mm where the edges of two neighbours nearly meet."""
+    """Ties with one gap of 3 mm where the edges of two neighbours nearly meet."""
     params = tuned(Params)
     carcass_params = tuned(CarcassParams)
     across = 2 if axis == 0 else 0

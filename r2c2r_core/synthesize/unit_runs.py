@@ -1,4 +1,4 @@
-"""Base units side by side: what a worktop lies on, and what a plinth closes below."""
+"""Runs of base units side by side, which share a worktop above and a plinth below."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which units are under one worktop."""
+    """Tuned tolerances of units under one worktop."""
 
-    flush_m: float = param(0.06, "m", "between their fronts, in depth")
-    step_m: float = param(0.03, "m", "between their tops")
+    flush_m: float = param(0.06, "m", "Maximum depth difference between their fronts")
+    step_m: float = param(0.03, "m", "Maximum height difference between their tops")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UnitRun:
-    """Base units in one plane with one top. Run frame: axes as the units' (fronts at -y), origin as the world's."""
+    """Base units in one plane with one top. Run frame: the units' axes (fronts at -y), the world's origin."""
 
     rotation: Matrix3  # world_from_run
     units: tuple[MeasuredObject, ...]
@@ -34,21 +34,21 @@ class UnitRun:
         return np.asarray(item.world_from_object.apply(box_corners(item.dimensions_m)) @ self.rotation)
 
     def interval(self, item: MeasuredObject, axis: int) -> Interval:
-        """Where an object lies along an axis of the run."""
+        """Interval of an object along an axis of the run."""
         along = self.corners(item)[:, axis]
         return float(along.min()), float(along.max())
 
     @property
     def stretches(self) -> list[Interval]:
-        """Where its units lie along it, from left to right."""
+        """Intervals of its units along the run, from left to right."""
         return sorted(self.interval(unit, 0) for unit in self.units)
 
     def least(self, axis: int) -> float:
-        """The furthest of the units towards an axis' negative side: their front for y, their undersides for z."""
+        """Minimum of the units along an axis: their front for y, their undersides for z."""
         return min(self.interval(unit, axis)[0] for unit in self.units)
 
     def most(self, axis: int) -> float:
-        """The furthest of the units towards an axis' positive side: their backs for y, their tops for z."""
+        """Maximum of the units along an axis: their backs for y, their tops for z."""
         return max(self.interval(unit, axis)[1] for unit in self.units)
 
 
@@ -71,19 +71,19 @@ def grouped(units: Sequence[MeasuredObject], side: int) -> list[UnitRun]:
 
 
 def heights(item: MeasuredObject) -> Interval:
-    """Its underside and its top in the world."""
+    """Underside and top in the world."""
     z = item.world_from_object.apply(box_corners(item.dimensions_m))[:, 2]
     return float(z.min()), float(z.max())
 
 
 def flush(a: MeasuredObject, b: MeasuredObject) -> bool:
-    """Whether both fronts are about in one plane."""
+    """Whether both fronts are approximately in one plane."""
     apart = float((a.front_centre - b.front_centre) @ a.outward)
     return float(a.outward @ b.outward) > 1 - 1e-3 and abs(apart) < tuned(Params).flush_m
 
 
 def overlap(a: Interval, b: Interval) -> float:
-    """By how much two intervals overlap; negative where they are apart."""
+    """Length of the overlap of two intervals; negative for disjoint ones."""
     return min(a[1], b[1]) - max(a[0], b[0])
 
 

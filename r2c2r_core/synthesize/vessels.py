@@ -1,8 +1,7 @@
-"""A mug or a bowl as convex pieces that leave its hollow open: staves round it, in rings, on a floor.
+"""Convex decomposition of a mug or a bowl that keeps its cavity open: staves around it, in rings, on a floor.
 
-CoACD does not see thin walls for what they are: with 12 to 24 pieces 66 to 87 % of a mug's hollow stayed open, in 3 to 10 s
-of CPU; staves leave 98 %, in under a second (measured on a mug and a bowl with
-walls of 4 and 8 mm).
+CoACD does not handle thin walls well: with 12 to 24 pieces 66 to 87 % of a mug's cavity stayed open, in 3 to 10 s of CPU;
+staves leave 98 %, in under a second (measured on a mug and a bowl with walls of 4 and 8 mm).
 """
 
 from dataclasses import dataclass
@@ -19,17 +18,22 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a vessel is parted into convex pieces."""
+    """Tuned decomposition of vessels."""
 
-    staves: int = param(16, "count", "round the axis", source="a stave's chord takes 2 % of the radius", ge=3)
-    floor_m: float = param(5e-4, "m", "above the hollow's floor: no stave holds a slice of it")
+    staves: int = param(16, "count", "Number of staves around the axis", source="a stave's chord takes 2 % of the radius", ge=3)
+    floor_m: float = param(
+        5e-4, "m", "Height above the cavity's floor at which the staves begin, so that none includes a slice of the floor"
+    )
     rings: int = param(
-        3, "count", "in height: a handle leaves the wall in the middle one, and a bowl's curve is followed", ge=1
+        3,
+        "count",
+        "Number of rings in height, so that a handle meets only the middle one and a bowl's curve is followed",
+        ge=1,
     )
 
 
 def staves(vertices: Points, faces: Faces) -> list[Points] | None:
-    """Corners of convex pieces of a closed mesh, +Z up; None where it has no hollow that opens upwards."""
+    """Corners of convex pieces of a closed mesh, +Z up; None without a cavity that opens upwards."""
     params = tuned(Params)
     hollow = find_hollow(vertices, faces)
     solid = _solid(vertices, faces)
@@ -47,7 +51,7 @@ def staves(vertices: Points, faces: Faces) -> list[Points] | None:
 
 
 def _sector(ring: Any, centre: np.ndarray, number: int) -> Any:
-    """What of a ring lies between two half planes through the axis."""
+    """The part of a ring between two half planes through the axis."""
     params = tuned(Params)
     for angle, side in ((number, 1.0), (number + 1, -1.0)):
         turn = 2 * np.pi * angle / params.staves

@@ -1,6 +1,6 @@
-"""Where the scan shows a worktop over a run of base units: its height, its front edge, its ends and its rear.
+"""Detection of a worktop over a run of base units: its height, front edge, ends and rear.
 
-Nobody clicks a worktop. What says that there is one is level surface just above the units; without it none is made.
+Nobody clicks a worktop. The evidence is level surface just above the units; without it none is made.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,45 +22,49 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where the scan shows a worktop."""
+    """Tuned parameters of worktop detection."""
 
     tops_m: tuple[float, float] = param(
-        (0.60, 1.15), "m", "least and most height at which base units end", source="sitting kitchens to bars"
+        (0.60, 1.15), "m", "Minimum and maximum height of the tops of base units", source="sitting kitchens to bars"
     )
-    stacked_m: float = param(0.05, "m", "between units that stand on each other")
+    stacked_m: float = param(0.05, "m", "Maximum gap between units that stand on each other")
     above_m: tuple[float, float] = param(
         (-0.01, 0.11),
         "m",
-        "least and most height over the units' tops",
+        "Minimum and maximum height of a worktop over the units' tops",
         source="a worktop of 20-60 mm, on a rail or on tops that were measured low",
     )
     level: float = param(
-        0.8, "cosine", "of a normal with up: within 37 degrees", source="fused scans of dark and polished stone are uneven"
+        0.8,
+        "cosine",
+        "Minimum vertical component of a normal: within 37 degrees of up",
+        source="fused scans of dark and polished stone are uneven",
     )
-    bin_m: float = param(0.02, "m", "width of the strips that are looked at", gt=0)
+    bin_m: float = param(0.02, "m", "Width of the strips that are tested", gt=0)
     evidence: float = param(
-        0.04, "share", "of the units' plan that must be seen", source="sensors lose most of a dark worktop, and things hide it"
+        0.04,
+        "share",
+        "Minimum fraction of the units' plan that must be observed as level surface",
+        source="sensors lose most of a dark worktop, and objects occlude it",
     )
-    wide_m: float = param(0.10, "m", "length of the stretches in which the run is looked at", gt=0)
+    wide_m: float = param(0.10, "m", "Length of the stretches into which the run is divided", gt=0)
     wide_share: float = param(
-        0.5, "share", "of those stretches that must show some of it: what is left lies along the run, not in one heap"
+        0.5, "share", "Minimum fraction of the stretches that must show surface, so that it is not concentrated in one place"
     )
-    speck: float = param(0.01, "share", "of a stretch: less of it shows nothing")
-    shown: float = param(0.5, "share", "of what is seen over the units, from which on a strip is worktop too")
-    reach_m: float = param(0.70, "m", "past the last unit: a corner, or an appliance that nobody clicked")
-    overhang_m: float = param(0.06, "m", "before the fronts, at most")
-    fine_m: float = param(0.005, "m", "steps in which the front edge is looked for", gt=0)
-    edge_m: float = param(0.03, "m", "below the surface, down to which the front edge is looked for")
-    hidden: float = param(
-        0.25, "ratio", "of what is seen of the top to what is seen of the edge, below which the edge gives the colour"
-    )
-    thinnest_m: float = param(0.005, "m", "of a worktop")
-    behind_m: float = param(0.20, "m", "behind the units: a wall this near is where the worktop ends")
-    stood_in_m: float = param(0.02, "m", "below the surface: what ends so little below it stands on it")
+    speck: float = param(0.01, "share", "Fraction of a stretch below which surface is ignored")
+    shown: float = param(0.5, "share", "Observed density relative to that over the units above which a strip is worktop too")
+    reach_m: float = param(0.70, "m", "Maximum extension past the last unit: a corner, or an appliance that was not clicked")
+    overhang_m: float = param(0.06, "m", "Maximum overhang in front of the fronts")
+    fine_m: float = param(0.005, "m", "Step of the search for the front edge", gt=0)
+    edge_m: float = param(0.03, "m", "Depth below the surface down to which the front edge is searched")
+    hidden: float = param(0.25, "ratio", "Ratio of observed top to observed edge below which the edge determines the colour")
+    thinnest_m: float = param(0.005, "m", "Minimum thickness of a worktop")
+    behind_m: float = param(0.20, "m", "Maximum distance of a wall behind the units at which the worktop ends")
+    stood_in_m: float = param(0.02, "m", "Maximum depth below the surface at which an object's underside still stands on it")
 
 
 def runs_of(objects: Sequence[MeasuredObject]) -> list[UnitRun]:
-    """Base units on which a worktop can lie, grouped by the way they face, their plane and their top; the longest first."""
+    """Base units that can carry a worktop, grouped by direction, plane and top; the longest run first."""
     params = tuned(Params)
     units = [item for item in objects if is_front(item) and params.tops_m[0] < heights(item)[1] < params.tops_m[1]]
     return grouped([unit for unit in units if not any(_lies_on(other, unit) for other in units)], side=1)
@@ -69,9 +73,9 @@ def runs_of(objects: Sequence[MeasuredObject]) -> list[UnitRun]:
 def worktop(
     capture: Capture, facets: Facets, run: UnitRun, objects: Sequence[MeasuredObject], taken: Sequence[Slab]
 ) -> list[Slab]:
-    """The worktop over a run, in as many pieces as what stands in it leaves; empty where the scan shows none.
+    """The worktop over a run, in pieces between the objects that stand in it; empty where the scan shows none.
 
-    `facets` are of the world, `taken` the worktops of other runs.
+    `facets` are in the world, `taken` are the worktops of other runs.
     """
     params = tuned(Params)
     slabs_params = tuned(SlabsParams)
@@ -104,22 +108,22 @@ def worktop(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Top:
-    """Level surface that the scan shows at one height about a run; in the run's frame."""
+    """Level surface at one height about a run; in the run's frame."""
 
     run: UnitRun
     height_m: float
-    level: Facets  # over the units, before and behind them
-    over: Facets  # of it, right over the units
+    level: Facets  # over the units, in front of and behind them
+    over: Facets  # the part directly over the units
     colour: Colour
 
     @property
     def shown(self) -> float:
-        """The share of the units' plan from which on a strip is worktop too."""
+        """Fraction of the units' plan above which a strip is worktop too."""
         return tuned(Params).shown * self.over.area_m2 / (_length(self.run) * _depth(self.run))
 
 
 def _top_of(facets: Facets, run: UnitRun) -> _Top | None:
-    """The level surface just above the units; None where there is too little, or it lies in one heap."""
+    """The level surface just above the units; None if there is too little, or it is concentrated in one place."""
     params = tuned(Params)
     facets_params = tuned(FacetsParams)
     front, back, top = run.least(1), run.most(1), run.most(2)
@@ -135,7 +139,7 @@ def _top_of(facets: Facets, run: UnitRun) -> _Top | None:
 
 
 def _lies_on(upper: MeasuredObject, lower: MeasuredObject) -> bool:
-    """Whether one unit is the next of the other's stack."""
+    """Whether one unit stands on the other in a stack."""
     if upper is lower or not flush(upper, lower):
         return False
     alone = UnitRun(lower.world_from_object.rotation, (lower,))
@@ -157,7 +161,7 @@ def _over_any(along: np.ndarray, run: UnitRun) -> np.ndarray:
 
 
 def _all_along(run: UnitRun, over: Facets) -> bool:
-    """Whether level surface is seen in most stretches of the units."""
+    """Whether level surface is observed in most stretches of the units."""
     params = tuned(Params)
     edges = np.arange(run.least(0), run.most(0) + params.wide_m, params.wide_m)
     seen = np.histogram(over.middles[:, 0], edges, weights=over.areas / _depth(run))[0] > params.speck * params.wide_m
@@ -165,7 +169,7 @@ def _all_along(run: UnitRun, over: Facets) -> bool:
 
 
 def _overhang(top: _Top) -> float:
-    """How far the surface goes on before the front plane, strip by strip; 0 where it is not seen to."""
+    """Overhang of the surface in front of the front plane, strip by strip; 0 if none is observed."""
     params = tuned(Params)
     before_m, least = top.run.least(1) - top.level.middles[:, 1], top.shown * _length(top.run)
     reached = 0.0
@@ -178,7 +182,7 @@ def _overhang(top: _Top) -> float:
 
 
 def _rear(capture: Capture, top: _Top) -> tuple[float, Source]:
-    """The wall close behind the units, else where the surface ends, but never before their backs."""
+    """The wall close behind the units, else the end of the surface, but never in front of their backs."""
     params = tuned(Params)
     run, behind = top.run, top.level.middles[:, 1]
     front, back = run.least(1), run.most(1)
@@ -196,7 +200,7 @@ def _rear(capture: Capture, top: _Top) -> tuple[float, Source]:
 
 
 def _colour(facets: Facets, run: UnitRun, height: float, over: Facets) -> Colour:
-    """That of the surface, or of its front edge where much more of that is seen: papers and reflections hide tops."""
+    """Colour of the surface, or of its front edge where much more of that is visible: papers and reflections hide tops."""
     params = tuned(Params)
     front, low, high = run.least(1), max(run.most(2), height - params.edge_m), height - params.fine_m
     edge = facets.where(facets.normals[:, 1] < -params.level)
@@ -208,7 +212,7 @@ def _colour(facets: Facets, run: UnitRun, height: float, over: Facets) -> Colour
 
 
 def _stretches(top: _Top) -> Iterator[Interval]:
-    """Where the worktop lies along the run: over the units, between them and past them where the surface goes on."""
+    """Intervals of the worktop along the run: over the units, between them and past them where the surface continues."""
     params = tuned(Params)
     run, units = top.run, top.run.stretches
     under = top.level.where(top.level.within(1, run.least(1), run.most(1)))
