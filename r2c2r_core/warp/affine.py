@@ -1,8 +1,8 @@
-"""The map that brings a mesh's front onto its primitive's (paper eq. 15-16, mended).
+"""Map of a mesh's front onto its primitive's (paper eq. 15-16, corrected): least-squares scale and translation per axis.
 
-Eq. 15's full 2x2 matrix has eight equations for six unknowns and shears doors; a scale per axis and a translation, fitted
-by least squares, keeps them square (method.md row 23), and its residual is reported. Eq. 16 keeps w, so the depth would
-not match: it is scaled too (row 24). A handle is not stretched with its panel: it moves as a rigid piece.
+Eq. 15's full 2x2 matrix has eight equations for six unknowns and shears doors; a scale per axis and a translation, fitted by
+least squares, keep them square (method.md row 23), and the residual is reported. Eq. 16 keeps w, so the depth would not match:
+it is scaled too (row 24). A handle is not stretched with its panel: it moves as a rigid piece.
 """
 
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What of a mesh is its front, and what its handle."""
+    """Tuned parameters that separate a mesh's handle from its front."""
 
     handle_m: float = param(
         0.003,
         "m",
-        "out of the front plane, from where it belongs to the handle",
-        source="bar handles stand out 25-40 mm, a phone's depth leaves a flat even to 3 mm",
+        "Minimum protrusion from the front plane for a vertex to belong to the handle",
+        source="bar handles protrude 25-40 mm; a phone's depth leaves a plane even to 3 mm",
     )
-    group_m: float = param(0.03, "m", "side of the cells by which what stands out is parted into handles", gt=0)
+    group_m: float = param(0.03, "m", "Side of the cells whose connected components separate handles", gt=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,13 +52,13 @@ def fit_map(source_corners: Points, target_corners: Points, source_depth_m: floa
 
 
 def fit_ranges(low: Vector3, high: Vector3, dimensions_m: Vector3) -> AxisMap:
-    """The map of the range low..high onto a centred box."""
+    """The map from the range low..high to a centred box."""
     scale = dimensions_m / np.maximum(high - low, 1e-6)
     return AxisMap(scale=scale, shift=-scale * (low + high) / 2)
 
 
 def warp_vertices(vertices: Points, faces: Faces, axis_map: AxisMap, front_y: float) -> Points:
-    """Mapped vertices; what stands out of the front (at `front_y` before the map) keeps its shape."""
+    """Mapped vertices; parts that protrude from the front (at `front_y` before the map) keep their shape."""
     warped = axis_map.apply(vertices)
     target_front = axis_map.scale[1] * front_y + axis_map.shift[1]
     out = vertices[:, 1] < front_y - tuned(Params).handle_m
@@ -71,7 +71,7 @@ def warp_vertices(vertices: Points, faces: Faces, axis_map: AxisMap, front_y: fl
 
 
 def handle_groups(vertices: Points, faces: Faces, out: np.ndarray) -> list[np.ndarray]:
-    """Vertices in front of the front, grouped where their patches in the front plane lie within 3 cm."""
+    """Vertices in front of the front plane, grouped where their patches in that plane lie within 3 cm."""
     params = tuned(Params)
     from scipy.ndimage import label
 
@@ -90,7 +90,7 @@ def handle_groups(vertices: Points, faces: Faces, out: np.ndarray) -> list[np.nd
 
 
 def _with_edges(vertices: Points, faces: Faces, out: np.ndarray) -> np.ndarray:
-    """Positions (x, z) of the standing-out vertices and along the edges between them: long bars have few vertices."""
+    """Positions (x, z) of the protruding vertices and along the edges between them: long bars have few vertices."""
     inside = faces[out[faces].all(axis=1)]
     flat = vertices[:, [0, 2]]
     samples = [flat[out]]

@@ -1,9 +1,8 @@
-"""A placed mesh turned front-outwards (paper eq. 11-14, mended).
+"""Canonical orientation of a placed mesh, front outwards (paper eq. 11-14, corrected).
 
-Departures (method.md rows 19-21): gravity leaves four quarter turns instead of 24 signed permutations, and never a
-reflection, which would mirror hinges and text. The front is the side the cameras saw, which the object frame already
-says; distances to a symmetric box cannot tell front from back, so a handle found on the far side only is what may
-overrule it.
+Departures (method.md rows 19-21): gravity leaves four quarter turns instead of 24 signed permutations, and never a reflection,
+which would mirror hinges and text. The front is the side the cameras saw, which the object frame already gives; distances to a
+symmetric box cannot distinguish front from back, so only a handle found on the far side overrules it.
 """
 
 from dataclasses import dataclass
@@ -19,21 +18,21 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a placed mesh is turned front-outwards."""
+    """Tuned parameters of canonical orientation."""
 
-    samples: int = param(6000, "count", "points drawn on the mesh", ge=100)
+    samples: int = param(6000, "count", "Number of points sampled on the mesh", ge=100)
     believable_rad: float = param(
         float(np.deg2rad(12.0)),
         "rad",
-        "largest turn that corrects a placement",
-        source="a placement is not wrong by more; a larger turn means the mesh has no right angles",
+        "Maximum rotation that corrects a placement",
+        source="a placement's error is smaller; a larger rotation means the mesh has no right angles",
     )
-    stands_out_m: tuple[float, float] = param((0.008, 0.10), "m", "nearest and farthest that a handle stands out of a front")
+    stands_out_m: tuple[float, float] = param((0.008, 0.10), "m", "Minimum and maximum protrusion of a handle")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CanonicalMesh:
-    """Vertices along the object's axes (front towards -Y), centre arbitrary, and what a person should know."""
+    """Vertices along the object's axes (front towards -Y), centre arbitrary, with warnings for a person."""
 
     vertices: Points
     turned_rad: float
@@ -43,7 +42,7 @@ class CanonicalMesh:
 def face_outwards(
     vertices_world: Points, faces: Faces, world_from_object: Rigid3, *, has_handle: bool, seed: int = 0
 ) -> CanonicalMesh:
-    """The mesh along the object's axes: its own right angles decide the exact yaw, the cameras' side which of four."""
+    """The mesh along the object's axes: its own right angles determine the exact yaw, the cameras' side which of four."""
     params = tuned(Params)
     vertices = world_from_object.inverse.apply(vertices_world)
     points, chosen = sample_surface(vertices, faces, params.samples, np.random.default_rng(seed))
@@ -63,13 +62,13 @@ def face_outwards(
 
 
 def _handle_is_behind(points: Points, normals: Points) -> bool:
-    """Whether something handle-like stands out of the back and nothing out of the front."""
+    """Whether a handle-like part protrudes from the back and none from the front."""
     front, back = _standing_out(points, normals), _standing_out(points * [-1, -1, 1], normals * [-1, -1, 1])
     return bool(back > 0.004 and front < 0.0005)
 
 
 def _standing_out(points: Points, normals: Points) -> float:
-    """Share of the surface in front of the large flat that looks towards -y; 0 when too much of it for a handle."""
+    """Fraction of the surface in front of the large plane that faces -y; 0 when it is too large for a handle."""
     params = tuned(Params)
     looking = normals[:, 1] < -0.8
     if looking.sum() < 20:

@@ -1,8 +1,8 @@
-"""The four corners of a mesh's front face (paper section 4.8, mended).
+"""Four corners of a mesh's front face (paper section 4.8, corrected).
 
-The paper scores vertices by radius and depth, which picks handle tips, needs a centred front, and gives four points that
-are not coplanar. Here: the front plane that every stage means (kitchen/fronts.py), then the smallest rectangle around its
-inliers (method.md row 22, whose RANSAC settles between frame and panel when they are millimetres apart).
+The paper scores vertices by radius and depth, which picks handle tips, needs a centred front, and gives four points that are
+not coplanar. Here: the front plane that every stage uses (kitchen/fronts.py), then the smallest rectangle around its inliers
+(method.md row 22, whose RANSAC converges between frame and panel when they are millimetres apart).
 """
 
 from dataclasses import dataclass
@@ -22,13 +22,15 @@ _FORWARD = np.array([0.0, -1.0, 0.0])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Where the corners of a mesh's front lie."""
+    """Tuned parameters of front corners."""
 
-    samples: int = param(12000, "count", "points drawn on the mesh", ge=100)
+    samples: int = param(12000, "count", "Number of points sampled on the mesh", ge=100)
     edge_share: float = param(
-        0.0005, "share", "of the front's points left outside each side: specks of other faces", ge=0, lt=0.5
+        0.0005, "share", "Fraction of the front's points ignored beyond each side: specks of other faces", ge=0, lt=0.5
     )
-    rim_m: float = param(0.006, "m", "about the front's outline, within which the mesh's own vertices say where it ends")
+    rim_m: float = param(
+        0.006, "m", "Distance from the front's outline within which the mesh's own vertices determine its edges"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,7 +43,7 @@ class FrontFace:
 
     @property
     def centre(self) -> Vector3:
-        """The middle of the rectangle."""
+        """Centre of the rectangle."""
         return self.corners.mean(axis=0)
 
     @property
@@ -55,7 +57,7 @@ class FrontFace:
 
 
 def find_front(vertices: Points, faces: Faces, *, seed: int = 0) -> FrontFace | None:
-    """The foremost large flat of the faces that look towards -Y; None when there is none."""
+    """The foremost large plane among faces that look towards -Y; None without one."""
     params = tuned(Params)
     rng = np.random.default_rng(seed)
     points, chosen = sample_surface(vertices, faces, params.samples, rng)
@@ -65,7 +67,7 @@ def find_front(vertices: Points, faces: Faces, *, seed: int = 0) -> FrontFace | 
         return None
     forward = faces[towards[:, 1] < -tuned(FrontsParams).looks]
     flat = forward[plane.holds(vertices[forward]).all(axis=1)]
-    # Sampled anew, alone, where there are any: among all faces a sliver along an edge may get no sample
+    # Resampled alone, if there are any: among all faces a sliver along an edge may get no sample
     inliers = sample_surface(vertices, flat, params.samples, rng)[0] if len(flat) else _on(plane, points, towards[chosen])
     rim = vertices[np.unique(forward)]
     corners = _rectangle_corners(inliers, rim[plane.holds(rim)], plane.outward, plane.offset_m)
@@ -73,14 +75,14 @@ def find_front(vertices: Points, faces: Faces, *, seed: int = 0) -> FrontFace | 
 
 
 def _on(plane: FrontPlane, points: Points, normals: Points) -> Points:
-    """The points that look forwards and lie on a plane."""
+    """The points that face forwards and lie on a plane."""
     return points[(normals[:, 1] < -tuned(FrontsParams).looks) & plane.holds(points)]
 
 
 def _rectangle_corners(inliers: Points, rim: Points, normal: Vector3, offset: float) -> Points:
     """Corners, on the plane, of the smallest rectangle around the inliers.
 
-    Specks are trimmed first; the sides then go out to the plane's own vertices, which samples fall short of.
+    Specks are trimmed first; the sides then extend to the plane's own vertices, which samples do not quite reach.
     """
     params = tuned(Params)
     level = rotation_between(normal, _FORWARD)

@@ -1,8 +1,8 @@
-"""The paper's own corners and affine map (sections 4.8-4.9, eq. 15-16), for those who want to compare.
+"""The paper's own corners and affine map (sections 4.8-4.9, eq. 15-16), for comparison.
 
-What the paper leaves open is decided here: the factor that prefers the front goes from 1 at the back to 2 at the front.
-Eq. 15's four corners give eight equations for six unknowns, so the map is the least-squares one and its residual is what
-"exactly" leaves over (method.md rows 22-24). Nothing is mended: handle tips may be picked, shear is kept, depth is not fitted.
+Choices where the paper is open: the factor that prefers the front goes from 1 at the back to 2 at the front. Eq. 15's four
+corners give eight equations for six unknowns, so the map is the least-squares one and its residual is the deviation from
+"exactly" (method.md rows 22-24). Nothing is corrected: handle tips may be picked, shear is kept, depth is not fitted.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _QUADRANTS = ((1, 1), (-1, 1), (-1, -1), (1, -1))  # signs of x and z: top right
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PaperMap:
-    """m -> its (u, v) in the source's frame through A and t, its depth w kept, back out of the target's frame."""
+    """Affine map: (u, v) in the source's frame through A and t, depth w kept, expressed in the target's frame."""
 
     source_centre: Vector3
     source_axes: Matrix3  # rows: u, v, depth
@@ -48,7 +48,7 @@ def paper_corners(vertices: Points) -> Points | None:
 
 
 def fit_paper_map(source: Points, target: Points) -> PaperMap | None:
-    """Eq. 15 between two sets of four corners, ordered as `paper_corners`; None when either spans no plane."""
+    """Eq. 15 between two sets of four corners, ordered as `paper_corners`; None when either does not span a plane."""
     frames = _frame(source), _frame(target)
     if frames[0] is None or frames[1] is None:
         return None

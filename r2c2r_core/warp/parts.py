@@ -1,7 +1,7 @@
-"""A fitted mesh cut into the fronts that move, with their handles, and the hollow carcass that stays.
+"""Segmentation of a fitted mesh into the moving fronts, with their handles, and the hollow carcass.
 
-One closed mesh has no inside and no separate door (method.md row 25): the fronts are cut off where the primitive's are,
-the cuts are capped, and the carcass is hollowed like its panels, so that an opened door shows an inside.
+One closed mesh has no inside and no separate door (method.md row 25): the fronts are cut off where the primitive's are, the
+cuts are capped, and the carcass is hollowed like its panels, so that an opened door shows an interior.
 """
 
 from collections.abc import Sequence
@@ -17,21 +17,21 @@ from r2c2r_core.tuning import param, tuned
 from r2c2r_core.warp.solids import Paint, box_solid, joined, mesh_of, plain_box, solid_of
 
 _FAR_M = 10.0
-_TOUCH_M = 1e-4  # a board this near an outer face is at it
+_TOUCH_M = 1e-4  # a board this close to an outer face touches it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What is left free where a mesh is cut apart."""
+    """Tuned gaps between the parts of a mesh."""
 
-    beside_m: float = param(0.0015, "m", "between a moving front and what stays beside it")
-    behind_m: float = param(0.002, "m", "between a moving front and the carcass behind it")
-    before_m: float = param(0.001, "m", "before a front that others pass, within which its own surface may lie")
+    beside_m: float = param(0.0015, "m", "Gap between a moving front and its static neighbours")
+    behind_m: float = param(0.002, "m", "Gap between a moving front and the carcass behind it")
+    before_m: float = param(0.001, "m", "Thickness in front of a front that others pass, within which its own surface may lie")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Region:
-    """Where a moving front lies, in the object frame: open towards the outside of the object."""
+    """Box of a moving front in the object frame, open towards the outside of the object."""
 
     low: Vector3
     high: Vector3
@@ -63,20 +63,20 @@ def cut_apart(item: SceneObject, mesh: TexturedMesh, paint: Paint) -> dict[str, 
 
 
 def _shares_its_box(item: SceneObject) -> bool:
-    """Whether its front slides sideways: then others pass where its box is, before its body or beside it."""
+    """Whether its front slides sideways: then other leaves pass through its box, in front of its body or beside it."""
     return any(joint.type == "prismatic" and abs(float(joint.axis_object[1])) < 0.5 for joint in item.joints)
 
 
 def _body(item: SceneObject) -> tuple[Vector3, Vector3]:
-    """Corners of what may stay of the mesh, in the object frame."""
+    """Corners of the part of the mesh that may remain, in the object frame."""
     half = item.dimensions_m / 2
     return _range(item.links[0], item.links[0].boxes) if _shares_its_box(item) else (-half, half)
 
 
 def front_region(item: SceneObject, link: Link) -> Region:
-    """The box of the front boards, unbounded forwards (the handle) and where it reaches the object's own edge.
+    """Box of the front boards, unbounded forwards (the handle) and where it reaches the object's own edge.
 
-    A front that slides sideways ends where its handle does: another may pass before it.
+    A front that slides sideways ends where its handle does: another may pass in front of it.
     """
     low, high = front_range(link)
     half = item.dimensions_m / 2
@@ -88,12 +88,12 @@ def front_region(item: SceneObject, link: Link) -> Region:
 
 
 def front_range(link: Link) -> tuple[Vector3, Vector3]:
-    """Corners of a moving link's front boards together, in the object frame."""
+    """Joint corners of a moving link's front boards, in the object frame."""
     return _range(link, link.of_role("front"))
 
 
 def cavity(item: SceneObject) -> tuple[Vector3, Vector3]:
-    """The inside of the carcass, between its boards; empty (low > high) unless both sides, top, bottom and back have one."""
+    """Interior of the carcass between its boards; empty (low > high) unless both sides, top, bottom and back have one."""
     params = tuned(Params)
     base = item.links[0]
     first, last = _body(item)
@@ -113,21 +113,21 @@ def cavity(item: SceneObject) -> tuple[Vector3, Vector3]:
 
 
 def _range(link: Link, boxes: Sequence[Box]) -> tuple[Vector3, Vector3]:
-    """Corners of boxes together, in the object frame; a link's axes are the object's."""
+    """Joint corners of boxes in the object frame; a link's axes are the object's."""
     centres = link.object_from_link.apply(np.array([box.link_from_box.translation for box in boxes]))
     halves = np.array([box.size_m for box in boxes]) / 2
     return (centres - halves).min(axis=0), (centres + halves).max(axis=0)
 
 
 def _widened(region: Region) -> Region:
-    """The region a carcass must leave free: a little wider than the front, and deeper by the seat gap."""
+    """Region that a carcass must leave free: a little wider than the front, and deeper by the seat gap."""
     params = tuned(Params)
     beside = np.array([params.beside_m, 0.0, params.beside_m])
     return Region(low=region.low - beside, high=region.high + beside + np.array([0.0, params.behind_m, 0.0]))
 
 
 def _inner_boxes(item: SceneObject, link: Link, paint: Paint) -> list[TexturedMesh]:
-    """What no camera saw, as panels: a drawer's floor, sides and back; shelves and floors inside a carcass."""
+    """Unobserved parts as panels: a drawer's floor, sides and back; shelves and floors inside a carcass."""
     return [_placed(box, link, paint) for box in link.of_role("inner")]
 
 
@@ -138,7 +138,7 @@ def _placed(box: Box, link: Link, paint: Paint) -> TexturedMesh:
 
 
 def _cut_open(item: SceneObject, mesh: TexturedMesh, paint: Paint, fronts: dict[str, Region]) -> dict[str, TexturedMesh]:
-    """The same cuts on a surface that bounds no solid: cut open, and backed with the primitive's panels instead of capped."""
+    """The same parts of a surface that does not bound a solid, backed with the primitive's panels instead of capped."""
     visuals: dict[str, TexturedMesh] = {}
     for link in item.links[1:]:
         skin = _kept(mesh, fronts[link.name])
@@ -190,10 +190,10 @@ def _sliced(mesh: TexturedMesh, normal: Vector3, offset: float) -> TexturedMesh:
 
 
 def _thinner(box: Box) -> Box:
-    """The panel drawn in by a millimetre, so that it backs the skin without fighting it."""
+    """The panel shrunk by a millimetre, so that it backs the skin without z-fighting."""
     return replace(box, size_m=np.maximum(box.size_m - 0.002, 0.001))
 
 
 def outline(meshes: Sequence[TexturedMesh]) -> TexturedMesh:
-    """All fronts together, for measuring their corners."""
+    """All fronts as one mesh, for measuring their corners."""
     return joined(list(meshes))

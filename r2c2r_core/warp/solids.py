@@ -1,4 +1,4 @@
-"""Textured solids that can be cut: manifold3d carries uv along, so seams and pictures survive the cut."""
+"""Textured solids for Boolean cuts: manifold3d carries uv along, so seams and textures survive the cut."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -13,17 +13,17 @@ _STRIP_PX = 8
 
 
 class Paint(NamedTuple):
-    """A texture with a strip of plain colours added below, and where each colour is."""
+    """A texture with a strip of plain colours added below, and the uv of each colour."""
 
     texture: Image
-    inside_uv: np.ndarray  # (2,) of the inside of furniture
-    back_uv: np.ndarray  # (2,) of the back of a front
+    inside_uv: np.ndarray  # (2,) colour of the inside of furniture
+    back_uv: np.ndarray  # (2,) colour of the back of a front
 
 
 def with_plain_colours(
     mesh: TexturedMesh, inside: tuple[int, int, int], back: tuple[int, int, int]
 ) -> tuple[TexturedMesh, Paint]:
-    """The same mesh on a texture that also holds two plain colours, for faces that no camera saw."""
+    """The same mesh on a texture that also contains two plain colours, for unobserved faces."""
     height, width = mesh.texture.shape[:2]
     strip = np.zeros((_STRIP_PX, width, 3), np.uint8)
     strip[:, : width // 2], strip[:, width // 2 :] = inside, back
@@ -37,7 +37,7 @@ def with_plain_colours(
 
 
 def solid_of(vertices: Points, faces: Faces, uv: TextureCoords) -> Any | None:
-    """A manifold3d solid that carries uv; None when the surface does not bound one."""
+    """A manifold3d solid that carries uv; None when the surface does not bound a solid."""
     import manifold3d
 
     mesh = manifold3d.Mesh64(
@@ -53,7 +53,7 @@ def box_solid(low: Vector3, high: Vector3, uv: np.ndarray) -> Any:
     """A solid box of one plain colour."""
     vertices, faces = box_mesh(np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64))
     solid = solid_of(vertices, faces, np.tile(uv, (len(vertices), 1)))
-    assert solid is not None  # a box bounds itself
+    assert solid is not None  # a box is always a solid
     return solid
 
 
@@ -67,7 +67,7 @@ def mesh_of(solid: Any, texture: Image) -> TexturedMesh:
 
 
 def joined(meshes: Sequence[TexturedMesh]) -> TexturedMesh:
-    """Several meshes on one texture as one."""
+    """Several meshes with one texture joined into one."""
     offsets = np.cumsum([0] + [len(m.vertices) for m in meshes[:-1]])
     return TexturedMesh(
         vertices=np.concatenate([m.vertices for m in meshes]),

@@ -1,4 +1,4 @@
-"""Primitives dressed in the fitted meshes (paper sections 4.6-4.9)."""
+"""Warping: fitted meshes as visuals of the primitives (paper sections 4.6-4.9)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -49,7 +49,7 @@ def fit_meshes(
     *,
     progress: Progress = SILENT,
 ) -> ArticulatedScene:
-    """Every object with the visual of its mesh; where a mesh cannot be used the primitive stays, with a warning."""
+    """The scene with the visual of each object's mesh; where a mesh is unusable the primitive remains, with a warning."""
     placed = {p.object_name: (p, a) for p, a in zip(placements, assets, strict=True)}
     objects = []
     failures: dict[str, str] = {}
@@ -66,7 +66,7 @@ def fit_meshes(
 
 
 def fit_mesh(item: SceneObject, placement: Placement, asset: MeshAsset, config: WarpConfig) -> SceneObject:
-    """One object, dressed."""
+    """One object with the visual of its mesh."""
     vertices_world = item.final_from_placed.apply(placement.world_from_mesh.apply(asset.mesh.vertices))
     if item.movable or not item.joints:
         return _whole(item, vertices_world, asset.mesh, config)
@@ -98,7 +98,7 @@ def fit_mesh(item: SceneObject, placement: Placement, asset: MeshAsset, config: 
 
 
 def _warped(item: SceneObject, canonical: Points, faces: Faces, target: Points, config: WarpConfig) -> Points:
-    """Vertices in the object frame: the mesh's front upright on the primitive's, its handle in shape, its depth fitted."""
+    """Vertices in the object frame: the mesh's front upright on the primitive's, its handle rigid, its depth fitted."""
     tilted = find_front(canonical, faces, seed=config.seed)
     upright = canonical if tilted is None else canonical @ tilted.upright_from_mesh.T
     front = find_front(upright, faces, seed=config.seed)
@@ -120,7 +120,7 @@ def front_corners(item: SceneObject) -> Points:
 
 
 def _whole(item: SceneObject, vertices_world: Points, mesh: TexturedMesh, config: WarpConfig) -> SceneObject:
-    """A thing or a fixed box: one visual, its range brought onto the box."""
+    """A movable object or a fixed box: one visual, its range mapped onto the box."""
     if item.movable:
         vertices = item.world_from_object.inverse.apply(vertices_world)
     else:
@@ -140,7 +140,7 @@ def _map_to(front: FrontFace, vertices: Points, target: Points, depth_m: float) 
 
 
 def _believable(axis_map: AxisMap, config: WarpConfig) -> AxisMap:
-    """The map, if it stretches no more than a placement can be wrong by."""
+    """The map, if its stretch is within the error of a placement; raises StageError otherwise."""
     across, (least, most) = axis_map.scale[[0, 2]], config.front_scale
     if (across < least).any() or (across > most).any():
         raise StageError(f"its front would have to be stretched by {across[0]:.2f} x {across[1]:.2f}")
@@ -150,7 +150,7 @@ def _believable(axis_map: AxisMap, config: WarpConfig) -> AxisMap:
 
 
 def _corner_residual(item: SceneObject, visuals: dict[str, TexturedMesh], seed: int) -> float | None:
-    """Largest distance from the corners of the front boards to those found anew on the finished fronts."""
+    """Largest distance between the corners of the front boards and those detected on the finished fronts."""
     whole = outline([visuals[link.name] for link in item.links[1:]])
     found = find_front(whole.vertices, whole.faces, seed=seed)
     if found is None:
@@ -174,7 +174,7 @@ def _front_colour(mesh: TexturedMesh, warped: Points, item: SceneObject) -> tupl
     """Median texture colour of the front face."""
     near = np.abs(warped[:, 1] + item.dimensions_m[1] / 2) < 0.004
     uv = mesh.uv[near] if near.sum() > 3 else mesh.uv
-    # vertices lie on a chart's border: look at triangle centres
+    # vertices lie on a chart's border: sample triangle centres instead
     faces = mesh.faces[near[mesh.faces].all(axis=1)] if near.sum() > 3 else mesh.faces
     centres = mesh.uv[faces].mean(axis=1) if len(faces) else uv
     return _as_unit(np.median(sample_texture(mesh.texture, centres[None].astype(np.float32))[0], axis=0))
