@@ -1,4 +1,4 @@
-"""Boxes: the upright box of a shape, the smallest rectangle of flat points, corners, and how deep two boxes overlap."""
+"""Bounding boxes: upright box of a shape, smallest rectangle of planar points, corners, and penetration of boxes."""
 
 from typing import NamedTuple
 
@@ -35,9 +35,9 @@ class Boxes(NamedTuple):
 def upright_box(points: Points, normals: Points | None = None, *, trim: float = 0.0) -> UprightBox:
     """The upright box of smallest plan area (paper eq. 8-10 with gravity known: rotating calipers in plan, exact).
 
-    `trim` drops that fraction of the points at either end of each axis, so that a handle or a spike does not count.
-    With surface normals, the yaw of their right angles wins when its box is within 1 % of the smallest: it is two to
-    three times steadier on noisy meshes (stack.md section 5).
+    `trim` drops that fraction of the points at either end of each axis, so that a handle or a spike does not count. With
+    surface normals, the yaw of their right angles is used when its box is within 1 % of the smallest: it is two to three times
+    more stable on noisy meshes (stack.md section 5).
     """
     plan = points[:, :2]
     yaws = _hull_edge_yaws(plan)
@@ -57,7 +57,7 @@ def box_at_yaw(points: Points, yaw_rad: float, *, trim: float = 0.0) -> UprightB
 
 
 def right_angle_yaw(normals: Points) -> float:
-    """Yaw in [0, pi/2) about which horizontal normals repeat every quarter turn; each counts with its horizontal part."""
+    """Yaw in [0, pi/2) of the normals modulo quarter turns, weighted by their horizontal part."""
     angle, weight = np.arctan2(normals[:, 1], normals[:, 0]), np.hypot(normals[:, 0], normals[:, 1]) ** 2
     return float(np.arctan2((weight * np.sin(4 * angle)).sum(), (weight * np.cos(4 * angle)).sum()) / 4 % (np.pi / 2))
 
@@ -81,9 +81,9 @@ def box_corners(size_m: Vector3) -> Points:
 
 
 def box_penetration(a: Boxes, b: Boxes) -> np.ndarray:
-    """Depth (n,) by which pairs a[i], b[i] overlap (separating axes, Gottschalk 1996); negative where they are apart.
+    """Penetration depth (n,) of pairs a[i], b[i] (separating axes, Gottschalk 1996); negative for disjoint boxes.
 
-    Where negative, its size is the largest gap along one of the 15 axes: a lower bound of the distance.
+    A negative value is minus the largest gap along one of the 15 axes: a lower bound of the distance.
     """
     faces = np.concatenate([np.swapaxes(a.axes, 1, 2), np.swapaxes(b.axes, 1, 2)], axis=1)
     edges = np.cross(np.swapaxes(a.axes, 1, 2)[:, :, None], np.swapaxes(b.axes, 1, 2)[:, None]).reshape(-1, 9, 3)

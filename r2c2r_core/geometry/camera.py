@@ -30,7 +30,7 @@ class Intrinsics:
 
 
 def project(points_camera: PointField, camera: Intrinsics) -> PixelField:
-    """Pixel positions (..., 2) of camera-frame points (..., 3); inf or nonsense where z <= 0: check z yourself."""
+    """Pixel positions (..., 2) of camera-frame points (..., 3); invalid where z <= 0, which the caller must check."""
     z = points_camera[..., 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.stack(
@@ -76,7 +76,7 @@ def sample_nearest(image: np.ndarray, uv_px: Pixels) -> tuple[np.ndarray, np.nda
 
 
 def sample_through(image: np.ndarray, camera: Intrinsics, other: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
-    """What each pixel of `other`, a camera at the same place, sees in `camera`'s image: (h, w), and whether it lies inside."""
+    """Image of `camera` sampled at the pixels of `other`, a camera with the same pose: (h, w), and whether inside."""
     uv = project(pixel_rays(pixel_centres(other), other), camera)
     values, inside = sample_nearest(image, uv.reshape(-1, 2))
     return values.reshape(other.height, other.width), inside.reshape(other.height, other.width)

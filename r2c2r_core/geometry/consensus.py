@@ -1,10 +1,10 @@
-"""The similarity most correspondences agree with, found through ratios of lengths rather than random triples.
+"""Similarity transform by consensus of correspondences, from length ratios instead of random triples.
 
-A similarity multiplies every distance by one number. Among the pairs that one right correspondence forms with all others,
-those with other right ones therefore share a length ratio, and show as a peak in that correspondence's histogram of
-ratios; correspondences that are in one peak and agree with each other too are a clique, which fixes the transform. Nothing
-is drawn at random but the subsets that are tried before the whole, so the work grows with the square of the correspondences
-and hardly with the share of wrong ones (a random triple needs (1 - share)^-3 tries: 125 000 at 98 %).
+A similarity multiplies every distance by one number. Among the pairs that one inlier forms with all others, those with other
+inliers therefore share a length ratio, and form a peak in that correspondence's histogram of ratios; correspondences that are
+in one peak and mutually consistent form a clique, which determines the transform. Only the subsets that are tried before the
+whole set are random, so the cost grows with the square of the correspondences and hardly with the outlier ratio (a random
+triple needs (1 - ratio)^-3 tries: 125 000 at 98 %).
 """
 
 from dataclasses import dataclass
@@ -20,26 +20,26 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How far the search for the most agreeing correspondences goes."""
+    """Tuned parameters of the consensus search."""
 
     samples: tuple[int, int, int] = param(
-        (128, 420, 1400), "count", "correspondences looked at; more of them only where fewer do not suffice"
+        (128, 420, 1400),
+        "count",
+        "Sizes of the successive samples of correspondences; a larger one only where a smaller is insufficient",
     )
-    sure: int = param(
-        12, "count", "right correspondences a sample must hold for a larger agreement to be impossible to overlook in it"
-    )
-    batch: int = param(12, "count", "peaks looked at together", ge=1)
-    members: int = param(64, "count", "of a peak that are compared with each other", ge=4)
-    look: int = param(10, "count", "members that decide whether a peak is worth comparing all", ge=1)
-    peak: float = param(0.03, "log", "half width of a peak of scale, where lengths are known better than that")
+    sure: int = param(12, "count", "Number of inliers in a sample above which a larger consensus cannot be missed")
+    batch: int = param(12, "count", "Number of peaks processed together", ge=1)
+    members: int = param(64, "count", "Maximum number of correspondences of a peak that are compared with each other", ge=4)
+    look: int = param(10, "count", "Number of members that decide whether all members of a peak are compared", ge=1)
+    peak: float = param(0.03, "log", "Minimum half width of a peak of scale")
 
 
 class _Lengths(NamedTuple):
     """Ratios of all distances within a sample of k correspondences."""
 
-    log_ratio: np.ndarray  # (k, k) float32, target over source; inf where either is too short to tell
-    tolerance: np.ndarray  # (k, k) float32, three standard deviations of it
-    half_width: float  # of a peak
+    log_ratio: np.ndarray  # (k, k) float32, target over source; inf where either is too short
+    tolerance: np.ndarray  # (k, k) float32, three standard deviations of the log ratio
+    half_width: float  # half width of a peak
 
 
 def similarity_consensus(
@@ -52,12 +52,12 @@ def similarity_consensus(
     relative_threshold: float = np.inf,
     minimum_inliers: int = 4,
 ) -> SimilarityFit | None:
-    """The similarity most correspondences agree with, refitted on them; None when fewer than `minimum_inliers` do.
+    """The similarity with most inliers, refitted on them; None with fewer than `minimum_inliers`.
 
-    `threshold` is in target units, three standard deviations of the noise along an axis, one number or one a
-    correspondence (depth noise grows with distance). `relative_threshold` is a fraction of the scaled size of `source`:
-    with an absolute threshold alone a tiny scale maps everything beside one cluster and wins. Scale, rotation and
-    translation are solved together (method.md rows 3 and 5).
+    `threshold` is in target units, three standard deviations of the noise along an axis, one number or one per correspondence
+    (depth noise grows with distance). `relative_threshold` is a fraction of the scaled size of `source`: with an absolute
+    threshold alone a tiny scale maps everything next to one cluster and wins. Scale, rotation and translation are estimated
+    together (method.md rows 3 and 5).
     """
     params = tuned(Params)
     count = len(source)
@@ -91,7 +91,7 @@ def _cliques(
     *,
     patient: bool,
 ) -> list[np.ndarray]:
-    """Up to three different sets (k,) bool of a sample's correspondences that one similarity explains, largest first."""
+    """Up to three different sets (k,) bool of a sample's correspondences consistent with one similarity, largest first."""
     params = tuned(Params)
     lengths = _measure(source, target, limit)
     rows, log_scales = _peaks(lengths, scale_range)
@@ -126,7 +126,7 @@ def _different(sets: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def _measure(source: Points, target: Points, limit: np.ndarray) -> _Lengths:
-    """Length ratios of all pairs; one is known where both lengths are well above zero."""
+    """Length ratios of all pairs; valid where both lengths are well above zero."""
     of_source, of_target = (cdist(points, points).astype(np.float32) for points in (source, target))
     squared = (limit**2).astype(np.float32)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -139,7 +139,7 @@ def _measure(source: Points, target: Points, limit: np.ndarray) -> _Lengths:
 
 
 def _peaks(lengths: _Lengths, scale_range: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Correspondences and the log scales many of their pairs share, most surprising first: beyond what all rows have there."""
+    """Correspondences and the log scales that many of their pairs share, by decreasing excess over the mean histogram."""
     count, width = len(lengths.log_ratio), lengths.half_width
     first, end = np.log(scale_range[0]) - width, np.log(scale_range[1]) + width
     known = (lengths.log_ratio > first) & (lengths.log_ratio < end)
@@ -162,19 +162,19 @@ def _peaks(lengths: _Lengths, scale_range: tuple[float, float]) -> tuple[np.ndar
 
 
 def _promising(lengths: _Lengths, rows: np.ndarray, log_scales: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The peaks of which some member agrees with many others, by a look at few members; all, where there are few."""
+    """Peaks with a member that agrees with many others, tested on few members; all peaks, where there are few."""
     params = tuned(Params)
     if len(rows) <= params.batch:
         return rows, log_scales
     members, inside = _members(lengths, rows, log_scales)
-    looked_at = slice(1, 1 + params.look)  # the first is the peak's own, which all others agree with
+    looked_at = slice(1, 1 + params.look)  # the first is the peak's own, which agrees with all others
     together = _consistent(lengths, log_scales, members[:, looked_at], members) & inside[:, looked_at, None] & inside[:, None]
     best = np.argsort(-together.sum(axis=2).max(axis=1), kind="stable")[: 2 * params.batch]
     return rows[best], log_scales[best]
 
 
 def _agreeing(lengths: _Lengths, rows: np.ndarray, log_scales: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For each peak (b,), the correspondences in it (b, m) and which of them (b, m) agree with most of the others there."""
+    """For each peak (b,), its correspondences (b, m) and a mask (b, m) of those that agree with most of the others."""
     members, kept = _members(lengths, rows, log_scales)
     together = _consistent(lengths, log_scales, members, members)
     for share in (0.5, 0.7):
@@ -184,7 +184,7 @@ def _agreeing(lengths: _Lengths, rows: np.ndarray, log_scales: np.ndarray) -> tu
 
 
 def _members(lengths: _Lengths, rows: np.ndarray, log_scales: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The correspondences (b, m) nearest to each peak, nearest first, and which of them (b, m) are in it."""
+    """The correspondences (b, m) nearest to each peak, nearest first, and a mask (b, m) of those in it."""
     slack = lengths.tolerance[rows] + 0.5 * lengths.half_width
     with np.errstate(invalid="ignore"):
         off = np.abs(lengths.log_ratio[rows] - log_scales[:, None].astype(np.float32)) / slack
@@ -197,7 +197,7 @@ def _members(lengths: _Lengths, rows: np.ndarray, log_scales: np.ndarray) -> tup
 
 
 def _consistent(lengths: _Lengths, log_scales: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Which pairs (b, m, n) of correspondences `first` (b, m) and `second` (b, n) have the length ratio of their peak."""
+    """Mask of pairs (b, m, n) of correspondences `first` (b, m) and `second` (b, n) with the length ratio of their peak."""
     pair = first[:, :, None] * len(lengths.log_ratio) + second[:, None, :]
     off = np.abs(lengths.log_ratio.ravel()[pair] - log_scales[:, None, None].astype(np.float32))
     return np.asarray(off < 0.8 * lengths.tolerance.ravel()[pair] + 0.5 * lengths.half_width)

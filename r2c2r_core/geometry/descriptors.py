@@ -1,13 +1,13 @@
-"""Which descriptors of two images belong together."""
+"""Matching of image descriptors by mutual nearest neighbours and ratio test."""
 
 import numpy as np
 
 
 def mutual_pairs(first: np.ndarray, second: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of unit descriptors `first` (n, d) and `second` (m, d) that are each other's best, by rising row of the first.
+    """Mutual nearest neighbours of unit descriptors `first` (n, d) and `second` (m, d), by rising row of the first.
 
-    The best must be clearly better than the second best: its distance below `ratio` times that one's (Lowe 2004). With
-    fewer than two of either nothing can be clear, and the answer is empty.
+    The best must be clearly better than the second best: its distance below `ratio` times that one's (Lowe 2004). With fewer
+    than two of either the ratio is undefined, and the result is empty.
     """
     if min(len(first), len(second)) < 2:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)

@@ -1,4 +1,4 @@
-"""The smallest box of any orientation: by the faces of the hull, and as the paper searches for it."""
+"""Smallest bounding box of any orientation: by the hull's faces, and by the paper's Powell search."""
 
 from typing import Any, NamedTuple
 
@@ -8,7 +8,7 @@ from r2c2r_core.arrays import Matrix3, Points, Vector3
 from r2c2r_core.geometry.boxes import smallest_rectangle
 from r2c2r_core.geometry.transforms import Rigid3, nearest_rotation
 
-_SAME_NORMAL = 1e-4  # of unit vectors: closer ones are one face in triangles
+_SAME_NORMAL = 1e-4  # of unit vectors: closer normals belong to triangles of one face
 
 
 class FreeBox(NamedTuple):
@@ -19,14 +19,14 @@ class FreeBox(NamedTuple):
 
     @property
     def volume_m3(self) -> float:
-        """What it encloses."""
+        """Enclosed volume."""
         return float(np.prod(self.size_m))
 
 
 def smallest_box(points: Points) -> FreeBox:
     """The box of least volume with one face on a face of the hull: exact in that face's plane (Freeman & Shapira 1975).
 
-    Takes the place of paper eq. 8-9, whose search sticks (method.md row 17). Raises ValueError for points in one plane.
+    Replaces paper eq. 8-9, whose search gets stuck (method.md row 17). Raises ValueError for coplanar points.
     """
     hull = _hull(points)
     corners = points[hull.vertices]
@@ -66,7 +66,7 @@ def _hull(points: Points) -> Any:
 
 
 def _box_on(corners: Points, normal: Vector3) -> FreeBox:
-    """The least box with a face across `normal`."""
+    """The smallest box with a face perpendicular to `normal`."""
     u = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     u /= np.linalg.norm(u)
     plane = np.column_stack([u, np.cross(normal, u)])
@@ -80,6 +80,6 @@ def _box_along(points: Points, rotation: Matrix3) -> FreeBox:
 
 
 def _distinct(normals: np.ndarray) -> np.ndarray:
-    """Directions, opposite ones and the triangles of one face counted once."""
+    """Unique directions; opposite ones and the triangles of one face count once."""
     largest = np.take_along_axis(normals, np.abs(normals).argmax(axis=1)[:, None], axis=1)
     return np.asarray(np.unique(np.round(normals * np.sign(largest) / _SAME_NORMAL) * _SAME_NORMAL, axis=0))

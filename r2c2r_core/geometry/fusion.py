@@ -63,7 +63,7 @@ def fuse_depth(
 
 
 def _in_canonical_order(surface: Surface) -> Surface:
-    """The same surface with vertices and faces in an order of their own; Open3D's hash map returns another one each time."""
+    """The same surface with vertices and faces in canonical order; Open3D's hash map returns another order each time."""
     order = np.lexsort(surface.vertices.T)
     place = np.zeros(len(order), dtype=np.int64)
     place[order] = np.arange(len(order))

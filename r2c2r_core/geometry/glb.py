@@ -1,4 +1,4 @@
-"""Binary glTF of one textured mesh."""
+"""Binary glTF export of one textured mesh."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from r2c2r_core.arrays import Faces, Points, Texture, TextureCoords
 
 
 def glb_bytes(vertices: Points, faces: Faces, uv: TextureCoords, texture: Texture) -> bytes:
-    """The mesh as GLB, in its own frame and unit as it is: nothing is turned to glTF's +Y up."""
+    """The mesh as GLB, in its own frame and unit: it is not rotated to glTF's +Y up."""
     import trimesh
     from PIL import Image as Pictures
     from trimesh.visual.material import PBRMaterial

@@ -1,4 +1,4 @@
-"""The hollow of a mug or a bowl: where a liquid would stay."""
+"""Cavity of a mug or a bowl: the space in which a liquid would stay."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -11,24 +11,26 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What counts as the hollow of a vessel."""
+    """Tuned parameters of vessel cavities."""
 
-    steps: int = param(24, "count", "of the grid along the longest side", ge=4)
-    round: int = param(8, "count", "horizontal directions looked into from a point", ge=3)
-    least_share: float = param(0.03, "share", "of the bounding box: a smaller hollow is a dent")
+    steps: int = param(24, "count", "Number of grid cells along the longest side", ge=4)
+    round: int = param(8, "count", "Number of horizontal rays cast from a point", ge=3)
+    least_share: float = param(
+        0.03, "share", "Minimum fraction of the bounding box that a cavity fills: a smaller one is a dent"
+    )
 
 
 class Hollow(NamedTuple):
-    """What is free inside a thing that opens upwards."""
+    """Free space inside an object that opens upwards."""
 
     points: Points  # (n, 3), of a grid
-    floor_z: float  # of the solid below, where it is low: a quarter of it lies lower
+    floor_z: float  # lower quartile of the solid's height below the cavity
 
 
 def find_hollow(vertices: Points, faces: Faces) -> Hollow | None:
-    """The hollow of a closed mesh, +Z up; None where it has none, or only a dent.
+    """The cavity of a closed mesh, +Z up; None without one, or with only a dent.
 
-    A point belongs to the hollow when it lies outside the solid, open upwards, with solid below it and all round it.
+    A point belongs to the cavity when it lies outside the solid, open upwards, with solid below it and all around it.
     """
     params = tuned(Params)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
@@ -61,7 +63,7 @@ def _castable(vertices: Points, faces: Faces) -> Any:
 
 
 def _distances(surface: Any, points: Points, direction: np.ndarray) -> np.ndarray:
-    """How far the surface is from each point; inf where a ray misses it, as none upwards from inside the solid does."""
+    """Ray distance from each point to the surface; inf without a hit (never upwards from inside the solid)."""
     import open3d as o3d
 
     if not len(points):

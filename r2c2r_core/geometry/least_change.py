@@ -1,4 +1,4 @@
-"""The smallest change that satisfies linear constraints."""
+"""Least distance programming: the smallest change that satisfies linear constraints."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ def least_change(equal: np.ndarray, equal_to: np.ndarray, at_least: np.ndarray, 
     """The shortest y with `equal @ y = equal_to` and `at_least @ y >= bound` (n unknowns; (k, n), (k,), (m, n), (m,)).
 
     Least distance programming by non-negative least squares (Lawson & Hanson 1974, ch. 23), in the null space of the
-    equalities; where these contradict each other they hold in least squares. Raises ValueError when the bounds leave nothing.
+    equalities; inconsistent equalities are satisfied in least squares. Raises ValueError for infeasible bounds.
     """
     from scipy.optimize import nnls
 
@@ -20,7 +20,7 @@ def least_change(equal: np.ndarray, equal_to: np.ndarray, at_least: np.ndarray, 
     rows, needed = rows[used] / lengths[used, None], needed[used] / lengths[used]  # distances of planes
     if not (needed > 0).any():
         return shortest
-    scale = float(needed.max())  # the change is at least this long: solved for in these units, or rounding wins
+    scale = float(needed.max())  # the change is at least this long: solved in these units, or rounding dominates
     stacked = np.vstack([rows.T, needed / scale])
     target = np.append(np.zeros(rows.shape[1]), 1.0)
     multipliers, length = nnls(stacked, target, maxiter=30 * stacked.shape[1])
@@ -31,7 +31,7 @@ def least_change(equal: np.ndarray, equal_to: np.ndarray, at_least: np.ndarray, 
 
 
 def _solved(equal: np.ndarray, equal_to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The shortest solution of equalities, and an orthonormal basis (n, f) of what they leave free."""
+    """The shortest solution of equalities, and an orthonormal basis (n, f) of their null space."""
     if len(equal) == 0:
         return np.zeros(equal.shape[1]), np.eye(equal.shape[1])
     u, scales, vt = np.linalg.svd(equal)

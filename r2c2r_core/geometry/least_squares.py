@@ -45,7 +45,7 @@ class Normal:
 
     @staticmethod
     def of(jacobian: np.ndarray, residual: np.ndarray, weight: np.ndarray) -> "Normal":
-        """Of residuals (n,), their derivatives (n, k) and weights (n,), which are inverse variances."""
+        """Normal equations of residuals (n,), their derivatives (n, k) and weights (n,), which are inverse variances."""
         weighted = jacobian * weight[:, None]
         return Normal(weighted.T @ jacobian, -weighted.T @ residual)
 

@@ -1,4 +1,4 @@
-"""Pictures brought to one exposure and one white."""
+"""Exposure and white balance: images brought to one common gain."""
 
 import cv2
 import numpy as np
@@ -6,16 +6,16 @@ import numpy as np
 from r2c2r_core.arrays import Image
 
 Gain = tuple[float, float, float]
-"""Factors of red, green and blue, of the stored values."""
+"""Factors on the stored values of red, green and blue."""
 
 NO_GAIN: Gain = (1.0, 1.0, 1.0)
 
 
-_CLIPS_FROM = 200  # of 255: above, a channel may be clipped, and what it lacks is not known
+_CLIPS_FROM = 200  # of 255: above, a channel may be clipped, and the true value is unknown
 
 
 def balanced(rgb: Image, gain: Gain) -> Image:
-    """The picture times its gain; towards white, which is white under any exposure, the gain fades out."""
+    """The image times its gain; the gain fades out towards white, which is white under any exposure."""
     if gain == NO_GAIN:
         return rgb
     given = np.arange(256, dtype=np.float64)[:, None]

@@ -1,4 +1,4 @@
-"""Masks: packing, overlap."""
+"""Binary masks: packing and overlap."""
 
 import zlib
 from dataclasses import dataclass

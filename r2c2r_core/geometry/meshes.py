@@ -1,7 +1,7 @@
-"""Closed triangle meshes: boxes, checks, simplification, measures.
+"""Closed triangle meshes: boxes, checks, simplification, measurements.
 
-A mesh is (vertices, faces). Skins of a textured mesh repeat vertices at seams, so the checks first join vertices that lie at
-exactly the same place.
+A mesh is (vertices, faces). Skins of a textured mesh repeat vertices at seams, so the checks first join vertices at exactly the
+same position.
 """
 
 from collections.abc import Sequence
@@ -25,12 +25,12 @@ _BOX_FACES = np.concatenate([_BOX_QUADS[:, [0, 1, 2]], _BOX_QUADS[:, [0, 2, 3]]]
 
 
 def box_mesh(low: Vector3, high: Vector3) -> Surface:
-    """The closed, outward surface of an axis-aligned box."""
+    """Closed, outward surface of an axis-aligned box."""
     return low + _BOX_CORNERS * (high - low), _BOX_FACES.copy()
 
 
 def join_vertices(vertices: Points, faces: Faces) -> Surface:
-    """The same surface with vertices at exactly the same place joined, and faces that collapse dropped."""
+    """The same surface with coincident vertices joined, and degenerate faces dropped."""
     unique, inverse = np.unique(vertices, axis=0, return_inverse=True)
     joined = inverse.reshape(-1)[faces]
     keep = (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])
@@ -38,7 +38,7 @@ def join_vertices(vertices: Points, faces: Faces) -> Surface:
 
 
 def is_watertight(vertices: Points, faces: Faces) -> bool:
-    """Whether every directed edge is met by exactly one edge the other way: closed and consistently wound."""
+    """Whether every directed edge is matched by exactly one opposite edge: closed and consistently wound."""
     if len(faces) == 0:
         return False
     _, joined = join_vertices(vertices, faces)
@@ -65,7 +65,7 @@ def volume(vertices: Points, faces: Faces) -> float:
 
 
 def unite(parts: Sequence[Surface], removed: Sequence[Surface] = ()) -> Surface:
-    """The boundary of the union of closed meshes, less the closed meshes `removed`."""
+    """Boundary of the union of closed meshes, minus the closed meshes `removed`."""
     import manifold3d
 
     solid = manifold3d.Manifold.batch_boolean([_solid(*part) for part in parts], manifold3d.OpType.Add)
@@ -76,7 +76,7 @@ def unite(parts: Sequence[Surface], removed: Sequence[Surface] = ()) -> Surface:
 
 
 def simplify(vertices: Points, faces: Faces, tolerance: float, max_faces: int) -> Surface:
-    """A closed mesh with fewer faces, still closed and manifold: `max_faces` or, on a rough surface, as few as could be had.
+    """A closed mesh with fewer faces, still closed and manifold: `max_faces` or, on a rough surface, the fewest possible.
 
     Raises ValueError when the mesh is not the boundary of a solid.
     """
@@ -94,7 +94,7 @@ def simplify(vertices: Points, faces: Faces, tolerance: float, max_faces: int) -
 
 
 def _collapsed(vertices: Points, faces: Faces, max_faces: int) -> Surface:
-    """Quadric edge collapse, which may pinch a thin part shut: then less of it, or none."""
+    """Quadric edge collapse; reduced, or skipped, where it would pinch off a thin part."""
     import fast_simplification
 
     for count in (max_faces, 2 * max_faces):
@@ -110,7 +110,7 @@ def _collapsed(vertices: Points, faces: Faces, max_faces: int) -> Surface:
 
 
 def largest_component(vertices: Points, faces: Faces) -> Surface:
-    """The connected piece with the largest surface; connection is by shared vertices."""
+    """The connected component with the largest surface; connection is by shared vertices."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -125,7 +125,7 @@ def largest_component(vertices: Points, faces: Faces) -> Surface:
 
 
 def compact(vertices: Points, faces: Faces) -> Surface:
-    """The same faces without the vertices that none of them uses."""
+    """The same faces without unused vertices."""
     used, inverse = np.unique(faces, return_inverse=True)
     return vertices[used], inverse.reshape(faces.shape)
 
@@ -151,7 +151,7 @@ def vertex_normals(vertices: Points, faces: Faces) -> Points:
 
 
 def sample_surface(vertices: Points, faces: Faces, count: int, rng: np.random.Generator) -> tuple[AnyPoints, np.ndarray]:
-    """`count` points spread evenly over the area, and the face each lies on."""
+    """`count` points distributed uniformly over the area, and the face each lies on."""
     areas = face_areas(vertices, faces)
     chosen = rng.choice(len(faces), count, p=areas / areas.sum())
     a, b = rng.random((2, count))
@@ -185,8 +185,8 @@ def closest_on_mesh(points: AnyPoints, vertices: Points, faces: Faces) -> tuple[
 def oriented_extents(vertices: Points) -> Vector3:
     """Side lengths of the smallest box around the vertices, longest first; independent of the mesh's rotation.
 
-    Only the vertices furthest out in 500 directions are searched: exact for boxes, within 1 % for round things, and the
-    search over a fine sphere's thousands of hull faces would take half a minute.
+    Only the extreme vertices in 500 directions are searched: exact for boxes, within 1 % for round objects; the search over a
+    fine sphere's thousands of hull faces would take half a minute.
     """
     from trimesh.bounds import oriented_bounds
 
@@ -229,9 +229,9 @@ def _mesh_of(solid: Any) -> Surface:
 
 
 def _parted(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
-    """Vertices that merely touch drawn apart, each into its own body by a hundred-thousandth of the mesh's size.
+    """The mesh with merely touching vertices separated by a hundred-thousandth of its size, each into its own body.
 
-    The kernel keeps them as two vertices at one place; a reader that joins by place would find an edge with four faces.
+    The kernel keeps them as two vertices at one position; a reader that joins by position would find an edge with four faces.
     """
     _, inverse, counts = np.unique(vertices, axis=0, return_inverse=True, return_counts=True)
     touching = counts[inverse.reshape(-1)] > 1

@@ -1,7 +1,7 @@
-"""Colour, depth and ids of textured triangles on the CPU, with OpenCV 5's rasteriser (no GL).
+"""CPU rasterisation of textured triangles with OpenCV 5 (no GL): colour, depth and ids.
 
-Depth equals Embree's to 1.5e-5 m at the 99th percentile; 8 ms for 20k faces at 640x480. The rasteriser smears triangles
-that cross the near plane: those are dropped, so split room-sized triangles to 0.3 m first (`subdivide_long_edges`).
+Depth equals Embree's to 1.5e-5 m at the 99th percentile; 8 ms for 20k faces at 640x480. The rasteriser smears triangles that
+cross the near plane: those are dropped, so split room-sized triangles to 0.3 m first (`subdivide_long_edges`).
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from r2c2r_core.arrays import DepthMetres, Faces, Points, Texture, TextureCoords
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 
-# What is drawn has sizes of its own: `h`, `w`, `n`, `m` would tie it to the texture or mesh it is drawn from.
+# The output has sizes of its own: `h`, `w`, `n`, `m` would tie it to the texture or mesh it is drawn from.
 AnyImage = UInt8[np.ndarray, "_ _ 3"]
 AnyDepth = Float[np.ndarray, "_ _"]
 AnyPoints = Float[np.ndarray, "_ 3"]
@@ -26,7 +26,7 @@ _NEAR_M, _FAR_M = 0.02, 20.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Raster:
-    """What the camera sees: z-depth (0 = nothing) and three interpolated attributes per pixel."""
+    """Rendered z-depth (0 = nothing) and three interpolated attributes per pixel."""
 
     depth_m: DepthMetres
     attributes: np.ndarray  # (h, w, 3) float32
@@ -41,7 +41,7 @@ def rasterize(
     canvas_w = width + int(np.ceil(abs(2 * camera.cx - width)))
     canvas_h = height + int(np.ceil(abs(2 * camera.cy - height)))
     left, top = round(canvas_w / 2 - camera.cx), round(canvas_h / 2 - camera.cy)
-    fraction_px = (left + camera.cx - canvas_w / 2, top + camera.cy - canvas_h / 2)  # what whole pixels cannot say
+    fraction_px = (left + camera.cx - canvas_w / 2, top + camera.cy - canvas_h / 2)  # sub-pixel remainder
     vertices = np.ascontiguousarray(vertices_world, dtype=np.float32)
     world_to_camera = camera_from_world.matrix
     z = vertices @ world_to_camera[2, :3].astype(np.float32) + np.float32(world_to_camera[2, 3])
@@ -103,7 +103,7 @@ def subdivide_long_edges(
 
 
 def _before(faces: Faces, is_before: np.ndarray) -> AnyFaces:
-    """The faces of which every vertex is."""
+    """The faces whose vertices all satisfy `is_before`."""
     if is_before.all():
         return faces
     return faces[is_before[faces[:, 0]] & is_before[faces[:, 1]] & is_before[faces[:, 2]]]

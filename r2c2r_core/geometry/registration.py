@@ -1,4 +1,4 @@
-"""Similarity transforms between point sets: closed form, and refitted; against outliers: consensus.py."""
+"""Least-squares similarity between point sets: closed form and refitted; with outliers see consensus.py."""
 
 from typing import NamedTuple
 
@@ -9,22 +9,22 @@ from r2c2r_core.geometry.transforms import Similarity3
 
 
 class DegenerateFitError(ValueError):
-    """The points lie on a line or coincide: they do not fix a rotation."""
+    """Degenerate point set, collinear or coincident, which does not determine a rotation."""
 
 
 class SimilarityFit(NamedTuple):
-    """A transform and the correspondences that agree with it."""
+    """A transform and its inlier correspondences."""
 
     target_from_source: Similarity3
     inliers: np.ndarray  # (n,) bool
 
 
 def umeyama(source: Points, target: Points, *, scale: float | None = None) -> Similarity3:
-    """Similarity taking `source` onto `target` in least squares; never a reflection (Umeyama 1991).
+    """Least-squares similarity from `source` to `target`; never a reflection (Umeyama 1991).
 
-    Replaces the paper's eq. 3-6: eq. 4 accumulates target @ source.T, for which eq. 5 as printed (V U^T) is the
-    inverse, and neither carries the sign of the determinant, without which half of all flat fronts come out mirrored.
-    `scale` freezes the scale. Raises DegenerateFitError when the points fix no rotation.
+    Replaces the paper's eq. 3-6: eq. 4 accumulates target @ source.T, for which eq. 5 as printed (V U^T) is the inverse, and
+    neither carries the sign of the determinant, without which half of all flat fronts come out mirrored. `scale` fixes the
+    scale. Raises DegenerateFitError when the points do not determine a rotation.
     """
     if len(source) < 3:
         raise DegenerateFitError(f"{len(source)} correspondences, 3 needed")
@@ -59,7 +59,7 @@ def umeyama_batch(source: np.ndarray, target: np.ndarray, weights: np.ndarray | 
 def refit(
     source: Points, target: Points, inliers: np.ndarray, limit: np.ndarray, relative_limit: float, minimum_inliers: int
 ) -> SimilarityFit | None:
-    """Alternate between fitting the inliers and choosing them, five times; None when they dwindle or line up."""
+    """Alternation between fitting the inliers and selecting them, five times; None when they are too few or collinear."""
     fit: Similarity3 | None = None
     for _ in range(5):
         if np.count_nonzero(inliers) < minimum_inliers:

@@ -1,4 +1,4 @@
-"""Colours at a list of places in an image: OpenCV's sampler, which wants pictures of places."""
+"""Bilinear image sampling at a list of positions with OpenCV, whose sampler requires 2D position maps."""
 
 import cv2
 import numpy as np

@@ -1,4 +1,4 @@
-"""The frames of r2c2r, and the transforms between them.
+"""Coordinate frames of r2c2r, and the transforms between them.
 
 | frame   | definition |
 |---------|------------|
@@ -42,7 +42,7 @@ class Rigid3:
 
     @property
     def inverse(self) -> "Rigid3":
-        """The transform the other way round."""
+        """Inverse transform."""
         return Rigid3(self.rotation.T, -self.rotation.T @ self.translation)
 
     @overload
@@ -87,7 +87,7 @@ class Similarity3:
 
     @property
     def inverse(self) -> "Similarity3":
-        """The transform the other way round."""
+        """Inverse transform."""
         rotation = self.rotation.T
         return Similarity3(1.0 / self.scale, rotation, -(rotation @ self.translation) / self.scale)
 
@@ -118,13 +118,13 @@ def rotation_about_z(angle_rad: float) -> Matrix3:
 
 
 def rotation_between(source: Vector3, target: Vector3) -> Matrix3:
-    """The smallest rotation that turns direction `source` onto direction `target`; of opposites, one of the half turns."""
+    """The smallest rotation from direction `source` to direction `target`; for opposite ones, one of the half turns."""
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
     axis, cosine = np.cross(a, b), float(a @ b)
     sine = float(np.linalg.norm(axis))
     if sine < _PARALLEL:  # equal or opposite: any perpendicular axis serves
         axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
-    if cosine < 0:  # near opposites a cross product loses its direction: half a turn first, and the small rest
+    if cosine < 0:  # near opposites the cross product is ill-conditioned: half a turn first, then the small remainder
         axis = axis - float(axis @ a) * a
         half_turn = 2.0 * np.outer(axis, axis) / float(axis @ axis) - np.eye(3)
         return np.asarray(rotation_between(-a, b) @ half_turn)

@@ -1,7 +1,7 @@
-"""Which frames show an object well (paper 4.2): the best of each interval of the recording, spread over viewing angles.
+"""View selection for an object (paper 4.2): the best frame of each interval of the recording, spread over viewing angles.
 
-The paper takes the best frame of 20 intervals. Intervals alone repeat a view where the person lingers (method.md row 14),
-so the winners of the intervals are candidates, and each next one taken is the best that also looks from somewhere new.
+The paper takes the best frame of 20 intervals. Intervals alone repeat a view where the person lingers (method.md row 14), so
+the best frames of the intervals are candidates, and each further one is the best that also adds a new direction.
 """
 
 from dataclasses import dataclass
@@ -16,27 +16,33 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which views of an object are worth having."""
+    """Tuned parameters of view selection."""
 
     intervals: int = param(
         20,
         "count",
-        "of the recording, of which each gives its best frame",
-        source="the paper's 20 (4.2), and at least two for every view asked for",
+        "Number of intervals of the recording, each of which contributes its best frame",
+        source="the paper's 20 (4.2), and at least two for every requested view",
         ge=1,
     )
-    border_px: int = param(2, "px", "to the image's border: a mask that comes nearer is cut off")
-    full_turn_rad: float = param(1.0, "rad", "between two views that share nothing worth having both for", gt=0)
-    same_place: float = param(0.02, "ratio", "worth of a view from where another one stands, beside one from a full turn away")
-    stands_out_m: float = param(
-        0.06, "m", "before a front, from where what stands out is more than a handle", source="handles stand out by up to 5 cm"
+    border_px: int = param(2, "px", "Distance to the image's border below which a mask counts as cropped")
+    full_turn_rad: float = param(
+        1.0, "rad", "Angle between two viewing directions above which both views are fully independent", gt=0
     )
-    stands_out_share: float = param(0.2, "share", "of the mask's points that stand out so, where something is open")
+    same_place: float = param(
+        0.02, "ratio", "Gain of a view from the direction of another one, relative to one at a fully independent angle"
+    )
+    stands_out_m: float = param(
+        0.06, "m", "Protrusion in front of a front above which it is more than a handle", source="handles protrude up to 5 cm"
+    )
+    stands_out_share: float = param(
+        0.2, "share", "Minimum fraction of the mask's points that protrude by stands_out_m for an open front"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MaskView:
-    """What is needed to judge one frame's view of an object."""
+    """Data for scoring one frame's view of an object."""
 
     frame_index: int
     mask: PackedMask
@@ -46,7 +52,7 @@ class MaskView:
 
 
 def choose_views(views: list[MaskView], count: int) -> list[MaskView]:
-    """Up to `count` views, in the order taken: the best one, then always the best that looks from somewhere new."""
+    """Up to `count` views by greedy selection: the best one, then always the best that adds a new direction."""
     params = tuned(Params)
     seen = sorted((view for view in views if view.mask.area_px > 0), key=lambda view: view.frame_index)
     if not seen:
@@ -67,10 +73,10 @@ def choose_views(views: list[MaskView], count: int) -> list[MaskView]:
 
 
 def view_scores(views: list[MaskView]) -> np.ndarray:
-    """How well each view shows the object beside the others, 0..1: large, whole, central, sharp, trusted."""
+    """Relative score of each view of the object, 0..1: large, complete, central, sharp, confident."""
     area = np.array([view.mask.area_px for view in views], dtype=np.float64)
     sharpness = np.array([view.sharpness for view in views])
-    sharp = np.searchsorted(np.sort(sharpness), sharpness) / max(len(views) - 1, 1)  # its rank: equals are equal
+    sharp = np.searchsorted(np.sort(sharpness), sharpness) / max(len(views) - 1, 1)  # rank: ties get equal values
     whole = np.array([0.4 if is_cropped(view.mask) else 1.0 for view in views])
     central = np.array([1 - 0.3 * _off_centre(view.mask) for view in views])
     trusted = 0.25 + 0.75 * np.array([view.confidence for view in views])
@@ -86,22 +92,22 @@ def is_cropped(mask: PackedMask) -> bool:
 
 
 def stands_open(outward_m: np.ndarray) -> bool:
-    """Whether points of a front, by how far they lie in front of where it was measured, show it pulled or swung open.
+    """Whether points of a front, given their distance in front of its measured plane, show it open.
 
-    Only what stands out counts: seen from the side, a box shows points behind its front.
+    Only protruding points count: seen from the side, a box shows points behind its front.
     """
     params = tuned(Params)
     return bool(len(outward_m) and np.quantile(outward_m, 1 - params.stands_out_share) > params.stands_out_m)
 
 
 def _interval_winners(score: np.ndarray, intervals: int) -> np.ndarray:
-    """Position of the best of each interval; the earliest of equals."""
+    """Index of the best view of each interval; the earliest in a tie."""
     edges = np.linspace(0, len(score), min(intervals, len(score)) + 1).round().astype(int)
     return np.array([low + int(np.argmax(score[low:high])) for low, high in pairwise(edges)])
 
 
 def _off_centre(mask: PackedMask) -> float:
-    """Distance of the mask's middle from the image's, as a share of half the image, at most 1."""
+    """Distance of the mask's centre from the image's, relative to half the image, at most 1."""
     x = (mask.left + mask.box_width / 2) / (mask.width / 2) - 1
     y = (mask.top + mask.box_height / 2) / (mask.height / 2) - 1
     return min(1.0, float(np.hypot(x, y)))

@@ -1,4 +1,4 @@
-"""What a depth image says about points whose place is known: the one place where a depth is looked up by projection."""
+"""Visibility tests of known points against depth images, with the depth noise model."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,32 +15,32 @@ Lengths = np.ndarray | np.floating | float  # metres, one or an array of them
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a depth image says of a point."""
+    """Tuned parameters of visibility tests."""
 
     sure: float = param(
         3.0,
         "σ",
-        "of the depth's noise, within which two depths agree",
+        "Number of standard deviations of depth noise within which two depths agree",
         source="of normal noise 0.1 % lies further out on one side",
     )
     nearest_m: float = param(
         0.1,
         "m",
-        "least distance from a camera at which a point is looked up",
-        source="no phone's depth camera measures nearer (ARKit LiDAR and Kinect: 0.2 to 0.4 m)",
+        "Minimum distance from a camera at which a point is looked up",
+        source="no phone's depth camera measures closer (ARKit LiDAR and Kinect: 0.2 to 0.4 m)",
     )
 
 
 class Sighting(NamedTuple):
-    """Points as one camera sees them."""
+    """Projection of points into one camera with the measured depth."""
 
-    z_m: np.ndarray  # (n,) along the optical axis
+    z_m: np.ndarray  # (n,) depth of the points along the optical axis
     seen_m: np.ndarray  # (n,) depth measured in their pixels; 0 where unknown, outside the image or too near to be seen
-    inside: np.ndarray  # (n,) bool: before the camera and inside the image
+    inside: np.ndarray  # (n,) bool: in front of the camera and inside the image
 
 
 def look_up(points_world: Points, world_from_camera: Rigid3, camera: Intrinsics, depth_m: DepthMetres) -> Sighting:
-    """Where world points (n, 3) lie for a camera, and the depth its image has there; `camera` has the image's size."""
+    """Depth of world points (n, 3) in a camera, and the measured depth at their pixels; `camera` has the image's size."""
     local = world_from_camera.inverse.apply(points_world)
     measured, inside = sample_nearest(depth_m, project(local, camera))
     inside &= local[:, 2] > tuned(Params).nearest_m
@@ -51,7 +51,7 @@ def look_up(points_world: Points, world_from_camera: Rigid3, camera: Intrinsics,
 class DepthNoise:
     """Standard deviation of a recording's depth at distance z: floor_m + per_m * z, metres (estimated at ingest).
 
-    The defaults are a phone's LiDAR: 4 mm and 3 mm more for each metre.
+    The defaults are a phone's LiDAR: 4 mm plus 3 mm per metre.
     """
 
     floor_m: float = 0.004
@@ -65,13 +65,13 @@ class DepthNoise:
         return np.asarray(margin_m + tuned(Params).sure * self.sigma(z_m))
 
     def agrees(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
-        """Where depth was measured and lies at z, give or take a margin and the noise. Arrays (...), 0 for unknown depth."""
+        """Mask where depth was measured and equals z within a margin and the noise. Arrays (...), 0 for unknown depth."""
         return np.asarray((seen_m > 0) & (np.abs(seen_m - z_m) < self._reach(z_m, margin_m)))
 
     def occluded(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
-        """Where something measured stands nearer than z by more than a margin and the noise."""
+        """Mask where the measured depth is nearer than z by more than a margin and the noise."""
         return np.asarray((seen_m > 0) & (seen_m < z_m - self._reach(z_m, margin_m)))
 
     def seen_through(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
-        """Where depth was measured behind z by more than a margin and the noise: nothing opaque is at z."""
+        """Mask where the measured depth is behind z by more than a margin and the noise: nothing opaque is at z."""
         return np.asarray((seen_m > 0) & (seen_m > z_m + self._reach(z_m, margin_m)))  # z < 0: behind the camera
