@@ -1,1 +1,1 @@
-"""What kitchens are, each fact once: categories and what people call them, the wall behind a front, the front of a mesh."""
+"""Domain knowledge of kitchens: categories and their names, the wall behind a front, the front plane of a mesh."""

@@ -1,7 +1,7 @@
-"""The category table: every kind of object that the pipeline knows, each fact once.
+"""Category table: every kind of object that the pipeline knows.
 
-A new kind is a line here and, where it is built in a new way, a file in synthesize/fixtures that its line names.
-Sizes are those of the front or of the whole object without handles, as people who sell or standardise such things give them.
+A new kind is a line here and, where it is built in a new way, a file in synthesize/fixtures that its line names. Sizes are
+those of the front or of the whole object without handles, as sellers or standards of such objects state them.
 """
 
 from functools import partial
@@ -29,7 +29,7 @@ _SLIDING = "makers: 0.3-1.5 m wide, before carcasses of wall units to wardrobes 
 _OWN = "own estimate of household things as sold"
 
 DEPTHS_SOLD_M = (0.30, 0.37, 0.48, 0.58, 0.62, 0.75)
-"""Of cabinets with their fronts: carcasses of 28, 35, 46, 56, 60 and 73 cm are what most makers list."""
+"""Depths of cabinets with their fronts: most makers list carcasses of 28, 35, 46, 56, 60 and 73 cm."""
 
 _OFTEN = "how often: own estimate of a fitted kitchen of some fifteen fronts"
 
@@ -67,7 +67,7 @@ def _thing(
     flat_top: bool = False,
     place: Place | None = None,
 ) -> Category:
-    """A loose thing, as deep as wide."""
+    """A free-standing object, as deep as wide."""
     across = Size(*width, _OWN)
     return Category(
         name=name,
@@ -90,7 +90,7 @@ def _thing(
 
 _base_unit = partial(Category, kind="front", depth=_BASE_DEPTH, height=_BASE_HEIGHT, material=materials.CHIPBOARD)
 _wall_unit = partial(Category, kind="front", depth=_WALL_DEPTH, height=_WALL_HEIGHT, material=materials.CHIPBOARD)
-_machine = partial(Category, kind="front", one_front=True)  # a machine shows one front whatever lines it carries
+_machine = partial(Category, kind="front", one_front=True)  # a machine shows one front, regardless of the lines on it
 _appliance = partial(Category, kind="appliance", stands=True)
 
 _FRONTS = (
@@ -421,10 +421,10 @@ _THINGS = (
     _thing("sofa", (0.8, 1.8, 2.0), (0.6, 0.85, 1.0), "couch", on_floor=True),
 )
 CATEGORIES: tuple[Category, ...] = (*_FRONTS, *_APPLIANCES, *_FIXED, *_THINGS)
-"""The project's own; `every_category()` also has those of other packages."""
+"""The project's own categories; `every_category()` also includes those of other packages."""
 
 
 def every_category() -> tuple[Category, ...]:
-    """Every kind that is known, the project's own first; a name that is taken stays whose it is."""
+    """Every known category, the project's own first; a plug-in cannot redefine a name in use."""
     taken = {name for category in CATEGORIES for name in category.names}
     return (*CATEGORIES, *(kind for kind in added("r2c2r.fixtures", Category) if not taken & set(kind.names)))

@@ -1,7 +1,7 @@
-"""How deep a front is: decided here, for every stage.
+"""Depth of a front for every stage: from the room, the worktop above, or the category.
 
-Nobody sees how deep a cabinet is behind its front. `front_depth` is what the room tells, and the masks of its sides; the
-shapes that `generate` weighs reach back to each of `depths_behind`; what was chosen is held to what can be by `believable`.
+The depth of a cabinet behind its front is not visible. `front_depth` is the room's constraint; the shapes that `generate` ranks
+extend to each of `depths_behind`; the chosen depth is limited to plausible values by `believable`.
 """
 
 from collections.abc import Sequence
@@ -23,53 +23,63 @@ DepthSource = Literal["seen", "points", "box", "wall", "worktop", "category", "c
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How deep a front may be, and which depth is believed."""
+    """Tuned parameters of depths behind a front."""
 
-    alike_m: float = param(0.015, "m", "between depths that are one guess")
-    least_worktop: float = param(0.75, "share", "of the category's depth: a level sheet that ends before is a shelf or a board")
-    wall_gap_m: float = param(0.005, "m", "between a wall and a unit's back")
-    to_wall_m: float = param(0.03, "m", "between a back and the wall it is taken to stand against")
-    worktop_above_m: float = param(0.75, "m", "above the middle drawer of its unit, at most, where a worktop lies")
-    along_m: float = param(0.02, "m", "width of the strips in which a worktop is followed backwards", gt=0)
-    level_m: float = param(0.01, "m", "height of the layers in which one is looked for", gt=0)
-    gap_bins: int = param(6, "count", "strips that may show nothing", source="what stands on a worktop hides less of it")
-    sheet_fill: float = param(0.7, "share", "of the strips that must show it")
-    deepest_m: float = param(1.2, "m", "behind a front, to which a worktop is followed", source="an island's, from both sides")
-    least_points: int = param(50, "count", "of the fused surface above a front, for a worktop to be looked for")
+    alike_m: float = param(0.015, "m", "Maximum difference between depths that count as one candidate")
+    least_worktop: float = param(
+        0.75, "share", "Minimum depth of a worktop relative to the category's: a shorter level sheet is a shelf or a board"
+    )
+    wall_gap_m: float = param(0.005, "m", "Gap between a wall and a unit's back")
+    to_wall_m: float = param(0.03, "m", "Distance between a back and a wall below which it is taken to touch the wall")
+    worktop_above_m: float = param(
+        0.75, "m", "Maximum height of a worktop above the top of a front, such as a middle drawer of its unit"
+    )
+    along_m: float = param(0.02, "m", "Width of the strips in which a worktop is traced backwards", gt=0)
+    level_m: float = param(0.01, "m", "Height of the layers in which a worktop is searched", gt=0)
+    gap_bins: int = param(
+        6, "count", "Maximum number of consecutive empty strips", source="objects on a worktop hide less of it"
+    )
+    sheet_fill: float = param(0.7, "share", "Minimum fraction of the strips that show the worktop")
+    deepest_m: float = param(
+        1.2, "m", "Maximum depth behind a front to which a worktop is traced", source="an island's, from both sides"
+    )
+    least_points: int = param(
+        50, "count", "Minimum number of points of the fused surface above a front for the search of a worktop"
+    )
 
 
 class FrontDepth(NamedTuple):
-    """How far a front reaches back, before anything shows it."""
+    """Prior depth of a front, before any observation."""
 
-    wall_m: float | None  # to the nearest wall that a thing of its category may stand against
-    usual_m: float  # of its category
+    wall_m: float | None  # to the nearest wall that an object of its category may stand against
+    usual_m: float  # usual depth of its category
 
     @property
     def depth_m(self) -> float:
-        """To the wall where there is one."""
+        """Depth to the wall if there is one, else the usual one."""
         return self.usual_m if self.wall_m is None else self.wall_m
 
 
 def front_depth(walls: Sequence[Wall], middle: Vector3, outward: Vector3, depth: Size) -> FrontDepth:
-    """The depth of a front with this middle and unit normal (world), of a category as deep as this."""
+    """Prior depth of a front with this centre and unit normal (world), given its category's depths."""
     to_wall = next((d for d in distances_behind(walls, middle, outward) if depth.holds(d)), None)
     return FrontDepth(to_wall, depth.usual)
 
 
 class DepthBehind(NamedTuple):
-    """How far a front reaches back, and how that is known."""
+    """A depth behind a front and its source."""
 
     depth_m: float
     source: DepthSource
 
 
 def believable(depth_m: float, behind: FrontDepth, allowed: Size, *, seen_apart: bool) -> tuple[float, bool]:
-    """The depth, to the wall where it ends near or beyond one, and whether it is no more than a usual one.
+    """Depth limited to the wall, or replaced if implausible, and whether it is only the category's usual one.
 
     Args:
-        depth_m: of the shape that was chosen.
-        behind: What the room tells of its front.
-        allowed: Depths of its category.
+        depth_m: Depth of the chosen shape.
+        behind: Prior depth of its front.
+        allowed: Range of depths of its category.
         seen_apart: Whether its sides are seen, as a free-standing appliance's are: it may stand off the wall, not in it.
 
     """
@@ -84,10 +94,9 @@ def believable(depth_m: float, behind: FrontDepth, allowed: Size, *, seen_apart:
 def depths_behind(
     capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, category: Category
 ) -> tuple[DepthBehind, ...]:
-    """The different depths a front may have, most trusted first.
+    """Candidate depths of a front, most trusted first.
 
-    To the wall behind it where one stands at a plausible distance; to where the worktop on it ends; as deep as its category
-    usually is.
+    To the wall behind it if one is at a plausible distance; to the end of the worktop on it; its category's usual depth.
     """
     params = tuned(Params)
     wall, usual = front_depth(
@@ -101,7 +110,7 @@ def depths_behind(
 
 
 def next_sizes(depth_m: float) -> tuple[DepthBehind, ...]:
-    """The next smaller and the next larger depth that cabinets are sold in."""
+    """The next smaller and the next larger depth in which cabinets are sold."""
     params = tuned(Params)
     smaller = max((d for d in DEPTHS_SOLD_M if d < depth_m - params.alike_m), default=None)
     larger = min((d for d in DEPTHS_SOLD_M if d > depth_m + params.alike_m), default=None)
@@ -109,7 +118,7 @@ def next_sizes(depth_m: float) -> tuple[DepthBehind, ...]:
 
 
 def distinct(depths: Sequence[DepthBehind]) -> tuple[DepthBehind, ...]:
-    """Without those that are about as deep as one before them."""
+    """The depths without those close to an earlier one."""
     params = tuned(Params)
     return tuple(
         b for k, b in enumerate(depths) if all(abs(b.depth_m - other.depth_m) > params.alike_m for other in depths[:k])
@@ -117,7 +126,7 @@ def distinct(depths: Sequence[DepthBehind]) -> tuple[DepthBehind, ...]:
 
 
 def _worktop_end(capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, least_m: float) -> float | None:
-    """Where the lowest level sheet above a front ends that begins over it, as a worktop does; None where none is seen."""
+    """Depth to the end of the lowest level sheet above a front that begins over it, as a worktop does; None without one."""
     params = tuned(Params)
     points = world_from_front.inverse.apply(capture.surface.vertices_world)
     above = points[(points[:, 2] > height_m / 2 - params.level_m) & (points[:, 2] < height_m / 2 + params.worktop_above_m)]

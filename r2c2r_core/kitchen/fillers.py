@@ -1,4 +1,4 @@
-"""Inside corners: where two runs meet, kitchens keep a filler so that the doors clear each other.
+"""Fillers at inside corners: where two runs meet, a filler lets the doors clear each other.
 
 A front cannot reach behind the plane of the run it meets, and a door that ended at that plane would not open past the other
 run's handles.
@@ -16,18 +16,18 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a filler is."""
+    """Tuned parameters of corner fillers."""
 
     width_m: float = param(
         0.05,
         "m",
-        "least width of a corner filler",
-        source="kitchen catalogues: fillers of 40-80 mm; a bar handle stands out 25-40 mm",
+        "Minimum width of a corner filler",
+        source="kitchen catalogues: fillers of 40-80 mm; a bar handle protrudes 25-40 mm",
     )
     faces_rad: float = param(
         float(np.deg2rad(40.0)),
         "rad",
-        "from squarely, within which the other run faces the edge",
+        "Maximum deviation from a right angle at which the other run faces the edge",
         source="a diagonal corner unit (45 degrees) meets its neighbours without a filler",
     )
 
@@ -40,7 +40,7 @@ class FrontBox(NamedTuple):
 
 
 def missing_filler(unit: FrontBox, side: float, other: FrontBox) -> float:
-    """By how many metres a unit's edge (side -1 left, +1 right) comes nearer to the other's front plane than a filler.
+    """Distance (m) by which a unit's edge (side -1 left, +1 right) violates a filler's width at the other's front plane.
 
     0 where the two do not meet at an inside corner.
     """
@@ -55,5 +55,5 @@ def missing_filler(unit: FrontBox, side: float, other: FrontBox) -> float:
     other_width, other_depth, other_height = other.dimensions_m
     beside = abs(x) < other_width / 2 + params.width_m
     level = abs(z) < (height + other_height) / 2
-    before = -other_depth / 2 - y  # of the edge in front of the other's front plane
+    before = -other_depth / 2 - y  # distance of the edge in front of the other's front plane
     return max(params.width_m - float(before), 0.0) if beside and level else 0.0

@@ -1,7 +1,7 @@
-"""The front plane of a mesh: the foremost flat layer that spans it, for every stage.
+"""Front plane of a mesh, for every stage: the foremost flat layer that spans it.
 
-A handle spans little of a front; the sunk panel of a shaker door lies behind its frame, which is the outer face even where it
-is the smaller part. Dimensions and the box of an object begin at this plane.
+A handle spans little of a front; the recessed panel of a shaker door lies behind its frame, which is the outer face even where
+it is the smaller part. Dimensions and the box of an object begin at this plane.
 """
 
 from dataclasses import dataclass
@@ -15,21 +15,23 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What counts as the front of a mesh."""
+    """Tuned parameters of the front plane."""
 
-    looks: float = param(0.7, "cosine", "with the front's direction, from which a face looks forwards: within 45 degrees")
-    layer_m: float = param(
-        0.003, "m", "half a layer's thickness", source="a phone's depth, fused, leaves a flat this even", gt=0
+    looks: float = param(
+        0.7, "cosine", "Minimum cosine to the front's direction for a face to be forward-facing: within 45 degrees"
     )
-    step_m: float = param(0.002, "m", "between the layers that are tried", gt=0)
-    spans: float = param(0.8, "share", "of the forward surface's width and of its height that a front face reaches over")
-    least_share: float = param(0.03, "share", "of the forward surface: a layer of less is specks")
-    least_points: int = param(60, "count", "points that look forwards, for a front plane to be asked for")
-    trim: float = param(0.005, "share", "of the points at either end, when extents are compared", ge=0, lt=0.5)
+    layer_m: float = param(
+        0.003, "m", "Half the thickness of a layer", source="evenness of a plane fused from a phone's depth", gt=0
+    )
+    step_m: float = param(0.002, "m", "Step between candidate layers", gt=0)
+    spans: float = param(0.8, "share", "Minimum extent of a front face relative to the forward surface's width and height")
+    least_share: float = param(0.03, "share", "Minimum fraction of the forward surface in a layer: less is specks")
+    least_points: int = param(60, "count", "Minimum number of forward-facing points for a front plane")
+    trim: float = param(0.005, "share", "Fraction of the points ignored at either end when extents are compared", ge=0, lt=0.5)
     agree_rad: tuple[float, float, float] = param(
         (float(np.deg2rad(20.0)), float(np.deg2rad(8.0)), float(np.deg2rad(3.0))),
         "rad",
-        "half angles of the cones about the mean normal, each within the one before",
+        "Half angles of the successively narrower cones about the mean normal",
     )
 
 
@@ -41,15 +43,15 @@ class FrontPlane(NamedTuple):
     middle: Vector3  # the mean of its points
 
     def holds(self, points: Points) -> np.ndarray:
-        """Which points lie on it."""
+        """Mask of the points that lie on it."""
         params = tuned(Params)
         return np.asarray(np.abs(points @ self.outward - self.offset_m) < params.layer_m)
 
 
 def front_plane(points: Points, normals: Points) -> FrontPlane | None:
-    """The front plane of surface samples (metres) whose front looks about towards -Y; None where too few of them do.
+    """The front plane of surface samples (metres) whose front faces about -Y; None with too few of them.
 
-    Where no layer spans the front, as on a bowed one, it is the fullest.
+    Where no layer spans the front, as on a bowed one, it is the one with most points.
     """
     params = tuned(Params)
     forwards = normals[:, 1] < -params.looks
@@ -61,14 +63,14 @@ def front_plane(points: Points, normals: Points) -> FrontPlane | None:
 
 
 def front_y(points: Points, normals: Points) -> float:
-    """Where the front face lies along y; where nothing flat looks forwards, the foremost points."""
+    """Position of the front face along y; without a forward-facing plane, the foremost points."""
     params = tuned(Params)
     plane = front_plane(points, normals)
     return float(np.quantile(points[:, 1], params.trim)) if plane is None else float(plane.middle[1])
 
 
 def _common_direction(normals: Points) -> Vector3:
-    """The direction most normals agree on: their median, thrice without those further off."""
+    """Robust mean of the normals: median direction with outliers removed in three passes."""
     params = tuned(Params)
     kept = normals
     for cosine in np.cos(params.agree_rad):
@@ -80,7 +82,7 @@ def _common_direction(normals: Points) -> Vector3:
 
 
 def _foremost_layer(points: Points, normal: Vector3) -> float:
-    """Offset along the normal of the foremost layer that spans the points; of the fullest where none does."""
+    """Offset along the normal of the foremost layer that spans the points; of the fullest if none does."""
     params = tuned(Params)
     offsets = points @ normal
     across = np.array([[normal[1], 0.0], [-normal[0], 0.0], [0.0, 1.0]])  # level, and up
@@ -100,13 +102,13 @@ def _foremost_layer(points: Points, normal: Vector3) -> float:
 
 
 def _extent(flat: np.ndarray) -> np.ndarray:
-    """Width and height of points in a plane, without the outermost."""
+    """Width and height of points in a plane, without outliers."""
     params = tuned(Params)
     return np.asarray(np.ptp(np.quantile(flat, [params.trim, 1 - params.trim], axis=0), axis=0))
 
 
 def _densest(offsets: np.ndarray, offset: float) -> float:
-    """Where, within a layer's thickness behind its first sight, most of the points lie."""
+    """Offset of the densest layer within a layer's thickness behind the first one found."""
     params = tuned(Params)
     near = offsets[(offsets <= offset + params.layer_m) & (offsets > offset - 2 * params.layer_m)]
     tried = np.arange(offset + params.layer_m, offset - 2 * params.layer_m, -params.step_m / 2)
@@ -114,7 +116,7 @@ def _densest(offsets: np.ndarray, offset: float) -> float:
 
 
 def _refined(points: Points, normal: Vector3, offset: float) -> FrontPlane:
-    """Least squares on the layer's points, three times."""
+    """Least-squares plane of the layer's points, iterated three times."""
     params = tuned(Params)
     middle = normal * offset
     for _ in range(3):

@@ -1,9 +1,9 @@
-"""From what a person typed to a line of the category table.
+"""Parsing of typed names to categories.
 
-A name is known without regard to case, separators, plural and a number at its end ("Micro-wave Ovens 2"). Else by its head,
-the last word of an English compound, and every other word of a name: "white two-door base cabinet" is a two-door cabinet.
-What is built as a fixture may then be told apart only by words that say where or how it stands: a "dish rack" is no shelf
-unit and a "car door" no cabinet, while any "... bottle" is a bottle.
+A name is matched regardless of case, separators, plural and a trailing number ("Micro-wave Ovens 2"). Otherwise by its head,
+the last word of an English compound, and every other word of a name: "white two-door base cabinet" is a two-door cabinet. For a
+category that is built as a fixture the remaining words may only describe position or look: a "dish rack" is no shelf unit and a
+"car door" no cabinet, while any "... bottle" is a bottle.
 """
 
 import difflib
@@ -54,19 +54,19 @@ _PLACES_AND_LOOKS = frozenset(
     )
 )
 _PLURALS = (("s", ""), ("es", ""), ("ves", "f"), ("ies", "y"))
-_ALIKE = 0.7  # difflib's ratio from which a name is suggested
+_ALIKE = 0.7  # minimum difflib ratio of a suggested name
 _SUGGESTED = 3
 
 
 class Named(NamedTuple):
-    """The category of what a person typed, and a notice where the table does not know it."""
+    """The category of a typed name, and a notice if the table does not know it."""
 
     category: Category
     notice: str | None
 
 
 class _Table(NamedTuple):
-    """The category table by what was typed."""
+    """Index of the category table by words."""
 
     whole: dict[str, Category]  # by a name without its separators
     by_head: dict[str, list[tuple[frozenset[str], Category]]]  # by the last word of a name, with all its words
@@ -74,12 +74,12 @@ class _Table(NamedTuple):
 
 
 def category_of(text: str) -> Category:
-    """The category that a person's words name; the rigid, free-standing `object` where the table does not know them."""
+    """The category of a typed name; the rigid, free-standing `object` for an unknown one."""
     return named(text).category
 
 
 def named(text: str) -> Named:
-    """The category that a person's words name, with close names where the table does not know them."""
+    """The category of a typed name, with a suggestion of close names for an unknown one."""
     return _named(text, categories.every_category())
 
 
@@ -112,7 +112,7 @@ def _table(lines: tuple[Category, ...]) -> _Table:
 
 
 def _by_head(words: Sequence[str], table: _Table) -> Category | None:
-    """The longest name with the same last word whose other words were all typed; what stands before "of" is the head."""
+    """The longest name with the same last word whose other words were all typed; the part before "of" is the head."""
     said = words[: words.index("of")] if "of" in words else words
     if not said:
         return None
@@ -131,6 +131,6 @@ def _words(text: str) -> list[str]:
 
 
 def _singular(word: str, known: frozenset[str]) -> str:
-    """What the word is the plural of, where the table knows that; else the word."""
+    """The singular of the word, where the table knows that; else the word."""
     forms = (re.sub(ending + "$", stem, word) for ending, stem in _PLURALS if word.endswith(ending))
     return next((form for form in forms if form in known), word)

@@ -1,4 +1,4 @@
-"""The walls behind a front, for every stage, and the floor under it. How deep a front is: `kitchen.depth`."""
+"""Walls behind a front, for every stage, and the floor under it. For a front's depth see `kitchen.depth`."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,22 +12,21 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What makes a wall the one behind a front."""
+    """Tuned parameters of walls behind a front."""
 
     parallel_rad: float = param(
         float(np.deg2rad(10.0)),
         "rad",
-        "between the normals of a front and of the wall behind it",
+        "Maximum angle between the normals of a front and of the wall behind it",
         source="measured on the sample kitchens: built-in fronts 0.2 degrees, free-standing appliances 5",
     )
 
 
 def distances_behind(walls: Sequence[Wall], middle: Vector3, outward: Vector3) -> list[float]:
-    """Metres from a front back to each wall that faces the same way, nearest first; negative for walls before it.
+    """Metres from a front back to each wall that faces the same way, nearest first; negative for walls in front of it.
 
-    A lining counts where it reaches along the wall to the front.
-
-    `middle` is the middle of the front and `outward` its unit normal, both in the world; distances are along that normal.
+    A lining counts only where it extends along the wall to the front. `middle` is the centre of the front and `outward` its
+    unit normal, both in the world; distances are along that normal.
     """
     facing = [wall for wall in walls if float(wall.normal @ outward) > np.cos(tuned(Params).parallel_rad)]
     parallel = [wall for wall in facing if _reaches(wall, middle)]
@@ -40,7 +39,7 @@ def _reaches(wall: Wall, point: Vector3) -> bool:
 
 
 def depths_in(walls: Sequence[Wall], points_world: Points) -> np.ndarray:
-    """(n walls,) how far the foremost of the points reaches behind each wall, metres; negative where all are in the room."""
+    """(n walls,) depth of the deepest point behind each wall, metres; negative where all are inside the room."""
     return np.array([float((wall.offset_m - points_world @ wall.normal).max()) for wall in walls])
 
 
