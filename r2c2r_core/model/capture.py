@@ -1,4 +1,4 @@
-"""A recording, levelled: posed frames and what the whole room looks like."""
+"""A levelled recording: posed frames and the geometry of the whole room."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple, Protocol
@@ -20,7 +20,7 @@ class Depth(NamedTuple):
 
 
 class FrameImages(Protocol):
-    """Where the pixels of a capture are; keyed by Frame.index. Implementations read from disk on demand."""
+    """Pixel access of a capture, keyed by Frame.index. Implementations read from disk on demand."""
 
     def rgb(self, frame_index: int) -> Image:
         """The colour image, at its stored resolution."""
@@ -39,28 +39,28 @@ class Frame:
     depth_camera: Intrinsics
     world_from_camera: Rigid3  # colour and depth share it (readers register them)
     sharpness: float  # variance of the Laplacian at 320 px width; only its order means something
-    gain: Gain = NO_GAIN  # brings the picture, which is stored as filmed, to the recording's common exposure and white
+    gain: Gain = NO_GAIN  # brings the image, stored as recorded, to the recording's common exposure and white balance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Room:
-    """What stands still: gravity, floor, walls. The world is levelled, so up is +Z and the floor, if found, z = 0.
+    """Static frame of the scene: gravity, floor, walls. The world is levelled, so up is +Z and the floor, if found, z = 0.
 
-    Each comes with its source and its spread: how far the surfaces it could be taken from lie off it (rms, one sigma),
-    whoever said it; None where there are none.
+    Each quantity comes with its source and its spread: the deviation of the surfaces that could determine it (rms, one sigma),
+    whatever its source; None where there are none.
     """
 
     up_source: Literal["file", "floor", "person", "assumed"]
-    up_spread_deg: float | None = None  # of large level and upright planes
-    up_file_off_deg: float | None = None  # of what the file says of gravity, from what the planes say; None: unknown
-    up_corrected: bool = False  # whether the planes' was taken in place of the file's
+    up_spread_deg: float | None = None  # deviation of large horizontal and vertical planes
+    up_file_off_deg: float | None = None  # angle between the file's gravity and the planes'; None: unknown
+    up_corrected: bool = False  # whether the planes' direction replaced the file's
     up_rival_capture: Vector3 | None = None  # up in the capture frame if the images are stored sideways; None: ruled out
     floor_found: bool
     floor_source: Literal["surface", "person"] | None = None  # None: not found
-    floor_spread_m: float | None = None  # of the surface near that height
+    floor_spread_m: float | None = None  # spread of the surface near that height
     manhattan_yaw_rad: float  # in [0, pi/2): world yaw of one of the two dominant horizontal directions
     yaw_source: Literal["surface", "person", "assumed"] = "surface"
-    yaw_spread_deg: float | None = None  # of large upright planes within 4 deg
+    yaw_spread_deg: float | None = None  # spread of large vertical planes within 4 deg
     walls: tuple["Wall", ...]
     walls_source: Literal["surface", "person"] = "surface"
 
@@ -71,17 +71,17 @@ class Wall:
 
     normal: Vector3
     offset_m: float
-    area_m2: float  # of the surface seen on it
-    spread_m: float | None = None  # of that surface about the plane, one sigma; None: nothing was seen there
-    span_m: tuple[float, float] | None = None  # of a lining, from where to where along up x normal it reaches; None: all along
+    area_m2: float  # area of the observed surface on it
+    spread_m: float | None = None  # of that surface about the plane, one sigma; None: nothing was observed there
+    span_m: tuple[float, float] | None = None  # interval of a lining along up x normal; None: unbounded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PoseEvidence:
-    """Where the poses come from, and how far frames that see one place at different times disagree (median, metres)."""
+    """Source of the poses, and the median distance in metres between frames that see one place at different times."""
 
     source: Literal["file", "refined", "odometry"]
-    given_gap_m: float | None  # with the recording's own poses; None: it has none, or no place was seen twice
+    given_gap_m: float | None  # with the recording's own poses; None: it has none, or no place was observed twice
     gap_m: float | None  # with the poses used
     given: np.ndarray | None = None  # (n, 4, 4) world_from_camera as recorded, where others are used instead
 
@@ -98,7 +98,7 @@ class SceneSurface:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scan:
-    """A recording as it was read, before it is levelled: `world` is the recording's own here, whichever way its up is."""
+    """A recording before levelling: `world` is the recording's own frame here, with any up direction."""
 
     name: str
     sha256: str
@@ -106,8 +106,8 @@ class Scan:
     frames: tuple[Frame, ...]
     surface: SceneSurface
     images: FrameImages
-    up_capture: Vector3 | None  # what the recording says of gravity
-    other_ups: tuple[Vector3, ...] = ()  # what that may mean instead
+    up_capture: Vector3 | None  # gravity according to the recording
+    other_ups: tuple[Vector3, ...] = ()  # alternative interpretations of it
     notices: tuple[str, ...]
     poses: PoseEvidence
     depth_noise: DepthNoise

@@ -1,4 +1,4 @@
-"""What cannot be true at once of the objects a person clicked."""
+"""Contradictions between the objects that a person clicked."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,7 +10,7 @@ ContradictionRule = Literal[
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contradiction:
-    """One line for a person: what contradicts what, at which clicks, and what would mend it."""
+    """One contradiction for a person: its objects, their clicks, and a suggested fix."""
 
     rule: ContradictionRule
     objects: tuple[str, ...]
@@ -19,5 +19,5 @@ class Contradiction:
 
     @property
     def line(self) -> str:
-        """Both in one line."""
+        """Message and fix in one line."""
         return f"{self.message}; {self.mend}"

@@ -1,4 +1,4 @@
-"""A plane of the scan seen from the front, to scale, as a person draws fronts on it."""
+"""Elevation: orthographic front view of a plane of the scan, to scale, on which a person draws fronts."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from r2c2r_core.arrays import Image, Vector3
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lines:
-    """How clearly lines of one direction show, 0 to 255: (blocks, positions), `block` cells in a block across."""
+    """Evidence of lines of one direction, 0 to 255: (blocks, positions), `block` cells per block across."""
 
     clarity: np.ndarray  # uint8
     block: int

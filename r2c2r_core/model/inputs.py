@@ -1,4 +1,4 @@
-"""What people give: prompts and overrides. They are inputs, so a re-run flows forward and never back."""
+"""User inputs: prompts and overrides. A re-run only reads them and never writes back."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -22,7 +22,7 @@ class PromptPoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawnHandle:
-    """A handle as a person drew it: x to the right and z up from the front's centre, metres."""
+    """A handle drawn by a person: x to the right and z up from the front's centre, metres."""
 
     left_m: float
     bottom_m: float
@@ -32,17 +32,17 @@ class DrawnHandle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawnFront:
-    """A front's rectangle as a person drew it in the elevation of its run."""
+    """A front's rectangle drawn by a person in the elevation of its run."""
 
     # metres, capture frame: top left, top right, bottom right, bottom left, as a person facing the front sees them
     corners_capture: tuple[tuple[float, float, float], ...]
-    handle: DrawnHandle | Literal["none"] | None = None  # None: looked for in the picture
+    handle: DrawnHandle | Literal["none"] | None = None  # None: detected in the image
     hinge: HingeSide | None = None  # None: inferred
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameSaid:
-    """What a person said of an object in one frame: its mask there, painted or kept, or that it is not visible."""
+    """A person's statement on an object in one frame: its mask there, painted or confirmed, or that it is not visible."""
 
     frame: int
     mask: PackedMask | None  # at the frame's proportions, at any size; None: not visible
@@ -50,7 +50,7 @@ class FrameSaid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CropBox:
-    """A box that a person drew around a thing: what is found outside is none of it."""
+    """A box drawn by a person around an object: points outside do not belong to it."""
 
     corner_capture: tuple[float, float, float]  # metres, capture frame
     edges_capture: tuple[tuple[float, float, float], ...]  # three from that corner, at right angles to each other, metres
@@ -58,15 +58,15 @@ class CropBox:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectPrompt:
-    """One object a person named, and clicked or drew."""
+    """One object named by a person, and clicked or drawn."""
 
     name: str  # unique, [A-Za-z0-9_]+ (scene_synthesizer and simulators accept no more)
     category: str
     points: tuple[PromptPoint, ...]
-    front: DrawnFront | None = None  # drawn: used as it is, whatever is clicked
-    frames: tuple[FrameSaid, ...] = ()  # at most one a frame; they stand, whatever is found there
-    crop: CropBox | None = None  # of a thing
-    others: tuple[PromptPoint, ...] = ()  # clicks on other objects that fall on it: never in a file, found by segment
+    front: DrawnFront | None = None  # drawn: used unchanged, regardless of clicks
+    frames: tuple[FrameSaid, ...] = ()  # at most one per frame; they override the segmentation
+    crop: CropBox | None = None  # of a free object
+    others: tuple[PromptPoint, ...] = ()  # clicks on other objects that lie on it: never in a file, set by segment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +77,7 @@ class Prompts:
 
 
 class JointLimits(NamedTuple):
-    """What a person said about one joint, in rad or m; None is computed."""
+    """A person's limits of one joint, in rad or m; None is computed."""
 
     lower: float | None
     upper: float | None
@@ -85,7 +85,7 @@ class JointLimits(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObjectOverride:
-    """What a person corrected about one object; None is computed."""
+    """A person's corrections of one object; None is computed."""
 
     candidate: str | None = None  # a candidate id, or a mesh file
     hinge: HingeSide | None = None
@@ -96,10 +96,10 @@ class ObjectOverride:
     joints: Mapping[str, JointLimits] = field(default_factory=dict)  # by the joint's name or its part's
     states: Mapping[str, Mapping[int, float]] = field(default_factory=dict)  # by joint as above, by frame: rad or m
     rejected: tuple[str, ...] = ()  # candidate ids a reviewer rejected
-    regenerate: int = 0  # times a reviewer asked for further candidates
-    built_as: str | None = None  # the category whose body and joints it takes, whatever it is called
-    left_out: bool = False  # of what is made from the scan unclicked: it is none of the scene
-    colour: tuple[float, float, float] | None = None  # RGB 0..1, of what no mesh dresses
+    regenerate: int = 0  # number of further batches that a reviewer requested
+    built_as: str | None = None  # the category whose body and joints it gets, regardless of its label
+    left_out: bool = False  # removes an object that was added from the scan without a click
+    colour: tuple[float, float, float] | None = None  # RGB 0..1, for objects without a mesh
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,9 +114,9 @@ class Overrides:
 
     @property
     def room(self) -> "Overrides":
-        """Only what was said of the room."""
+        """Only the corrections of the room."""
         return replace(self, objects={})
 
     def of(self, name: str) -> ObjectOverride:
-        """The object's corrections; empty when there are none."""
+        """The object's corrections; empty without any."""
         return self.objects.get(name, ObjectOverride())

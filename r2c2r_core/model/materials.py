@@ -1,7 +1,8 @@
-"""What things weigh and how they resist: every number of the physics, with where it comes from.
+"""Masses, friction and joint resistance: every physical number with its source.
 
-Of whole appliances and things the weight is known, not a density: an effective density turns a fixture's panels, or a thing's
-colliders, into a weight within that range. What no table was found for is called an own estimate or an own choice.
+For whole appliances and objects the weight is known, not a density: an effective density converts a fixture's panels, or an
+object's colliders, into a weight within that range. Values without a published table are marked as own estimates or own
+choices.
 """
 
 from dataclasses import dataclass
@@ -9,11 +10,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """A density for the panels of a fixture, or for the colliders of a thing."""
+    """Density of the panels of a fixture, or of the colliders of an object."""
 
     density_kg_m3: float
     source: str
-    weight_kg: tuple[float, float] | None = None  # least and most of a usual whole one; None: a material, not a thing
+    weight_kg: tuple[float, float] | None = None  # minimum and maximum of a usual complete one; None: a material, not an object
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,8 +94,8 @@ SLIDE_FEEL = JointFeel(damping=8.0, friction=1.5, effort=80.0, velocity=1.0, sou
 HEAVY_DOOR_FEEL = JointFeel(damping=0.8, friction=0.4, effort=40.0, velocity=3.0, source=f"{_OPENED}, seals; {_RELEASED}")
 
 SURFACE_FRICTION = 0.5
-"""Of every surface; dry wood on wood 0.25-0.5 and laminate 0.2-0.4 in friction tables. A gripper brings its own: MuJoCo takes
+"""Friction of every surface; dry wood on wood 0.25-0.5 and laminate 0.2-0.4 in tables. A gripper has its own: MuJoCo takes
 the larger of two, PhysX their mean."""
 
 ARMATURE = {"revolute": 0.005, "prismatic": 0.02}
-"""kg m^2 and kg added to a joint for the solver's sake: own choice, under 2 % of a cabinet door's or a drawer's own."""
+"""kg m^2 and kg added to a joint for solver stability: own choice, under 2 % of a cabinet door's or a drawer's own."""

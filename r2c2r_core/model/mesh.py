@@ -1,4 +1,4 @@
-"""Generated meshes."""
+"""Generated meshes and candidate sets."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ class TexturedMesh:
 class MeshAsset:
     """One candidate, in its own `mesh` frame: arbitrary rotation, translation and unit (about a unit cube).
 
-    A generator that works in the room knows where it stands; a learned one, or a person's file, does not.
+    A generator that works in the scan's frame knows the pose; a learned one, or a person's file, does not.
     """
 
     object_name: str
@@ -33,8 +33,8 @@ class MeshAsset:
     metrics: dict[str, float]  # see generate/consensus.py
     parameters: dict[str, float]
     warnings: tuple[str, ...]
-    world_from_mesh: Similarity3 | None = None  # where its generator made it; None: to be searched for
-    assumes: str = ""  # what it takes for true of what nobody saw, in a few words; empty: a sample of a generator's own
+    world_from_mesh: Similarity3 | None = None  # pose given by its generator; None: unknown, to be searched
+    assumes: str = ""  # its hypothesis of the unobserved parts, in a few words; empty: a plain sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,11 +1,11 @@
-"""A front's joint as it was filmed: what moved it, and where it stood in each frame.
+"""Filmed motion of a front's joint: its kind and axis, and its state in each frame.
 
 Frames: the world (+Z up, floor z = 0; transforms.py). Units: metres and radians. A state is the joint's position: 0 is closed
 whether or not that was filmed, positive is opening, about the axis by the right-hand rule (revolute) or along it (prismatic).
 Frame numbers are Frame.index, the frame's number in the recording.
 
-`r2c2r evaluate` scores what the manifest says of this: type, axis and pivot of the joint, the state of every frame that shows
-the front (one that is not listed, or has no value, is a miss), stops, limits and insides. A truth file says the same per joint:
+`r2c2r evaluate` scores the manifest's values of these: type, axis and pivot of the joint, the state of every frame that shows
+the front (one that is not listed, or has no value, is a miss), stops, limits and insides. A truth file has the same per joint:
 `states` (of every frame, never null), `seen_px` and `seen_share` (how much of the front each frame shows), `stop_seen`,
 `largest` and `inside`.
 """
@@ -20,60 +20,60 @@ from numpy import ndarray
 from r2c2r_core.arrays import Vector3
 
 Source = Literal["measured", "at_least", "inferred", "default", "person"]
-"""Where a number comes from. `at_least` is said of limits only: the largest opening that was seen, without a stop."""
+"""Source of a number. `at_least` is used for limits only: the largest observed opening, without a stop."""
 
 DOOR, DRAWER = "door", "drawer"
-"""Parts of what has a drawer below its door."""
+"""Parts of an object with a drawer below its door."""
 
 MotionKind = Literal["revolute", "prismatic", "fixed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class State:
-    """Where a front stood in a frame that shows it."""
+    """Joint state in a frame that shows the front."""
 
-    value: float | None  # rad or m; None: in view, and not known
-    sigma: float | None  # its standard deviation, same unit; None with it, or where a person said so
+    value: float | None  # rad or m; None: in view, but unknown
+    sigma: float | None  # its standard deviation, same unit; None if unknown or set by a person
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inside:
-    """What was seen behind an open front, metres; None: not seen.
+    """Observed interior behind an open front, metres; None: not observed.
 
-    Of a drawer the box that is drawn out, of anything else the compartment that the front closes. Lengths are clear ones,
-    between the faces of the boards: what would fit.
+    For a drawer, the box that slides out; otherwise the compartment that the front closes. Lengths are clear ones, between the
+    faces of the boards: the space available.
     """
 
     depth_m: float | None = None  # from the back of the closed front to the face of the rear board
     width_m: float | None = None  # between the sides
     height_m: float | None = None  # from the bottom's face to the rim of a drawer's sides, or to the top board's underside
-    shelves_m: tuple[float, ...] = ()  # upper faces of the shelves, above the bottom's face, ascending; of the seen ones
+    shelves_m: tuple[float, ...] = ()  # upper faces of the observed shelves, above the bottom's face, ascending
     board_m: float | None = None  # thickness of the sides, from their front edges
     front_m: float | None = None  # thickness of the front itself, from its edge
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointMotion:
-    """One joint, fitted to all frames in which its front moves or stands open.
+    """One joint, fitted to all frames in which its front moves or is open.
 
-    `kind` follows the evidence, not the category. A prismatic joint's pivot is the middle of its closed front; a revolute one's
+    `kind` follows the evidence, not the category. A prismatic joint's pivot is the centre of its closed front; a revolute one's
     is the point of its axis nearest to that. `fixed` has neither axis nor pivot, and its states are all 0.
     """
 
-    part: str = ""  # which leaf of an object of several: "left", "right", DOOR, DRAWER; "" where there is one
+    part: str = ""  # leaf of an object with several: "left", "right", DOOR, DRAWER; "" for a single leaf
     kind: MotionKind
     axis_world: Vector3 | None  # unit; opening turns about it, or goes along it
     pivot_world: Vector3 | None
     covariance: Float[ndarray, "6 6"] | None
-    """Of a small rotation of the axis about the world's axes (rad), then of the pivot (m). Zero along what is a matter of
-    choice: turns about the axis itself, and where on a hinge's line its pivot lies. None where a person said so."""
+    """Covariance of a small rotation of the axis about the world's axes (rad), then of the pivot (m). Zero along gauge
+    freedoms: rotation about the axis itself, and the pivot's position along a hinge's line. None if a person set the joint."""
     states: Mapping[int, State]  # by Frame.index: every frame that shows the front
-    largest: float  # the widest state seen, rad or m
-    stop_seen: bool  # whether it was held still at the end of its motion, so that `largest` is its limit
+    largest: float  # the largest observed state, rad or m
+    stop_seen: bool  # whether it rested at the end of its motion, so that `largest` is its limit
     source: Source  # of axis and pivot: measured, inferred or person
     inside: Inside | None = None
 
     @property
     def limit_source(self) -> Source:
-        """Of `largest` as the joint's upper limit."""
+        """Source of `largest` as the joint's upper limit."""
         return "measured" if self.stop_seen else "at_least"

@@ -1,4 +1,4 @@
-"""Where a candidate stands in the world."""
+"""Placement of a candidate in the world."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,13 @@ from r2c2r_core.geometry.transforms import Similarity3
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MatchedPoints:
-    """Keypoints found both in a photo and in a rendered view of the candidate, lifted to points; n pairs over all frames."""
+    """Keypoints matched between photos and rendered views of the candidate, lifted to points; n pairs over all frames."""
 
     frame_index: np.ndarray  # (n,) int, Frame.index of the photo
     points_mesh: Points
     points_world: Points
-    noise_m: np.ndarray  # (n,) standard deviation to expect of the world point
-    inlier: np.ndarray  # (n,) bool, agrees with the pose
+    noise_m: np.ndarray  # (n,) expected standard deviation of the world point
+    inlier: np.ndarray  # (n,) bool, inlier of the pose
 
 
 NO_MATCHES = MatchedPoints(
@@ -30,11 +30,11 @@ NO_MATCHES = MatchedPoints(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spread:
-    """Standard deviations of a pose as all the evidence together holds it, each of the direction held least."""
+    """Standard deviations of a pose from all the evidence, each along its least constrained direction."""
 
-    turn_deg: float  # turns that leave the shape as it is aside
+    turn_deg: float  # excluding rotations under which the shape is invariant
     turn_axis_world: Vector3
-    shift_m: float  # of the mesh's middle
+    shift_m: float  # of the mesh's centre
     shift_axis_world: Vector3
     scale: float  # share
 
@@ -57,5 +57,5 @@ class Placement:
     method: str
     warnings: tuple[str, ...]
     spread: Spread | None = None
-    runner_up_turn_deg: float | None = None  # by how much the runner-up is turned from the winner
+    runner_up_turn_deg: float | None = None  # rotation between the runner-up and the winner
     matched: MatchedPoints = NO_MATCHES

@@ -1,4 +1,4 @@
-"""What a segmenter believes is there before anyone clicks."""
+"""Object proposals of a segmenter, before any click."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,7 +10,7 @@ from r2c2r_core.model.inputs import PromptPoint
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Proposal:
-    """An object to confirm or dismiss. Confirming it is adding `click` with `category`: nothing else is remembered."""
+    """An object to confirm or dismiss. Confirming it adds `click` with `category`; nothing else is stored."""
 
     kind: Literal["front", "appliance", "thing"]
     category: str  # a guess, for a person to change
@@ -18,6 +18,6 @@ class Proposal:
     click: PromptPoint  # in the frame that shows it best
     outline: PackedMask  # its visible pixels in that frame, at RGB resolution
     size_m: tuple[float, float, float]  # width, depth, height; the depth of a front is a usual one
-    centre_world: Vector3  # of its front, where it has one
+    centre_world: Vector3  # of its front, if it has one
     handle_px: tuple[tuple[float, float], ...]  # corners of its handle in that frame; empty where none was found
-    doubts: tuple[str, ...] = ()  # why it should be looked at before it is confirmed; empty for most
+    doubts: tuple[str, ...] = ()  # reasons to check it before confirming; usually empty

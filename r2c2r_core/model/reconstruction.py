@@ -1,4 +1,4 @@
-"""All nouns of one run, as the exporter needs them."""
+"""All results of one run, as the exporter needs them."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from r2c2r_core.model.track import MaskTrack
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageRun:
-    """How one stage was run."""
+    """Backend and settings of one stage's run."""
 
     name: str
     backend: str

@@ -1,4 +1,4 @@
-"""What was checked, and what was measured."""
+"""Certificate and metrics: results of checks and measurements."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -6,7 +6,7 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One thing the linter or the simulation has to say."""
+    """One finding of the linter or the simulation."""
 
     rule: str
     severity: Literal["error", "warning"]
@@ -16,21 +16,23 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoaderResult:
-    """One loader's verdict; a loader that is not installed is `not tried`, never passed."""
+    """One loader's result; a loader that is not installed is `not tried`, never passed."""
 
     loader: str
     state: Literal["passed", "failed", "not tried"]
     detail: str
-    steps_per_s: tuple[tuple[int, float], ...] = ()  # worlds at once, and steps of all of them in a second of this machine
+    steps_per_s: tuple[
+        tuple[int, float], ...
+    ] = ()  # number of parallel worlds, and their total steps per second on this machine
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocker:
-    """What keeps a joint from opening all the way: a loose thing, or what another joint moves when that is open too."""
+    """Obstacle that keeps a joint from opening fully: a free object, or a part moved by another joint when that is open too."""
 
-    name: str  # of the thing's object, or of the other joint
+    name: str  # of the free object, or of the other joint
     kind: Literal["thing", "joint"]
-    position: float  # of the blocked joint, rad or m: the first of the sweep at which they overlap
+    position: float  # of the blocked joint, rad or m: the first position of the sweep at which they overlap
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,18 +41,18 @@ class JointResult:
 
     joint: str
     deepest_penetration_m: float  # over the kinematic sweep, 21 positions
-    travel_reached: float  # 0..1 of the range under the stated force
-    cavity_open: float | None = None  # 0..1 of the space it opens that no collider fills; None: no such space
+    travel_reached: float  # fraction 0..1 of the range under the stated force
+    cavity_open: float | None = None  # fraction 0..1 of the space it opens that no collider fills; None: no such space
     blocked_by: tuple[Blocker, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThingResult:
-    """A free-standing thing: whether it stays where it stands, and whether its opening is open to an engine."""
+    """Test of a free-standing object: whether it stays in place, and whether its opening is free of colliders."""
 
     name: str
     drift_m: float
-    opening_free: float | None = None  # 0..1 of the hollow of its mesh that no collider fills; None: it has no hollow
+    opening_free: float | None = None  # fraction 0..1 of its mesh's cavity that no collider fills; None: it has no cavity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +66,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColliderFit:
-    """How far what an engine touches of a link lies from what is drawn of it."""
+    """Distances between a link's colliders and its visual."""
 
     link: str
     drawn_to_collider: Gap
@@ -73,10 +75,10 @@ class ColliderFit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Likeness:
-    """Whether the scene can be what was filmed: the second verdict of a certificate, beside that of physics."""
+    """Plausibility verdict of a certificate, beside that of physics: whether the scene can be the filmed one."""
 
     state: Literal["passed", "doubtful", "failed"]
-    doubts: tuple[tuple[str, str], ...]  # objects to look at, and why: contradictions first
+    doubts: tuple[tuple[str, str], ...]  # objects to check, with reasons: contradictions first
 
 
 ALIKE = Likeness(state="passed", doubts=())
@@ -84,7 +86,7 @@ ALIKE = Likeness(state="passed", doubts=())
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
-    """The proof that goes into every bundle."""
+    """Certificate included in every bundle."""
 
     passed: bool
     likeness: Likeness

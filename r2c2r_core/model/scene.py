@@ -1,4 +1,4 @@
-"""An articulated scene: fixtures made of panels, then dressed in the fitted meshes."""
+"""Articulated scene: fixtures made of panels, with the fitted meshes as visuals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,9 +11,9 @@ from r2c2r_core.model.motion import JointMotion, Source
 
 JointType = Literal["revolute", "prismatic"]
 InsidePart = Literal["depth", "shelves"]
-"""What of the space behind a front may have been seen: how deep it is (of a drawer, its tray), and where its shelves are."""
+"""Observable properties of the space behind a front: its depth (for a drawer, its tray's) and its shelves."""
 Role = Literal["front", "handle", "carcass", "inner"]
-"""What a board is to the unit: a door or drawer front (or a fixed one beside it), a piece of a handle, an outer board of the
+"""Role of a board in its unit: a door or drawer front (or a fixed one beside it), a piece of a handle, an outer board of the
 body, or something inside that no camera sees (a shelf, a divider, a drawer's tray)."""
 
 
@@ -21,7 +21,7 @@ body, or something inside that no camera sees (a shelf, a divider, a drawer's tr
 class Box:
     """A panel or a handle piece: a box in its link's frame."""
 
-    name: str  # for people and files; what it is says its role
+    name: str  # for people and files; its function is its role
     role: Role
     size_m: Vector3
     link_from_box: Rigid3
@@ -53,17 +53,17 @@ class Link:
     boxes: tuple[Box, ...]  # colliders, and the visual where `visual` is None
     pieces: tuple[ConvexPiece, ...]
     visual: TexturedMesh | None  # in the link frame
-    colour: tuple[float, float, float]  # RGB 0..1 of the primitive where no mesh covers it
+    colour: tuple[float, float, float]  # RGB 0..1 of the primitive without a mesh
     inertial: Inertial
 
     def of_role(self, role: Role) -> tuple[Box, ...]:
-        """The boxes that are this to the unit."""
+        """The boxes with that role."""
         return tuple(box for box in self.boxes if box.role == role)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Joint:
-    """Moves `child` in `parent`. 0 is closed, positive opens."""
+    """Joint that moves `child` relative to `parent`. 0 is closed, positive opens."""
 
     name: str
     type: JointType
@@ -78,14 +78,14 @@ class Joint:
     damping: float
     friction: float
     sources: dict[str, Source]  # axis, origin, lower (limit), limits (the upper one)
-    uncut: float | None = None  # the upper limit before an obstacle cut it short; None where nothing did
-    confidence: float | None = None  # in the side it is hinged on, 0..1; None where the category leaves no choice
-    motion: JointMotion | None = None  # as it was filmed; None where it was not seen to move
+    uncut: float | None = None  # the upper limit before an obstacle reduced it; None without one
+    confidence: float | None = None  # in its hinge side, 0..1; None where the category leaves no choice
+    motion: JointMotion | None = None  # filmed motion; None if it was not observed to move
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SceneObject:
-    """One fixture or free-standing thing."""
+    """One fixture or free-standing object."""
 
     name: str
     category: str  # as the person wrote it
@@ -98,17 +98,17 @@ class SceneObject:
     movable: bool  # a free body in simulation (bottle, chair) rather than fixed to the world
     warp_residual_m: float | None  # front corners, after the fit; None before warp
     warnings: tuple[str, ...]
-    warp_residual_paper_m: float | None = None  # what the paper's affine map leaves of its own four corners, for comparison
-    final_from_placed: Rigid3 = field(default_factory=Rigid3)  # how layout and person moved it: a world motion
-    inside_sources: Mapping[InsidePart, Source] = field(default_factory=dict)  # measured, or the fixture's own: default
+    warp_residual_paper_m: float | None = None  # residual of the paper's affine map on its own four corners, for comparison
+    final_from_placed: Rigid3 = field(default_factory=Rigid3)  # displacement by layout and person: a world motion
+    inside_sources: Mapping[InsidePart, Source] = field(default_factory=dict)  # measured, or the fixture's default
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ArticulatedScene:
-    """Everything that stands in the world frame."""
+    """All objects in the world frame."""
 
     name: str
     objects: tuple[SceneObject, ...]
-    layout_moves_m: dict[str, float]  # how far the layout moved each object
+    layout_moves_m: dict[str, float]  # displacement of each object by the layout
     warnings: tuple[str, ...]
     failures: dict[str, str] = field(default_factory=dict)  # objects left out, with one line each

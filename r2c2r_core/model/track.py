@@ -1,4 +1,4 @@
-"""Where an object is seen."""
+"""Segmentation of an object over the recording."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,12 +17,12 @@ class FrontHandle:
     right_m: float
     bottom_m: float
     top_m: float
-    protrusion_m: float  # how far it stands out of the front
+    protrusion_m: float  # protrusion from the front
     confidence: float  # 0..1
 
     @property
     def centre(self) -> tuple[float, float]:
-        """(x, z) of its middle, metres."""
+        """(x, z) of its centre, metres."""
         return (self.left_m + self.right_m) / 2, (self.bottom_m + self.top_m) / 2
 
     @property
@@ -43,38 +43,38 @@ class FrontPanel:
     roll_rad: float = 0.0  # in-plane tilt that was found and removed (gravity error)
     edges: tuple[float, ...] = ()  # probability of each edge: left, right, top, bottom; empty where a person drew it
     right: float = 1.0  # probability that all of them are within 10 mm
-    seam: float = 0.0  # probability of the likeliest seam inside it that was not cut
-    slides: float = 0.0  # probability that it slides sideways, over what it stands before
+    seam: float = 0.0  # probability of the most likely seam inside it that was not cut
+    slides: float = 0.0  # probability that it slides sideways, over the panel behind it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ThingBox:
-    """A free-standing thing's gravity-aligned box, measured on its visible points. Frame: `object` (transforms.py)."""
+    """A free-standing object's gravity-aligned box, measured on its visible points. Frame: `object` (transforms.py)."""
 
     world_from_object: Rigid3
     dimensions_m: Vector3  # width, depth, height
-    support_z_m: float  # world height of what it stands on
+    support_z_m: float  # world height of its support
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MaskTrack:
-    """An object's masks at RGB resolution, and what the segmenter measured while finding them."""
+    """An object's masks at RGB resolution, with the segmenter's measurements."""
 
     name: str
     category: str
     masks: dict[int, PackedMask]  # by Frame.index; only frames that see the object
     confidence: dict[int, float]  # 0..1, same keys
     front: FrontPanel | None  # set for furniture fronts and, where found, for appliances
-    box: ThingBox | None  # set for appliances and free-standing things
+    box: ThingBox | None  # set for appliances and free-standing objects
     kind: Literal["front", "appliance", "thing"]
     backend: str
     prompt_count: int
     warnings: tuple[str, ...]
-    motions: tuple[JointMotion, ...] = ()  # of each leaf that was filmed open
+    motions: tuple[JointMotion, ...] = ()  # motion of each leaf filmed open
 
     @property
     def opened_frames(self) -> frozenset[int]:
-        """Frames in which its front is not in its place."""
+        """Frames in which its front is not closed."""
         return frozenset(
             frame for motion in self.motions for frame, state in motion.states.items() if state.value is None or state.value > 0
         )
