@@ -1,4 +1,4 @@
-"""All surfaces painted and lit into one texture, so that a frame is a single lookup."""
+"""Texture atlas of all surfaces, painted and lit, so that a frame is a single texture lookup."""
 
 from dataclasses import dataclass, field
 
@@ -18,7 +18,7 @@ _MIDDLE_TONE = 0.20  # linear; phones expose a little above 18 % grey
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LitScene:
-    """What the renderer draws, in the kitchen frame."""
+    """Geometry and atlas for the renderer, in the kitchen frame."""
 
     vertices: Points
     faces: Faces
@@ -29,23 +29,25 @@ class LitScene:
     gloss_of_patch: np.ndarray  # (patches,) float32
     normal_of_patch: np.ndarray  # (patches, 3): mean outward normal
     flat_patch: np.ndarray  # (patches,) bool
-    reflectance_of_patch: np.ndarray  # (patches,) mean albedo, which decides what the depth sensor gets back
-    pane_faces: np.ndarray  # (faces,) which belong to clear glass
+    reflectance_of_patch: np.ndarray  # (patches,) mean albedo, which determines the return of the depth sensor
+    pane_faces: np.ndarray  # (faces,) bool, belongs to clear glass
     face_normals: np.ndarray  # (m, 3) outward
     face_offsets: np.ndarray  # (m,) of the faces' planes
     emitters: tuple["Emitter", ...]
     mover_of_patch: tuple[str, ...] = ()
-    body_patch: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # (patches,) of what moves: not its front
+    body_patch: np.ndarray = field(
+        default_factory=lambda: np.zeros(0, bool)
+    )  # (patches,) bool, moving parts other than the front
 
 
 def front_patches(scene: LitScene) -> np.ndarray:
-    """(patches,) which of them are of a front that can move: its panel and its handle."""
+    """(patches,) mask of the patches of a front that can move: its panel and its handle."""
     return np.asarray(np.array([bool(mover) for mover in scene.mover_of_patch]) & ~scene.body_patch)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Emitter:
-    """A rectangle that shines."""
+    """A rectangular light source."""
 
     corner: np.ndarray
     right: np.ndarray
@@ -54,7 +56,7 @@ class Emitter:
 
 
 def light_scene(patches: list[Patch], rng: np.random.Generator) -> LitScene:
-    """Paint, light and pack all patches."""
+    """Scene with all patches painted, lit and packed."""
     tiles = [paint_tile(*_tile_size(patch), patch.paint, rng) for patch in patches]
     albedo = np.array([tile.reshape(-1, 3).mean(axis=0) for tile in tiles])
     panes = np.array([patch.paint.kind == "glass" for patch in patches])
@@ -99,7 +101,7 @@ def light_scene(patches: list[Patch], rng: np.random.Generator) -> LitScene:
 
 
 def _light_through(patches: list[Patch], panes: np.ndarray, albedo: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
-    """The light on every patch; panes stop none of it and have none of their own."""
+    """Light on every patch; panes neither block light nor have light of their own."""
     solid = np.flatnonzero(~panes)
     light = [np.ones((1, 1, 3), np.float32)] * len(patches)
     for index, grid in zip(solid, bake_light([patches[i] for i in solid], albedo[solid], rng), strict=True):
@@ -120,7 +122,7 @@ def _tile_size(patch: Patch) -> tuple[int, int]:
 
 
 def _shelve(sizes: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], int]:
-    """Places (x, y) of the padded tiles on shelves, tallest first, and the height used."""
+    """Shelf packing: positions (x, y) of the padded tiles, tallest first, and the height used."""
     places = [(0, 0)] * len(sizes)
     x = y = shelf = 0
     for index in sorted(range(len(sizes)), key=lambda i: (-sizes[i][0], i)):
@@ -133,7 +135,7 @@ def _shelve(sizes: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], int]:
 
 
 def _exposure(patches: list[Patch], albedo: np.ndarray, light: list[np.ndarray]) -> float:
-    """The gain an automatic exposure picks: what stands in the run and its surroundings average to a middle tone."""
+    """Gain of an automatic exposure: the run and its surroundings average to a middle tone."""
     radiance = np.array([float(albedo[i].mean() * light[i].mean()) for i in range(len(patches))])
     area = np.array([patch.size_m[0] * patch.size_m[1] for patch in patches])
     things = np.array([patch.object_id > 0 for patch in patches])

@@ -1,4 +1,4 @@
-"""Kitchen → surfaces: fronts, carcasses, handles, appliances, bottles and the room."""
+"""Surfaces of a planned kitchen: fronts, carcasses, handles, appliances, bottles and the room."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,7 +30,7 @@ _NONE: Hollows = MappingProxyType({})
 def build_kitchen(kitchen: Kitchen, hollows: Hollows = _NONE) -> list[Patch]:
     """All surfaces with every front closed, and instance ids 1 + position in `kitchen.object_names` (0: background).
 
-    `hollows` are the insides that can be seen, by the name of the unit or of the machine's joint; all else is solid.
+    `hollows` are the visible interiors, by the name of the unit or of the machine's joint; all else is solid.
     """
     ids = {name: position + 1 for position, name in enumerate(kitchen.object_names)}
     patches = _room(kitchen)
@@ -87,7 +87,7 @@ def _room(kitchen: Kitchen) -> list[Patch]:
 
 
 def _splashback(kitchen: Kitchen, run: Run) -> list[Patch]:
-    """On the wall behind a run, from the worktop to the wall cabinets."""
+    """Splashback on the wall behind a run, from the worktop to the wall cabinets."""
     top = min((c.z for c in run.upper_carcasses), default=kitchen.worktop_top_m + 0.5)
     left, right = run.ends
     low, high = (left, -0.009, kitchen.worktop_top_m), (right, -0.0005, top)
@@ -95,7 +95,7 @@ def _splashback(kitchen: Kitchen, run: Run) -> list[Patch]:
 
 
 def _posed(patches: list[Patch], run: Run) -> list[Patch]:
-    """From the run's frame into the kitchen's."""
+    """Patches transformed from the run's frame to the kitchen's."""
     return (
         shifted(turned(patches, run.yaw_rad, (0.0, 0.0)), np.array([*run.place, 0.0]))
         if run.yaw_rad or any(run.place)
@@ -151,7 +151,7 @@ def _base_body(kitchen: Kitchen, run: Run, hollows: Hollows) -> list[Patch]:
 
 
 def _worktop_surface(kitchen: Kitchen, run: Run, front: float) -> list[Patch]:
-    """The top, with a hole where the sink is."""
+    """Top of the worktop, with a hole for the sink."""
     left, right = run.ends
     top = kitchen.worktop_top_m
     sink = next((p for p in run.props if p.kind == "sink"), None)
@@ -166,13 +166,13 @@ def _worktop_surface(kitchen: Kitchen, run: Run, front: float) -> list[Patch]:
 
 
 def _behind(carcass: Carcass, run: Run, hollows: Hollows) -> list[Hollow]:
-    """The compartments of a carcass that can be seen."""
+    """Visible compartments of a carcass."""
     units = [unit for unit in (*run.base, *run.upper) if unit.name in hollows]
     return [hollows[unit.name] for unit in units if carcass_behind(run, unit) is carcass]
 
 
 def _opened_carcass(carcass: Carcass, hollows: list[Hollow], paint: Paint) -> list[Patch]:
-    """The front edges of a carcass's boards, and what is between them."""
+    """The front edges of a carcass's boards, and its compartments."""
     return [*pierced_front(carcass, hollows, paint), *(patch for each in hollows for patch in hollow_patches(each))]
 
 
@@ -192,7 +192,7 @@ def _upper_body(kitchen: Kitchen, run: Run, hollows: Hollows) -> list[Patch]:
 
 
 def _glazed(carcass: Carcass, kitchen: Kitchen) -> list[Patch]:
-    """What is seen through panes: boards of 16 mm, and cups and plates on two shelves."""
+    """Interior visible through panes: boards of 16 mm, and cups and plates on two shelves."""
     inside, wall = kitchen.style.carcass, 0.016
     x0, x1 = carcass.x + wall, carcass.x + carcass.width_m - wall
     z0, z1 = carcass.z + wall, carcass.z + carcass.height_m - wall
@@ -239,7 +239,7 @@ def _furniture(
 
 
 def _back(leaf: Leaf, y: float, paint: Paint, object_id: int) -> list[Patch]:
-    """The inner face of a front."""
+    """Inner face of a front."""
     low, high = (leaf.x, y - 0.001, leaf.z), (leaf.x + leaf.width_m, y, leaf.z + leaf.height_m)
     return box(low, high, paint, faces="back", object_id=object_id)
 
@@ -267,7 +267,7 @@ def _fridge(kitchen: Kitchen, object_id: int, hollows: Hollows) -> list[Patch]:
 def _machine_body(
     thing: Appliance, low: tuple[float, float, float], high: tuple[float, float, float], object_id: int, hollows: Hollows
 ) -> list[Patch]:
-    """The box behind a machine's fronts, open to the compartments that can be seen, with the drawers in them."""
+    """Box behind a machine's fronts, open to its visible compartments, with the drawers in them."""
     seen = {name: hollows[name] for name in thing.fronts if name in hollows}
     if not seen:
         return box(low, high, thing.body, object_id=object_id)
@@ -280,7 +280,7 @@ def _machine_body(
         spans += [(low[0], high[0], z, bottom), (low[0], left, bottom, top), (right, high[0], bottom, top)]
         z = top
     patches += facing_quads([*spans, (low[0], high[0], z, high[2])], low[1], thing.body, object_id)
-    inner = [patch for each in compartments for patch in hollow_patches(each)]  # masks are of what moves, and of the outside
+    inner = [patch for each in compartments for patch in hollow_patches(each)]  # masks cover moving parts and the outside only
     inner += [patch for name, each in seen.items() for patch in tray_patches(each, name, object_id)]
     return patches + shifted(inner, centre)
 
@@ -295,7 +295,7 @@ def _fridge_fronts(fridge: Appliance, x0: float, x1: float, z0: float, z1: float
 
 
 def _fridge_handles(fridge: Appliance) -> list[Handle]:
-    """Its handle; of french doors one beside the middle on either side, and one along the drawer's upper edge."""
+    """Its handle; for french doors one next to the middle on either side, and one along the drawer's upper edge."""
     if not fridge.drawer_m:
         return [fridge.handle]
     middle = fridge.size_m[0] / 2
@@ -304,7 +304,7 @@ def _fridge_handles(fridge: Appliance) -> list[Handle]:
 
 
 def _microwave(kitchen: Kitchen, oven: Appliance, object_id: int, hollows: Hollows) -> list[Patch]:
-    """Door on the hinge side, control panel beside it; turned by its yaw on the worktop."""
+    """Door on the hinge side, control panel beside it; rotated by its yaw on the worktop."""
     x0, x1, y0, y1, z0, z1 = _bounds(oven)
     z0 += 0.012  # above its feet
     split = y0 + oven.door_thickness_m

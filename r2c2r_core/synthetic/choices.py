@@ -1,4 +1,4 @@
-"""What a person may ask of a synthetic kitchen, by name."""
+"""Styles, palettes and layouts of synthetic kitchens that a person can choose, by name."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ DEFAULT_STYLE, DEFAULT_LAYOUT = "slab", "straight"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """What was asked for; with nothing asked the kitchen is the seed's own."""
+    """A person's choice of style, palette and layout; an empty one gives the seed's own kitchen."""
 
     style: str | None = None  # of STYLES
     palette: str | None = None  # of PALETTES

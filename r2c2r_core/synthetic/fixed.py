@@ -1,4 +1,4 @@
-"""What is somebody's object and does not open: open shelves and hoods."""
+"""Prompted objects without joints: open shelves and hoods."""
 
 import numpy as np
 
@@ -12,14 +12,14 @@ _STEEL = Paint(kind="steel", colour=(0.50, 0.51, 0.52), gloss=0.6, texel_m=0.002
 
 
 def fixed_patches(thing: Fixed, style: Style, object_id: int) -> list[Patch]:
-    """Its surfaces, in the frame of its run."""
+    """Surfaces of a fixed object, in the frame of its run."""
     if thing.category == "hood":
         return _hood(thing, object_id)
     return _open_shelf(thing, style, object_id)
 
 
 def _open_shelf(thing: Fixed, style: Style, object_id: int) -> list[Patch]:
-    """Two sides, a back and shelves, with cups and bowls on them that are nobody's."""
+    """Two sides, a back and shelves, with cups and bowls on them as background."""
     (x0, y0, z0), (x1, y1, z1) = thing.low, thing.high
     paint = style.wall_front
     patches = box((x0, y0, z0), (x0 + _BOARD_M, y1, z1), paint, object_id=object_id)
@@ -37,7 +37,7 @@ def _open_shelf(thing: Fixed, style: Style, object_id: int) -> list[Patch]:
 
 
 def _hood(thing: Fixed, object_id: int) -> list[Patch]:
-    """A flat canopy as wide as it is, and a chimney on the wall above."""
+    """A flat canopy of the hood's width, and a chimney on the wall above."""
     (x0, _, z0), (x1, y1, z1) = thing.low, thing.high
     middle = (x0 + x1) / 2
     canopy = box(thing.low, (x1, y1, z0 + _CANOPY_M), _STEEL, object_id=object_id)

@@ -1,4 +1,4 @@
-"""A front's surfaces: a slab or a frame with what fills it, and its handle."""
+"""Surfaces of a front: a slab or a frame with its filling, and the handle."""
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def _slab(leaf: Leaf, face_y: float, thickness: float, paint: Paint | dict[str, 
 
 
 def _framed(leaf: Leaf, frame: Frame, face_y: float, thickness: float, paint: Paint, object_id: int) -> list[Patch]:
-    """Two stiles, two rails between them, and what they hold."""
+    """Two stiles, two rails between them, and their filling."""
     x0, x1, z0, z1 = leaf.x, leaf.x + leaf.width_m, leaf.z, leaf.z + leaf.height_m
     rail = frame.rail_m
     patches = []
@@ -92,7 +92,7 @@ def handle_patches(handle: Handle, corner: np.ndarray, paint: Paint, object_id: 
 
 
 def _cup(handle: Handle, centre: np.ndarray, paint: Paint, object_id: int) -> list[Patch]:
-    """A shell open below: a quarter of an ellipsoid, `thickness_m` high, closed by what its shadow hides."""
+    """A shell open below: a quarter of an ellipsoid, `thickness_m` high, its mouth closed by a dark patch as its shadow."""
     half, reach, height = handle.length_m / 2, handle.reach_m, handle.thickness_m
     rise, turn = np.linspace(np.pi / 2, 0.0, _CUP_STEPS)[:, None], np.linspace(np.pi, 0.0, 2 * _CUP_STEPS)[None, :]
     shell = np.stack(

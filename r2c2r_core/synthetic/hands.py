@@ -1,4 +1,4 @@
-"""A person's hand and forearm on a front while it moves: dark, and nobody's."""
+"""A person's hand and forearm on a moving front: dark, and background."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from r2c2r_core.synthetic.patches import Patch, lathe, moving
 
 _SLEEVE = Paint(kind="laminate", colour=(0.06, 0.05, 0.05), texel_m=0.004)
 _PROFILE = ((0.0, 0.62), (0.055, 0.6), (0.05, 0.35), (0.034, 0.14), (0.045, 0.08), (0.04, 0.02), (0.0, 0.0))
-_SHOULDER_DROP_M, _SHOULDER_ASIDE_M = 0.3, 0.25  # of the hand's person, who holds the phone in the other
+_SHOULDER_DROP_M, _SHOULDER_ASIDE_M = 0.3, 0.25  # of the hand's owner, who holds the phone in the other hand
 
 
 def hand_mover(joint: str) -> str:
-    """The mover's name of the hand on that joint's front."""
+    """Mover name of the hand on that joint's front."""
     return f"hand:{joint}"
 
 
@@ -23,7 +23,7 @@ def hand_patches(joint: str) -> list[Patch]:
 
 
 def hand_pose(front: Front, grip: np.ndarray, state: float, eye: np.ndarray, right: np.ndarray) -> Rigid3:
-    """Where the hand is: on the grip (a point of the closed front), its arm towards the person behind the camera."""
+    """Pose of the hand: on the grip (a point of the closed front), its arm towards the person behind the camera."""
     place = front.pose(state).apply(grip)
     shoulder = eye - [0.0, 0.0, _SHOULDER_DROP_M] + _SHOULDER_ASIDE_M * right
     along = shoulder - place
@@ -34,7 +34,7 @@ def hand_pose(front: Front, grip: np.ndarray, state: float, eye: np.ndarray, rig
 
 
 def grip_of(front: Front, patches: list[Patch]) -> np.ndarray:
-    """Where a hand takes hold: the handle's middle, or the middle of the edge that moves most."""
+    """Grip point of a hand: the handle's centre, or the middle of the edge that moves most."""
     handle = [p.grid.reshape(-1, 3) for p in patches if p.mover == front.joint.name and p.is_handle]
     if handle:
         return np.asarray(np.concatenate(handle).mean(axis=0))

@@ -1,6 +1,6 @@
-"""What is behind a front that opens: boards, shelves, and the drawer that comes out with it.
+"""Interiors behind fronts that open: boards, shelves, and the drawer that slides out with its front.
 
-All lengths of one inside come from one place, so that what is drawn and what the truth says are the same.
+All lengths of one interior have a single source, so that the rendering and the truth agree.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ _MACHINES = {"dishwasher": _TUB, "oven": _OVEN, "microwave": _OVEN}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tray:
-    """The box behind a drawer's front: its outside where it is closed, in the frame of its run."""
+    """The box behind a drawer's front: its outer bounds when closed, in the frame of its run."""
 
     low: Vector
     high: Vector
@@ -46,7 +46,7 @@ class Hollow:
 
     @property
     def inside(self) -> Inside:
-        """Its true measures: of the drawer where it holds one."""
+        """True dimensions: of the drawer if there is one, else of the compartment."""
         if self.tray is not None:
             (x0, _, z0), (x1, y1, z1), wall = self.tray.low, self.tray.high, self.tray.board_m
             return Inside(
@@ -67,7 +67,7 @@ class Hollow:
 
 
 def unit_hollow(kitchen: Kitchen, run: Run, furniture: Furniture, rng: np.random.Generator) -> Hollow:
-    """Behind the front of a unit."""
+    """Compartment behind the front of a unit."""
     carcass, first, last = carcass_behind(run, furniture), furniture.leaves[0], furniture.leaves[-1]
     machine = _MACHINES.get(furniture.category)
     board = _MACHINE_WALL_M if machine is not None else float(rng.uniform(*_BOARDS_M))
@@ -92,7 +92,7 @@ def unit_hollow(kitchen: Kitchen, run: Run, furniture: Furniture, rng: np.random
 
 
 def appliance_hollow(thing: Appliance, front: str, rng: np.random.Generator) -> Hollow:
-    """Behind a front of a free-standing machine, in the frame of its box: x from its middle, y and z from its centre."""
+    """Compartment behind a front of a free-standing machine, in its box's frame: x from its middle, y and z from its centre."""
     (width, depth, height), is_drawer = thing.size_m, front.endswith("_drawer")
     cold = thing.category != "microwave"
     wall = _FRIDGE_WALL_M if cold else 0.012
@@ -127,7 +127,7 @@ def carcass_behind(run: Run, furniture: Furniture) -> Carcass:
 
 
 def hollow_patches(hollow: Hollow, object_id: int = 0) -> list[Patch]:
-    """The boards of a compartment as seen from within, its shelves, and what stands on them."""
+    """The boards of a compartment as seen from within, its shelves, and the objects on them."""
     low, high, board = hollow.low, hollow.high, hollow.board_m
     patches = inner_walls(low, high, hollow.paint, object_id)
     for level in hollow.shelves_m:
@@ -142,7 +142,7 @@ def hollow_patches(hollow: Hollow, object_id: int = 0) -> list[Patch]:
 
 
 def tray_patches(hollow: Hollow, mover: str, object_id: int) -> list[Patch]:
-    """The drawer of a compartment where it is closed, with a box in it; nothing where it holds none."""
+    """The closed drawer of a compartment, with a box in it; empty without a drawer."""
     if hollow.tray is None:
         return []
     low, high, wall = hollow.tray.low, hollow.tray.high, hollow.tray.board_m
@@ -161,7 +161,7 @@ def tray_patches(hollow: Hollow, mover: str, object_id: int) -> list[Patch]:
 
 
 def pierced_front(carcass: Carcass, hollows: list[Hollow], paint: Paint) -> list[Patch]:
-    """The front of a carcass, facing -Y, with what its compartments leave of it: the edges of its boards."""
+    """Front plane of a carcass, facing -Y, outside its compartments: the edges of its boards."""
     x0, x1 = carcass.x, carcass.x + carcass.width_m
     y, z, top = -carcass.depth_m, carcass.z, carcass.z + carcass.height_m
     spans = []
@@ -182,7 +182,7 @@ def facing_quads(spans: list[tuple[float, float, float, float]], y: float, paint
 
 
 def _shelves(height: float, rng: np.random.Generator) -> tuple[float, ...]:
-    """As many as fit with room for a hand, not quite evenly spaced."""
+    """Heights of shelves, as many as leave space for a hand, not quite evenly spaced."""
     count = min(int(height / _LEAST_SHELF_SPACE_M) - 1, int(rng.integers(1, 4)))
     if count < 1:
         return ()
@@ -191,7 +191,7 @@ def _shelves(height: float, rng: np.random.Generator) -> tuple[float, ...]:
 
 
 def _tray(low: Vector, high: Vector, back: float, travel: float, rng: np.random.Generator) -> Tray:
-    """As deep as its travel, or up to what the compartment leaves; its sides lower than the opening."""
+    """Drawer as deep as its travel, limited by the compartment; its sides lower than the opening."""
     wall, most = float(rng.uniform(*_DRAWER_BOARDS_M)), high[1] - 0.012
     rear = min(back + travel + float(rng.uniform(0.01, 0.09)), most)
     rise = float(rng.uniform(0.5, 0.85)) * (high[2] - low[2])

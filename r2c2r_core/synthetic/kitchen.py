@@ -1,4 +1,4 @@
-"""A planned kitchen: sizes, places, hinge sides and looks, before anything is built.
+"""Plan of a kitchen: sizes, positions, hinge sides and looks, before anything is built.
 
 Kitchen frame: metres, +Z up, floor z = 0, back wall at y = 0, fronts face -Y, +X to the right of a person facing them.
 """
@@ -35,7 +35,7 @@ class Handle:
     kind: HandleKind
     length_m: float
     thickness_m: float
-    reach_m: float  # how far it stands out of the front
+    reach_m: float  # protrusion from the front
     vertical: bool
     x: float  # its centre, from the front's left edge
     z: float  # its centre, from the front's bottom edge
@@ -43,7 +43,7 @@ class Handle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """Four rails round what fills a front: a sunk panel, clear glass, or glass that nothing is seen through."""
+    """Four rails around the filling of a front: a recessed panel, clear glass, or frosted glass."""
 
     rail_m: float
     recess_m: float
@@ -63,7 +63,7 @@ class Leaf:
     open_limit: float  # rad, or metres where it slides
     slides: Way | None = None  # along the run; without it, and without a hinge, it is a drawer
     frame: Frame | None = None  # None: a slab
-    look: Paint | None = None  # of an appliance's front; None: as its run's fronts
+    look: Paint | None = None  # paint of an appliance's front; None: as its run's fronts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +78,7 @@ class Furniture:
     shows_right_side: bool = False
 
     def joint_name(self, leaf: Leaf) -> str:
-        """Of the joint that moves one of its leaves."""
+        """Name of the joint that moves one of its leaves."""
         return f"{self.name}_joint{f'_{leaf.hinge}' if len(self.leaves) > 1 else ''}"
 
 
@@ -96,7 +96,7 @@ class Carcass:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Board:
-    """A fixed part that is nobody's object: a face frame, a channel, a filler, an end panel."""
+    """A fixed background part: a face frame, a channel, a filler, an end panel."""
 
     low: tuple[float, float, float]
     high: tuple[float, float, float]
@@ -105,7 +105,7 @@ class Board:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fixed:
-    """A prompted object of a run that does not open: an open shelf, a hood. Its box."""
+    """A prompted object of a run without joints, as a box: an open shelf, a hood."""
 
     name: str
     category: str
@@ -133,7 +133,7 @@ class Appliance:
 
     @property
     def fronts(self) -> tuple[str, ...]:
-        """The names of its joints: of its door; or of the left one, the right one, and the drawer under them."""
+        """Names of its joints: of its door; or of the left door, the right one, and the drawer under them."""
         return tuple(f"{self.name}_joint{part}" for part in (("_left", "_right", "_drawer") if self.drawer_m else ("",)))
 
 
@@ -156,7 +156,7 @@ class Bottle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prop:
-    """Something that nobody clicks: a sink, a hob, a kettle, a shelf …, standing at (x, y)."""
+    """An unprompted object at (x, y): a sink, a hob, a kettle, a shelf …"""
 
     kind: str
     x: float
@@ -187,13 +187,13 @@ class Run:
 
     @property
     def kitchen_from_run(self) -> Rigid3:
-        """Its pose."""
+        """Pose of the run."""
         return Rigid3(rotation_about_z(self.yaw_rad), np.array([*self.place, 0.0]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Style:
-    """What all units of one kitchen share."""
+    """Paints and dimensions common to all units of one kitchen."""
 
     base_front: Paint
     wall_front: Paint
@@ -211,7 +211,7 @@ class Style:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kitchen:
-    """Everything the builder needs."""
+    """Complete plan for the builder."""
 
     style: Style
     runs: tuple[Run, ...]  # the first stands along the back wall

@@ -1,4 +1,4 @@
-"""Which kitchen a seed gives."""
+"""Random kitchen of a seed."""
 
 from dataclasses import replace
 
@@ -78,7 +78,7 @@ def plan_kitchen(seed: int) -> Kitchen:
 
 
 def _framed(units: tuple[Furniture, ...]) -> tuple[Furniture, ...]:
-    """The units with a frame round a sunk panel on every front that is high enough for one."""
+    """The units with a frame around a recessed panel on every front that is high enough for one."""
     return tuple(
         replace(
             unit,
@@ -319,7 +319,7 @@ def place_microwave(rng: np.random.Generator, right: float, worktop_top: float) 
 def fill_worktop(
     rng: np.random.Generator, right: float, microwave: Appliance | None, base: tuple[Furniture, ...], base_depth: float
 ) -> tuple[tuple[Prop, ...], tuple[Bottle, ...]]:
-    """Three bottles, and what else fits beside the microwave, none overlapping along the run."""
+    """Three bottles, and props that fit beside the microwave, without overlaps along the run."""
     stays = [] if microwave is None else [(microwave.centre[0], microwave.size_m[0] / 2 + 0.05)]
     taken = list(stays)
     props: list[Prop] = []
@@ -338,7 +338,7 @@ def fill_worktop(
             props.append(Prop(kind=kind, x=x, y=-base_depth / 2, width_m=2 * half, paint=paint))
     while len(bottles) < 3:
         x = _free_place(rng, right, taken, 0.065)
-        if x is None:  # too full: the sink and the hob give way
+        if x is None:  # too full: retry without the sink and the hob
             props, bottles, taken = [], [], list(stays)
             continue
         bottles.append(_pick_bottle(rng, f"bottle_{len(bottles) + 1}", x, base_depth))
@@ -357,7 +357,7 @@ def fill_worktop(
 
 
 def _free_place(rng: np.random.Generator, right: float, taken: list[tuple[float, float]], half: float) -> float | None:
-    """An x on the worktop that keeps clear of what is taken; claims it."""
+    """An x on the worktop clear of the occupied intervals, which it reserves; None without one."""
     for _ in range(60):
         x = float(rng.uniform(half + 0.03, right - half - 0.03))
         if all(abs(x - other) > half + other_half for other, other_half in taken):
@@ -367,7 +367,7 @@ def _free_place(rng: np.random.Generator, right: float, taken: list[tuple[float,
 
 
 def hang_on_wall(rng: np.random.Generator, right: float, upper: tuple[Furniture, ...]) -> tuple[Prop, ...]:
-    """A shelf of books beside the wall cabinets where there is room, and sockets."""
+    """A shelf of books beside the wall cabinets where there is space, and sockets."""
     left_end, right_end = upper[0].leaves[0].x, upper[-1].leaves[0].x + upper[-1].leaves[0].width_m
     white = Paint(kind="laminate", colour=(0.80, 0.80, 0.78), texel_m=0.002)
     props = [

@@ -1,4 +1,4 @@
-"""One front of a unit: how far it opens, and where its handle is."""
+"""One front of a unit: its opening range and its handle."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ _HINGES_DEG = (95.0, 100.0, 107.0, 110.0)  # openings that makers of concealed h
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where a unit stands: what its carcass takes up."""
+    """Position and outer bounds of a unit's carcass."""
 
     x: float
     width_m: float
@@ -26,7 +26,7 @@ class Place:
 def drawer_leaf(
     left: float, right: float, row: tuple[float, float], place: Place, look: Look, rng: np.random.Generator
 ) -> Leaf:
-    """As far out as its runner: full extension, or three quarters of it."""
+    """A drawer front that opens as far as its runner: full extension, or three quarters of it."""
     low, high = row
     width, height = right - left, high - low
     runners = [length for length in _RUNNERS_M if length < place.depth_m - 0.06]
@@ -76,7 +76,7 @@ def door_leaf(
 def _door_handle(
     width: float, height: float, hinge: Hinge, place: Place, look: Look, rng: np.random.Generator
 ) -> Handle | None:
-    """Upright on the opening side near the edge that hands reach; lying in that edge's middle where the look says so."""
+    """A vertical handle at the reachable end of the opening side, or a horizontal one in the middle of that edge."""
     if look.door_handle is None:
         return None
     if look.level_handles:

@@ -1,6 +1,6 @@
-"""Light baked into every surface: soft shadows from the window and the lamp, and two bounces between the surfaces.
+"""Baked lighting of every surface: soft shadows from the window and the lamp, and interreflections between the surfaces.
 
-Irradiance is kept on a coarse grid per patch ("lumels"), in units in which radiosity = albedo * light.
+Irradiance is stored on a coarse grid per patch ("lumels"), in units in which radiosity = albedo * light.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _SHADOW_RAYS = 20
 _BOUNCE_RAYS = 40
 _BOUNCES = 3
 _CHUNK = 40_000
-_NEAREST_M2 = 0.03  # keeps surfaces that touch a lamp from shining like one
+_NEAREST_M2 = 0.03  # limits the irradiance of surfaces that touch a lamp
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,7 +102,7 @@ def _ray_scene(patches: list[Patch]) -> tuple[object, np.ndarray, np.ndarray]:
 
 
 def _direct_light(scene: object, lumels: _Lumels, emitter: Patch, radiance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Light that arrives from one rectangular emitter, with soft shadows."""
+    """Direct light from one rectangular emitter, with soft shadows."""
     corner, right, down = emitter.grid[0, 0], emitter.grid[0, -1] - emitter.grid[0, 0], emitter.grid[-1, 0] - emitter.grid[0, 0]
     facing = np.cross(down, right)
     area = float(np.linalg.norm(facing))
@@ -128,7 +128,7 @@ def _direct_light(scene: object, lumels: _Lumels, emitter: Patch, radiance: np.n
 def _bounce_hits(
     scene: object, lumels: _Lumels, patch_of_face: np.ndarray, corners: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """(n, rays) index of the lumel that each cosine-distributed ray meets; n where it meets nothing."""
+    """(n, rays) index of the lumel hit by each cosine-distributed ray; n for a miss."""
     count = len(lumels.positions)
     helper = np.where(np.abs(lumels.normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     tangent = np.cross(lumels.normals, helper)

@@ -1,4 +1,4 @@
-"""How fronts are made: what one kitchen draws of its style.
+"""Random construction of a kitchen's fronts in a style.
 
 Nothing here, nor in units.py, comes from the tables that the pipeline estimates with: handles, gaps, travels and depths have
 distributions of their own, so that an estimate is never compared with the rule that drew it.
@@ -11,12 +11,12 @@ import numpy as np
 from r2c2r_core.synthetic.kitchen import Filling, Frame, HandleKind
 
 LEVEL_HANDLE_SHARE = 0.12
-"""Of the kitchens with handles: theirs lie in the middle of the doors' upper or lower edge and say nothing of the hinge."""
+"""Fraction of kitchens whose handles lie in the middle of the doors' upper or lower edge, uninformative for the hinge."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaceFrame:
-    """The widths of a face frame's members round a unit's openings."""
+    """Widths of a face frame's members around a unit's openings."""
 
     stile_m: float
     rail_m: float
@@ -25,7 +25,7 @@ class FaceFrame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """What all fronts of one kitchen share."""
+    """Construction of all fronts of one kitchen."""
 
     door_handle: HandleKind | None
     drawer_handle: HandleKind | None
@@ -38,10 +38,10 @@ class Look:
     face_frame: FaceFrame | None
     channel_m: float | None  # height of the channel over a front
     every_channel: bool  # else only over the lowest drawer: the ones above are pulled from below
-    grip_m: float  # by which wall fronts hang lower than their carcass, to be pulled there
+    grip_m: float  # overhang of wall fronts below their carcass, to be pulled there
 
     def frame(self, height_m: float, *, upper: bool) -> Frame | None:
-        """The frame of a front of that height."""
+        """Frame of a front of that height; None for a slab."""
         glazed = upper and self.filling != "panel"
         if self.rail_m is None or (height_m < self.least_framed_m and not glazed):
             return None
@@ -51,7 +51,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Make:
-    """What a style leaves to chance."""
+    """Probabilities and options of a style."""
 
     framed: float = 0.0  # share of the kitchens with framed fronts
     doors: tuple[HandleKind, ...] = ()
@@ -75,7 +75,7 @@ _MAKES = {
 
 
 def pick_look(style: str, rng: np.random.Generator) -> Look:
-    """One kitchen's look in a style of choices.py."""
+    """Random look of one kitchen in a style of choices.py."""
     make = _MAKES[style]
     door = _one_of(make.doors, rng)
     drawer = door if make.drawers is None else _one_of(make.drawers, rng)

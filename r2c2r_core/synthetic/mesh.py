@@ -1,4 +1,4 @@
-"""Patches joined into one triangle mesh."""
+"""Triangle mesh joined from patches."""
 
 from typing import NamedTuple
 

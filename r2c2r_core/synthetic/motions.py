@@ -1,4 +1,4 @@
-"""What is true of every joint of a film: where it stands in each frame, how much of its front is seen, its stop, its inside."""
+"""Ground truth of every joint in a recording: its state and its front's visibility in each frame, its stop, its interior."""
 
 from dataclasses import asdict, dataclass
 
@@ -13,26 +13,26 @@ from r2c2r_core.synthetic.render import View
 
 _BEHIND_M = 0.05
 _FEWEST_STILL = 3  # frames that show a front at rest, for its stop to be seen
-MIN_SEEN_PX, MIN_SEEN_SHARE = 400, 0.25  # as evaluate asks (records.py); stages do not import each other
+MIN_SEEN_PX, MIN_SEEN_SHARE = 400, 0.25  # as required by evaluate (records.py); stages do not import each other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sight:
-    """How much of a front one frame shows."""
+    """Visible part of a front in one frame."""
 
     seen_px: int
-    seen_share: float  # of its whole outline, what hides it and the frame's edges taken away
+    seen_share: float  # fraction of its whole outline, reduced by occlusion and the frame's edges
 
     @property
     def shows(self) -> bool:
-        """Whether a person would say that the frame shows it."""
+        """Whether a person would call the front visible in the frame."""
         return self.seen_px >= MIN_SEEN_PX and self.seen_share >= MIN_SEEN_SHARE
 
 
 def sights(
     film: Film, states: dict[str, float], scene: LitScene, view: View, camera: Intrinsics, camera_from_kitchen: Rigid3
 ) -> dict[str, Sight]:
-    """Of every front, by its joint's name."""
+    """Visibility of every front, by its joint's name."""
     names = np.array(scene.mover_of_patch)
     counts = np.bincount(view.patch[view.patch >= 0], minlength=len(names)) * ~scene.body_patch
     found = {}
@@ -44,7 +44,7 @@ def sights(
 
 
 def motion_entries(film: Film, seen: list[dict[str, Sight]]) -> dict[str, dict[str, object]]:
-    """The keys that truth.json gains per joint."""
+    """Additional truth.json entries of each joint."""
     frames = len(seen)
     times = [share_of(i, frames) for i in range(frames)]
     states = [film.states(time) for time in times]
@@ -66,7 +66,7 @@ def motion_entries(film: Film, seen: list[dict[str, Sight]]) -> dict[str, dict[s
 
 
 def _outline_px(front: Front, state: float, camera: Intrinsics, camera_from_kitchen: Rigid3) -> float:
-    """The area of a front's outline, as if the picture had no edges; 0 where a part of it is behind the camera."""
+    """Area of a front's outline without cropping at the image border; 0 where a part of it is behind the camera."""
     corners = camera_from_kitchen.apply(front.pose(state).apply(front.corners))
     if corners[:, 2].min() < _BEHIND_M:
         return 0.0

@@ -1,4 +1,4 @@
-"""Where a person stands who films what is opened: past everything, then before each front in turn."""
+"""Camera path of a person who films fronts being opened: past everything, then in front of each front in turn."""
 
 import numpy as np
 
@@ -6,15 +6,15 @@ from r2c2r_core.synthetic.kitchen import Kitchen
 from r2c2r_core.synthetic.opening import WALK_FROM, WALK_TO, Film, Front, Opening, swept
 from r2c2r_core.synthetic.path import Shot, even_pace, film_along, key_poses
 
-_ASIDE_DEG = (10, -10, 22, -22, 34, -34, 46, -46, 58, -58)  # from straight before a front
-_AWAY_M = (1.55, 1.35, 1.75, 1.2, 1.05, 0.9)  # from its closed face; the earlier is the better liked
-_EYE_M = (1.15, 1.55)  # heights of the phone, lower for what hangs on the wall
+_ASIDE_DEG = (10, -10, 22, -22, 34, -34, 46, -46, 58, -58)  # from the normal of a front
+_AWAY_M = (1.55, 1.35, 1.75, 1.2, 1.05, 0.9)  # from its closed face, in order of preference
+_EYE_M = (1.15, 1.55)  # heights of the phone, lower for wall units
 _FROM_LEAF_M, _FROM_UNITS_M, _FROM_WALLS_M = 0.45, 0.3, 0.3
 _SWAY_M = 0.13
 
 
 def walk_and_open(film: Film, frames: int, rng: np.random.Generator) -> list[Shot]:
-    """The shots of a film: the walk squeezed between what stands open at the start and what is opened after it."""
+    """Shots of a film: the walk takes place between the closing of the initially open front and the first opening."""
     eyes, targets = key_poses(film.kitchen, rng)
     knots = WALK_FROM + (WALK_TO - WALK_FROM) * even_pace(eyes, targets)
     before = [o for o in film.openings if o.rises[0] < 0]
@@ -34,7 +34,7 @@ def walk_and_open(film: Film, frames: int, rng: np.random.Generator) -> list[Sho
 
 
 def _turns(openings: list[Opening]) -> list[tuple[Opening, ...]]:
-    """Those that overlap in time are filmed together."""
+    """Openings grouped so that those that overlap in time are filmed together."""
     turns: list[tuple[Opening, ...]] = []
     for opening in sorted(openings, key=lambda each: each.rises[0]):
         if turns and opening.rises[0] < turns[-1][0].rises[1]:
@@ -47,7 +47,7 @@ def _turns(openings: list[Opening]) -> list[tuple[Opening, ...]]:
 def _visit(
     film: Film, turn: tuple[Opening, ...], ends: tuple[float, float], rng: np.random.Generator
 ) -> list[tuple[float, np.ndarray, np.ndarray]]:
-    """Times, eyes and targets of a stay before fronts that open together: a slow step to the side, and back."""
+    """Times, eyes and targets of a stay in front of fronts that open together: a slow step to the side, and back."""
     fronts = [film.fronts[opening.joint] for opening in turn]
     ways = np.concatenate([swept(front, opening.widest) for front, opening in zip(fronts, turn, strict=True)])
     closed = np.concatenate([front.corners for front in fronts])
@@ -64,7 +64,7 @@ def _visit(
 
 
 def _outwards(front: Front) -> np.ndarray:
-    """Level, from the closed front into the room."""
+    """Horizontal direction from the closed front into the room."""
     if front.run is None:
         return np.array([0.0, -1.0, 0.0])
     return front.run.kitchen_from_run.turn(np.array([0.0, -1.0, 0.0]))
@@ -73,7 +73,7 @@ def _outwards(front: Front) -> np.ndarray:
 def _stand(
     kitchen: Kitchen, fronts: list[Front], ways: np.ndarray, closed: np.ndarray, out: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """The best liked eye that keeps clear of walls, units and of where the leaves come by."""
+    """Best eye position clear of walls, units and the swept leaves."""
     face = closed.mean(axis=0) * [1, 1, 0]
     high = closed[:, 2].mean() > 1.2
     height = _EYE_M[0] if high else _EYE_M[1]
@@ -96,7 +96,7 @@ def _stand(
 
 
 def _clearance(kitchen: Kitchen, eyes: np.ndarray) -> np.ndarray:
-    """How far each eye is, on the floor plan, from the nearest run or the refrigerator; negative inside one."""
+    """Distance of each eye, in plan, from the nearest run or the refrigerator; negative inside one."""
     fridge = np.array(kitchen.fridge.centre[:2]), np.array(kitchen.fridge.size_m[:2]) / 2
     nearest = _from_rectangle(eyes[:, :2], fridge[0] - fridge[1], fridge[0] + fridge[1])
     for run in kitchen.runs:

@@ -1,8 +1,7 @@
-"""A recording in which fronts are opened: which ones, when, how far, and what is seen behind them.
+"""Schedule of a recording in which fronts are opened: which ones, when, how far, and their interiors.
 
-After a walk past everything closed, fronts are opened one after the other, where it can be two of them overlapping in time; one
-stands open when the film begins and one is left open when it ends. Some are held still where they
-stop, the others turn back before it.
+After a walk past everything closed, fronts are opened one after the other, if possible two of them overlapping in time; one is
+open when the film begins and one is left open when it ends. Some rest where they stop, the others turn back earlier.
 """
 
 from collections.abc import Mapping
@@ -17,14 +16,14 @@ from r2c2r_core.synthetic.insides import Hollow, appliance_hollow, carcass_behin
 from r2c2r_core.synthetic.kitchen import Appliance, Furniture, Kitchen, Run
 from r2c2r_core.synthetic.truth import TrueJoint, TrueObject, true_objects
 
-WALK_FROM, WALK_TO = 0.12, 0.46  # of the recording: past everything, before the first front is opened
-START_CLOSED = 0.085  # by when what stood open at the start is closed
-_FRAMES_EACH = 38  # of the recording, for each front that is opened
+WALK_FROM, WALK_TO = 0.12, 0.46  # fractions of the recording: walk past everything, before the first front is opened
+START_CLOSED = 0.085  # fraction at which the initially open front is closed
+_FRAMES_EACH = 38  # frames of the recording per opened front
 _MOST = 7
-_RARE = ("lateral", "appliance drawer", "bottom", "top", "pair")  # kinds that come first where a kitchen has them
-_CLEAR_M = 0.01  # kept from the room's walls
+_RARE = ("lateral", "appliance drawer", "bottom", "top", "pair")  # kinds that are preferred where a kitchen has them
+_CLEAR_M = 0.01  # clearance from the room's walls
 _HELD_SHARE = 0.6
-_TOGETHER_M = 1.4  # between two fronts that one view shows
+_TOGETHER_M = 1.4  # maximum distance between two fronts in one view
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,56 +35,56 @@ class Front:
     kind: str
     corners: np.ndarray  # (8, 3) of its box, closed
     run: Run | None  # None: of a free-standing machine
-    hollow_key: str  # of the compartment it closes, as build.py names it
+    hollow_key: str  # of the compartment it closes, as named by build.py
 
     @property
     def middle(self) -> np.ndarray:
-        """The middle of its box."""
+        """Centre of its box."""
         return np.asarray(self.corners.mean(axis=0))
 
     def pose(self, state: float) -> Rigid3:
-        """How it has moved from its closed place, in the kitchen's frame."""
+        """Motion from its closed pose, in the kitchen's frame."""
         return joint_pose(self.joint, state)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Opening:
-    """One front's way: closed until `rises[0]`, at its widest from `rises[1]` to `falls[0]`, closed from `falls[1]` on.
+    """Trajectory of one front: closed until `rises[0]`, widest from `rises[1]` to `falls[0]`, closed from `falls[1]` on.
 
-    Times are shares of the recording; what stands open at its beginning rose before 0, what is left open falls after 1.
+    Times are fractions of the recording; a front open at its beginning rose before 0, one left open falls after 1.
     """
 
     joint: str
     widest: float  # rad or m
     rises: tuple[float, float]
     falls: tuple[float, float]
-    held: bool  # still, at the end of its motion, for longer than a person takes to turn round
+    held: bool  # rests at the end of its motion, for longer than a person takes to turn around
 
     def state(self, time: float) -> float:
-        """Rad or m at a time."""
+        """State at a time, rad or m."""
         return self.widest * (_ease(time, *self.rises) - _ease(time, *self.falls))
 
     def moves(self, time: float) -> bool:
-        """Whether a hand is on it."""
+        """Whether a hand moves it at that time."""
         return self.rises[0] < time < self.rises[1] or self.falls[0] < time < self.falls[1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Film:
-    """All that is opened in one recording."""
+    """All openings of one recording."""
 
     kitchen: Kitchen
     fronts: Mapping[str, Front]  # every front that could move, by its joint's name
-    openings: tuple[Opening, ...]  # in the order in which the camera goes to them
+    openings: tuple[Opening, ...]  # in the order of the camera's visits
     hollows: Mapping[str, Hollow]
 
     def states(self, time: float) -> dict[str, float]:
-        """What every front's joint stands at, rad or m."""
+        """State of every front's joint, rad or m."""
         found = dict.fromkeys(self.fronts, 0.0)
         return found | {opening.joint: opening.state(time) for opening in self.openings}
 
     def frames_open(self, owner: str, frames: int) -> frozenset[int]:
-        """The frames in which a front of that object is not in its place."""
+        """Frames in which a front of that object is not closed."""
         mine = [opening for opening in self.openings if self.fronts[opening.joint].owner == owner]
         return frozenset(i for i in range(frames) if any(o.state(share_of(i, frames)) > 0 for o in mine))
 
@@ -96,7 +95,7 @@ def share_of(frame: int, frames: int) -> float:
 
 
 def plan_film(kitchen: Kitchen, frames: int, rng: np.random.Generator) -> Film:
-    """The film of a kitchen in so many frames: the more frames, the more fronts."""
+    """Film of a kitchen with that many frames: more frames, more fronts."""
     kitchen = _with_lift(kitchen, rng)
     fronts = {front.joint.name: front for front in _fronts(kitchen)}
     free = [front for front in fronts.values() if _is_free(front, kitchen)]
@@ -111,7 +110,7 @@ def plan_film(kitchen: Kitchen, frames: int, rng: np.random.Generator) -> Film:
 
 
 def joint_pose(joint: TrueJoint, state: float) -> Rigid3:
-    """How a joint has moved its part, in the frame the joint is in."""
+    """Motion of a joint's part, in the frame of the joint."""
     if joint.type == "prismatic":
         return Rigid3(np.eye(3), state * joint.axis)
     rotation = np.asarray(Rotation.from_rotvec(state * joint.axis).as_matrix())
@@ -119,7 +118,7 @@ def joint_pose(joint: TrueJoint, state: float) -> Rigid3:
 
 
 def _ease(time: float, start: float, end: float) -> float:
-    """From 0 to 1 as a hand moves things: the path of least jerk (Flash and Hogan 1985)."""
+    """Minimum-jerk trajectory from 0 to 1, as a hand moves objects (Flash and Hogan 1985)."""
     t = float(np.clip((time - start) / (end - start), 0.0, 1.0))
     return t**3 * (10 - 15 * t + 6 * t**2)
 
@@ -191,7 +190,7 @@ def _corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def _is_free(front: Front, kitchen: Kitchen) -> bool:
-    """Whether nothing is in its way, nothing hangs on it, and a person with a phone can stand before it."""
+    """Whether its sweep is free, it carries nothing, and a person with a phone can stand in front of it."""
     way = swept(front)
     x0, x1, y0, _, _ = kitchen.room
     if way[:, 0].min() < x0 + _CLEAR_M or way[:, 0].max() > x1 - _CLEAR_M or way[:, 1].min() < y0 + 0.5:
@@ -205,7 +204,7 @@ def _is_free(front: Front, kitchen: Kitchen) -> bool:
 
 
 def swept(front: Front, upto: float | None = None) -> np.ndarray:
-    """(n, 3) where the corners of a front come by on its way to a state, or to its limit."""
+    """(n, 3) positions of the corners of a front on its way to a state, or to its limit."""
     states = np.linspace(0.0, front.joint.upper if upto is None else upto, 9)
     return np.concatenate([front.pose(float(state)).apply(front.corners) for state in states])
 
@@ -224,7 +223,7 @@ def _carries(unit: Furniture, run: Run) -> bool:
 
 
 def _worktop_is_clear(way: np.ndarray, kitchen: Kitchen) -> bool:
-    """Whether nothing on the worktop stands where a microwave's door comes by."""
+    """Whether the sweep of a microwave's door over the worktop is free."""
     low, high = way[:, :2].min(axis=0) - 0.06, way[:, :2].max(axis=0) + 0.06
     standing = [(b.x, b.y) for b in kitchen.bottles] + [
         (p.x, p.y) for p in kitchen.runs[0].props if p.z == 0 and p.kind != "hob"
@@ -233,7 +232,7 @@ def _worktop_is_clear(way: np.ndarray, kitchen: Kitchen) -> bool:
 
 
 def _choose(free: list[Front], count: int, rng: np.random.Generator) -> list[list[Front]]:
-    """Groups of fronts that open together, of as many kinds as there are: a pair's two leaves are one group."""
+    """Groups of fronts that open together, of as many kinds as possible: a pair's two leaves are one group."""
     kinds: dict[str, list[Front]] = {}
     for front in free:
         kinds.setdefault(front.kind, []).append(front)
@@ -256,7 +255,7 @@ def _choose(free: list[Front], count: int, rng: np.random.Generator) -> list[lis
 
 
 def _shares_carcass(a: Front, b: Front) -> bool:
-    """Two doors that slide past each other close one compartment."""
+    """Whether two doors slide past each other and close one compartment."""
     return a.kind == b.kind == "lateral" and a.run is b.run
 
 
@@ -282,7 +281,7 @@ def _schedule(kitchen: Kitchen, groups: list[list[Front]], rng: np.random.Genera
 
 
 def _turn(front: Front, at: float, length: float, held: bool, last: bool, rng: np.random.Generator) -> Opening:
-    """One opening within its part of the film: the way there, then out, a rest or none, and back."""
+    """One opening within its part of the film: approach, opening, an optional rest, and closing."""
     pace = float(rng.uniform(0.8, 1.05))
     out = at + 0.28 * length, at + (0.28 + 0.26 * pace) * length
     rest = float(rng.uniform(0.16, 0.22)) * length if held else 0.0
@@ -292,7 +291,7 @@ def _turn(front: Front, at: float, length: float, held: bool, last: bool, rng: n
 
 
 def _in_reach(groups: list[list[Front]], kitchen: Kitchen) -> list[list[Front]]:
-    """The groups in the order of a short way, from the main run's middle on."""
+    """The groups in nearest-neighbour order, from the main run's middle on."""
     here, rest, order = np.array([sum(kitchen.runs[0].ends) / 2, -1.5]), list(groups), []
     while rest:
         nearest = min(rest, key=lambda group: float(np.linalg.norm(group[0].middle[:2] - here)))
@@ -303,7 +302,7 @@ def _in_reach(groups: list[list[Front]], kitchen: Kitchen) -> list[list[Front]]:
 
 
 def _overlapped(groups: list[list[Front]]) -> list[list[Front]]:
-    """The groups; where none has two fronts, the first two that one view shows and that keep clear of each other are one."""
+    """The groups; if none has two fronts, the first two that fit one view without collision are merged."""
     if any(len(group) > 1 for group in groups):
         return groups
     for (number, (a,)), (other, (b,)) in combinations(enumerate(groups), 2):
@@ -315,12 +314,12 @@ def _overlapped(groups: list[list[Front]]) -> list[list[Front]]:
 
 
 def _apart(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether the boxes round two ways share nothing."""
+    """Whether the bounding boxes of two sweeps are disjoint."""
     return bool(((one.max(axis=0) < other.min(axis=0)) | (other.max(axis=0) < one.min(axis=0))).any())
 
 
 def _hollows_of(kitchen: Kitchen, front: Front, rng: np.random.Generator) -> dict[str, Hollow]:
-    """The compartment behind a front; of french doors both leaves' one."""
+    """The compartment behind a front; french doors share one."""
     if front.run is not None:
         unit = next(u for u in (*front.run.base, *front.run.upper) if u.name == front.owner)
         return {front.hollow_key: unit_hollow(kitchen, front.run, unit, rng)}

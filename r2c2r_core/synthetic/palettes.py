@@ -1,4 +1,4 @@
-"""Colours that the fronts and what surrounds them have together."""
+"""Colour palettes of the fronts and their surroundings."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -59,7 +59,7 @@ def _two_tone(style: Style, rng: np.random.Generator) -> Style:
 
 
 def _in(style: Style, front: Paint) -> Style:
-    """Every front, and a darker plinth, in one paint."""
+    """The style with every front in one paint, and a darker plinth."""
     plinth = replace(style.plinth, colour=rgb(np.array(front.colour) * 0.6))
     return replace(style, base_front=front, wall_front=front, plinth=plinth)
 

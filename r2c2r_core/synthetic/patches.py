@@ -1,4 +1,4 @@
-"""Surfaces as grids of quads, each with its own piece of texture: what the kitchen is built from."""
+"""Surface patches of the kitchen: grids of quads, each with its own piece of texture."""
 
 from dataclasses import dataclass, replace
 
@@ -19,9 +19,9 @@ class Patch:
     object_id: int = 0  # 0: background
     is_handle: bool = False
     lumel_m: float = 0.025  # spacing of the baked light
-    mover: str = ""  # the joint that it moves with; "": it stands still
-    is_body: bool = False  # of what moves: not the front itself, but the drawer behind it
-    is_inner: bool = False  # of a compartment: seen when its front is open
+    mover: str = ""  # the joint that it moves with; "": static
+    is_body: bool = False  # moving part other than the front itself: the drawer behind it
+    is_inner: bool = False  # part of a compartment: visible when its front is open
 
 
 Vector = tuple[float, float, float]
@@ -77,7 +77,7 @@ def box(
 
 
 def inner_walls(low: Vector, high: Vector, paint: Paint, object_id: int = 0) -> list[Patch]:
-    """The walls of a box open at the front, seen from within."""
+    """Walls of a box open at the front, seen from within."""
     return box(high, low, paint, faces="front left right top bottom", object_id=object_id)  # corners swapped: facing inwards
 
 
@@ -126,7 +126,7 @@ def tube(
 
 
 def turned(patches: list[Patch], yaw_rad: float, centre: tuple[float, float]) -> list[Patch]:
-    """The patches turned about the vertical through `centre`."""
+    """The patches rotated about the vertical through `centre`."""
     if yaw_rad == 0.0:
         return patches
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
@@ -136,12 +136,12 @@ def turned(patches: list[Patch], yaw_rad: float, centre: tuple[float, float]) ->
 
 
 def moving(patches: list[Patch], mover: str, *, is_body: bool = False) -> list[Patch]:
-    """The patches as parts of what a joint moves."""
+    """The patches assigned to a joint that moves them."""
     return [replace(p, mover=mover, is_body=is_body) for p in patches]
 
 
 def shifted(patches: list[Patch], by: np.ndarray) -> list[Patch]:
-    """The patches moved by a vector."""
+    """The patches translated by a vector."""
     return [replace(p, grid=p.grid + by) for p in patches]
 
 

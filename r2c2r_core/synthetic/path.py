@@ -1,4 +1,4 @@
-"""Where a person holding the phone walks and looks."""
+"""Camera path of a person who walks along a kitchen with a phone."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from r2c2r_core.synthetic.rounds import round_poses
 
 SECONDS = 18.0
 _STEPS = 7  # knots on each way along the run
-_LOOK_AT_M = (0.50, 1.45)  # heights looked at in turn: the base units, the wall units
+_LOOK_AT_M = (0.50, 1.45)  # alternating target heights: the base units, the wall units
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -22,22 +22,22 @@ class Shot:
     timestamp_s: float
     kitchen_from_camera: Rigid3  # OpenCV camera axes
     blur_px: float  # length of the motion blur, at 960 px width
-    gain: float  # exposure against the mean
+    gain: float  # exposure relative to the mean
 
 
 def walk(kitchen: Kitchen, frames: int, rng: np.random.Generator) -> list[Shot]:
-    """Along the run and back, looking up and down at the fronts from both sides."""
+    """Walk along the run and back, looking up and down at the fronts from both sides."""
     eyes, targets = key_poses(kitchen, rng)
     return film_along(even_pace(eyes, targets), eyes, targets, frames, rng)
 
 
 def key_poses(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Eye positions and points looked at on the walk past everything, in the kitchen's frame."""
+    """Eye positions and target points of the walk past everything, in the kitchen's frame."""
     return _key_poses(kitchen, rng) if len(kitchen.runs) == 1 else round_poses(kitchen, rng)
 
 
 def film_along(knots: np.ndarray, eyes: np.ndarray, targets: np.ndarray, frames: int, rng: np.random.Generator) -> list[Shot]:
-    """A hand-held camera that comes by each pose at its knot (0..1 of the recording)."""
+    """A hand-held camera that passes each pose at its knot (0..1 of the recording)."""
     times = np.linspace(0.0, SECONDS, frames)
     eye = Akima1DInterpolator(knots, eyes, method="makima")(times / SECONDS)
     target = Akima1DInterpolator(knots, targets, method="makima")(times / SECONDS)
@@ -65,9 +65,9 @@ def even_pace(positions: np.ndarray, aims: np.ndarray) -> np.ndarray:
 
 
 def _key_poses(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Eye positions and points looked at along a single run.
+    """Eye positions and target points along a single run.
 
-    A look at the whole, out along the run at standing height, the refrigerator from top to bottom, and back lower and closer.
+    A view of the whole, out along the run at standing height, the refrigerator from top to bottom, and back lower and closer.
     """
     left, right = kitchen.runs[0].ends
     fridge = kitchen.fridge

@@ -1,4 +1,4 @@
-"""A lit scene with its fronts moved to where they stand in one frame."""
+"""A lit scene with its fronts moved to their states in one frame."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,19 +15,19 @@ _PAD_PX = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stage:
-    """One scene lit twice: with every front closed, and with those that open half open.
+    """One scene lit twice: with every front closed, and with the opening fronts half open.
 
-    What moves is seen in a light between the two; what is behind it, in the second alone.
+    Moving parts are lit by a blend of the two; interiors by the second alone.
     """
 
     closed: LitScene
     opened: LitScene  # the same patches in the same places of the atlas
-    vertices_of: Mapping[str, np.ndarray]  # of what each joint moves, closed
-    atlas: Image  # of the closed scene, with the insides as they are lit when open
+    vertices_of: Mapping[str, np.ndarray]  # vertices moved by each joint, closed
+    atlas: Image  # atlas of the closed scene, with the interiors as lit when open
 
     @staticmethod
     def of(closed: LitScene, opened: LitScene, inner: np.ndarray) -> "Stage":
-        """`inner` (patches,) says which of them are insides."""
+        """Stage from both scenes; `inner` (patches,) marks the interiors."""
         owner = _patch_of_vertex(closed)
         movers = np.array(closed.mover_of_patch)[owner]
         atlas = closed.atlas.copy()
@@ -38,7 +38,7 @@ class Stage:
         return Stage(closed=closed, opened=opened, vertices_of=vertices, atlas=atlas)
 
     def at(self, poses: Mapping[str, Rigid3 | None], openness: Mapping[str, float]) -> LitScene:
-        """The scene with each mover at its pose (None: it is not there), lit by how far open it stands, 0..1."""
+        """The scene with each mover at its pose (None: absent), lit according to its openness, 0..1."""
         scene, owner = self.closed, _patch_of_vertex(self.closed)
         vertices, gone = scene.vertices.copy(), np.zeros(len(scene.vertices), bool)
         normals, atlas = scene.normal_of_patch.copy(), self.atlas
@@ -75,7 +75,7 @@ class Stage:
 
 
 def moved_patches(patches: list[Patch], poses: Mapping[str, Rigid3]) -> list[Patch]:
-    """The patches with what joints move at their poses."""
+    """The patches with the moving ones at their joints' poses."""
     return [
         replace(p, grid=poses[p.mover].apply(p.grid.reshape(-1, 3)).reshape(p.grid.shape)) if p.mover in poses else p
         for p in patches

@@ -1,4 +1,4 @@
-"""What stands about in a kitchen and is nobody's object: sink, hob, kettle, board, jar, plant, shelf, sockets, window frame."""
+"""Unprompted objects of a kitchen: sink, hob, kettle, board, jar, plant, shelf, sockets, window frame."""
 
 from collections.abc import Callable
 
@@ -24,7 +24,7 @@ def sink_bounds(sink: Prop) -> tuple[float, float, float, float]:
 
 
 def crockery(x0: float, x1: float, y: float, z: float) -> list[Patch]:
-    """A row of bowls and mugs on a shelf, 11 cm apart; which comes where depends on the place alone."""
+    """A row of bowls and mugs on a shelf, 11 cm apart; their choice depends on the position alone."""
     row = []
     for number, x in enumerate(np.arange(x0 + 0.07, x1 - 0.05, 0.11)):
         white = 0.35 + 0.4 * ((7 * number + round(100 * z)) % 5) / 4
@@ -37,7 +37,7 @@ def crockery(x0: float, x1: float, y: float, z: float) -> list[Patch]:
 
 
 def window_frame(window: Patch) -> list[Patch]:
-    """White bars round a window in a side wall and across its middle."""
+    """White bars around a window in a side wall and across its middle."""
     white = Paint(kind="laminate", colour=(0.80, 0.80, 0.79), texel_m=0.006)
     low, high = window.grid.reshape(-1, 3).min(axis=0), window.grid.reshape(-1, 3).max(axis=0)
     x0, x1 = low[0] - 0.03, low[0] + 0.035

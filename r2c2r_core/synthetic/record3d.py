@@ -1,4 +1,4 @@
-"""The writer of Record3D's .r3d: a zip of JPEGs, LZFSE depth and confidence, and one JSON."""
+"""Writer of Record3D's .r3d: a zip of JPEGs, LZFSE depth and confidence, and one JSON."""
 
 import json
 import zipfile
@@ -19,7 +19,7 @@ _ZIP_TIME = (2024, 1, 1, 0, 0, 0)  # a fixed date: the same seed gives the same 
 
 @dataclass(kw_only=True)
 class Record3DWriter:
-    """Writes frames as they come; metadata goes in on close."""
+    """Streaming writer of frames; metadata is written on close."""
 
     path: Path
     fps: int
@@ -86,7 +86,7 @@ class Record3DWriter:
 
 
 def _coefficients(camera: Intrinsics) -> list[float]:
-    """fx, fy, cx, cy as ARKit counts pixels: their centres at integers."""
+    """Fx, fy, cx, cy in ARKit's convention: pixel centres at integers."""
     return [round(float(value), 6) for value in (camera.fx, camera.fy, camera.cx - 0.5, camera.cy - 0.5)]
 
 

@@ -1,4 +1,4 @@
-"""One frame: colour as a phone camera gives it, and the instance behind every pixel."""
+"""Rendering of one frame: colour of a phone camera, and the instance of every pixel."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from r2c2r_core.synthetic.atlas import Emitter, LitScene
 
 _OVERSAMPLE = 2
 _SHINE_STEP = 4
-_PANE_PASSES = 0.86  # of the light, through 4 mm of clear glass and back
+_PANE_PASSES = 0.86  # transmittance through 4 mm of clear glass and back
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,7 +48,7 @@ def render_view(scene: LitScene, camera: Intrinsics, camera_from_kitchen: Rigid3
 
 
 def facing_faces(scene: LitScene, camera_from_kitchen: Rigid3, *, panes: bool = False) -> Faces:
-    """The faces whose outside the camera may see, of clear glass or of all else: everything is closed, so no other is seen."""
+    """Faces turned towards the camera, either of clear glass or of everything else (back-face culling: all is closed)."""
     eye = camera_from_kitchen.inverse.translation
     return scene.faces[(scene.face_normals @ eye > scene.face_offsets) & (scene.pane_faces == panes)]
 
@@ -56,7 +56,7 @@ def facing_faces(scene: LitScene, camera_from_kitchen: Rigid3, *, panes: bool = 
 def _through_panes(
     scene: LitScene, colour: Image, patch: np.ndarray, depth_m: np.ndarray, camera: Intrinsics, camera_from_kitchen: Rigid3
 ) -> tuple[Image, np.ndarray, np.ndarray]:
-    """Colour, patch and depth where clear glass stands before what was drawn: dimmed, and of the pane."""
+    """Colour, patch and depth with clear glass in front: dimmed colour, the pane's patch and depth."""
     facing = facing_faces(scene, camera_from_kitchen, panes=True)
     panes = rasterize(scene.vertices, facing, scene.attributes, camera, camera_from_kitchen)
     before = (panes.depth_m > 0) & ((panes.depth_m < depth_m) | (depth_m <= 0))
@@ -68,7 +68,7 @@ def _through_panes(
 def reflections(
     scene: LitScene, patch: np.ndarray, depth_m: np.ndarray, camera: Intrinsics, camera_from_kitchen: Rigid3
 ) -> Image:
-    """What the window and the lamp add to glossy flat surfaces, blurred by their roughness.
+    """Reflections of the window and the lamp on glossy flat surfaces, blurred by their roughness.
 
     Computed at a quarter of the size, where it is smooth; the surfaces' own gloss keeps its edges at full size.
     """
@@ -95,7 +95,7 @@ def reflections(
 
 
 def _seen_share(emitter: Emitter, points: np.ndarray, directions: np.ndarray, roughness: np.ndarray) -> np.ndarray:
-    """How much of the emitter a rough mirror at `points` shows in `directions`: 1 in its middle, fading across its edges."""
+    """Visible fraction of the emitter in a rough mirror at `points` along `directions`, fading across its edges from 1."""
     right, down = np.linalg.norm(emitter.right), np.linalg.norm(emitter.down)
     facing = np.cross(emitter.down, emitter.right) / (right * down)
     approach = directions @ facing
@@ -113,7 +113,7 @@ def _seen_share(emitter: Emitter, points: np.ndarray, directions: np.ndarray, ro
 def photograph(
     colour: Image, *, gain: float, blur_px: float, white: tuple[float, float, float], rng: np.random.Generator
 ) -> Image:
-    """The frame as a phone stores it: motion blur, exposure, white balance, falling-off corners, noise."""
+    """The frame as stored by a phone: motion blur, exposure, white balance, vignetting, noise."""
     image = colour
     if blur_px > 1:
         image = np.asarray(cv2.filter2D(image, -1, _streak(blur_px, float(rng.uniform(0, np.pi)))), dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""The way of a person with a phone round more than one run: along each, out at eye level and back lower."""
+"""Camera path of a person with a phone around several runs: along each, out at eye level and back lower."""
 
 from dataclasses import dataclass
 
@@ -8,8 +8,8 @@ from r2c2r_core.synthetic.kitchen import Kitchen, Run
 
 _STEPS = 7
 _HEIGHTS_M = (1.52, 1.30)
-_LEVELS_M, _LOW_LEVELS_M = (0.50, 1.55), (0.45, 0.85)  # heights looked at in turn; the latter where nothing hangs
-_LEAD_M = 0.45  # looked ahead or back by
+_LEVELS_M, _LOW_LEVELS_M = (0.50, 1.55), (0.45, 0.85)  # alternating target heights; the latter without wall units
+_LEAD_M = 0.45  # distance of the target ahead or back
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,7 +24,7 @@ class Leg:
 
 
 def round_poses(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Eye positions and points looked at, in the kitchen's frame, one after the other."""
+    """Eye positions and target points in the kitchen's frame, in order."""
     second = kitchen.runs[1]
     if not second.has_wall:
         return _round_island(kitchen, rng)
@@ -59,7 +59,7 @@ def _along_corner(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarra
 
 
 def _along_galley(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """One side, a look out of the aisle, the other side, and again lower."""
+    """One side, a view out of the aisle, the other side, and again lower."""
     main, wing = kitchen.runs
     aisle = -wing.place[1] - 2 * kitchen.base_depth_m
     near, far = _x_range(kitchen)
@@ -76,7 +76,7 @@ def _along_galley(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarra
 
 
 def _round_island(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Along the island's outer side, round its end, along the main run, and back along its inner side."""
+    """Along the island's outer side, around its end, along the main run, and back along its inner side."""
     main, outer, inner = kitchen.runs
     depth = kitchen.base_depth_m
     aisle = -outer.place[1] - 2 * depth
@@ -105,7 +105,7 @@ def _round_island(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarra
 
 
 def _walk_leg(kitchen: Kitchen, leg: Leg, eyes: list[np.ndarray], targets: list[np.ndarray], rng: np.random.Generator) -> None:
-    """Appends the leg's poses: ahead and back, up and down in turn."""
+    """Append the leg's poses: ahead and back, up and down in turn."""
     low = min(carcass.x for carcass in leg.run.base_carcasses)
     high = max(carcass.x + carcass.width_m for carcass in leg.run.base_carcasses)
     direction = np.sign(leg.end - leg.start) or 1.0

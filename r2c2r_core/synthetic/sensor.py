@@ -1,4 +1,4 @@
-"""A phone's LiDAR depth, as ARKit hands it out: smooth, a little wrong, torn at edges, unsure on dark and grazing surfaces."""
+"""Simulated LiDAR depth of a phone, as from ARKit: smooth, mixed at edges, unsure on dark and grazing surfaces."""
 
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ def scan_depth(scene: LitScene, camera: Intrinsics, camera_from_kitchen: Rigid3,
     fine = raster.depth_m.astype(np.float32)
     centre = slice(_OVERSAMPLE // 2, None, _OVERSAMPLE)
     truth, patch = fine[centre, centre], np.rint(raster.attributes[centre, centre, 2]).astype(int)
-    footprint = _OVERSAMPLE * 1.5  # a beam covers more than one pixel: edges mix and thin things sink in
+    footprint = _OVERSAMPLE * 1.5  # a beam covers more than one pixel: edges mix and thin objects recede
     mixed = cv2.GaussianBlur(fine, (0, 0), footprint / 2)[centre, centre]
     near, far = cv2.erode(fine, np.ones((5, 5))), cv2.dilate(fine, np.ones((5, 5)))
     jump = (far - near)[centre, centre]
@@ -52,7 +52,7 @@ def scan_depth(scene: LitScene, camera: Intrinsics, camera_from_kitchen: Rigid3,
 
 
 def _returned_light(scene: LitScene, patch: np.ndarray, cosine: np.ndarray) -> np.ndarray:
-    """Share of a pulse that comes back, over the beam's footprint: dark, shiny and grazing surfaces return little."""
+    """Fraction of a pulse that returns, averaged over the beam's footprint: little from dark, shiny and grazing surfaces."""
     back = scene.reflectance_of_patch[patch] * np.clip(cosine, 0.05, 1) * (1 - 0.6 * scene.gloss_of_patch[patch])
     return np.asarray(cv2.GaussianBlur(back.astype(np.float32), (0, 0), 0.8))
 

@@ -1,4 +1,4 @@
-"""Units that are more than doors and drawers: machines behind fronts, tall ones, sliding doors, blind corners."""
+"""Special units: machines behind fronts, tall units, sliding doors, blind corners."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,17 +15,17 @@ SpecialKind = Literal["dishwasher", "sliding", "tall"]
 
 OVEN_HEIGHT_M, MICROWAVE_HEIGHT_M, BUILT_IN_WIDTH_M = 0.595, 0.382, 0.596  # fronts of built-in machines as sold
 _BLACK = (0.020, 0.020, 0.022)
-_OVERLAP_M, _TRACK_M = 0.035, 0.026  # of sliding doors: by which they cover each other, and between their faces
+_OVERLAP_M, _TRACK_M = 0.035, 0.026  # of sliding doors: their overlap, and the distance between their faces
 
 
 def plan_any(kind: UnitKind | SpecialKind, place: Place, style: Style, look: Look, rng: np.random.Generator) -> Unit:
-    """A unit of either sort."""
+    """A unit of any kind, special or plain."""
     special = _PLANNERS.get(kind)
     return plan_unit(kind, place, style, look, rng) if special is None else special(place, style, look, rng)  # type: ignore[arg-type]
 
 
 def blind_corner(visible: Unit, hidden_m: float, filler_m: float, on_left: bool, style: Style) -> Unit:
-    """The unit with its carcass drawn on into the corner, and a filler between its front and the next run's."""
+    """The unit with its carcass extended into the corner, and a filler between its front and the next run's."""
     carcass = visible.carcass
     behind = hidden_m + filler_m
     x = carcass.x - behind if on_left else carcass.x
@@ -98,7 +98,7 @@ def _sliding_leaf(
 
 
 def _tall(place: Place, style: Style, look: Look, rng: np.random.Generator) -> Unit:
-    """Up to the wall cabinets' tops: a front or two below, an oven, a microwave over it, a door above them."""
+    """Unit up to the wall cabinets' tops: one or two fronts below, an oven, a microwave over it, a door above them."""
     gap = style.gap_m
     left, right = place.x + gap / 2, place.x + place.width_m - gap / 2
     spare = place.top - place.bottom - OVEN_HEIGHT_M - MICROWAVE_HEIGHT_M - 3 * gap

@@ -1,4 +1,4 @@
-"""A kitchen that never was: a recording as a phone would make it, with everything about it known."""
+"""Synthetic recording of a random kitchen, as from a phone, with complete ground truth."""
 
 import json
 import shutil
@@ -33,7 +33,7 @@ from r2c2r_core.synthetic.styled import plan_styled_kitchen
 from r2c2r_core.synthetic.truth import Sightings, capture_from_kitchen, prompts_document, true_objects, truth_document
 from r2c2r_core.threads import in_threads
 
-_AJAR = 0.6  # of the way to its widest: where the light on a front that opens is worked out
+_AJAR = 0.6  # fraction of the widest state at which the light on an opening front is computed
 _FOCAL_PER_LONG_SIDE = 0.757  # 726.6 px at 960 px: a real iPhone recording
 
 _QUICK_PNG = [
@@ -48,7 +48,7 @@ _QUICK_PNG = [
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SamplePaths:
-    """What a sample consists of."""
+    """Files of a sample."""
 
     scan: Path
     truth: Path
@@ -69,7 +69,7 @@ def write_sample(
 ) -> SamplePaths:
     """Write scan.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames.
 
-    With `opened`, fronts are opened and closed while it is filmed (opening.py). `show` is given each colour frame.
+    With `opened`, fronts are opened and closed during the recording (opening.py). `show` receives each colour frame.
     """
     paths = SamplePaths(
         scan=out / "scan.r3d", truth=out / "truth.json", prompts=out / "prompts.json", masks=out / "truth_masks"
@@ -103,7 +103,7 @@ def write_sample(
 
     def taken() -> Iterator[_Taken]:
         for frame in in_threads(take, range(frames)):
-            show(frame.rgb)  # before it is reported, so that whoever hears of it can look
+            show(frame.rgb)  # before it is reported, so that a listener can display it
             yield frame
 
     with Record3DWriter(path=paths.scan, fps=round(frames / SECONDS)) as writer:
@@ -122,22 +122,24 @@ def write_sample(
     return paths
 
 
-Scenes = Callable[[int, Shot, int], LitScene]  # of a frame, its shot, and how many frames there are
+Scenes = Callable[[int, Shot, int], LitScene]  # from frame number, shot, and number of frames
 
 
 def _still(kitchen: Kitchen, seed: int) -> Scenes:
-    """A kitchen in which nothing moves."""
+    """Static scene for all frames."""
     scene = light_scene(build_kitchen(kitchen), np.random.default_rng([seed, 2]))
     return lambda number, shot, frames: scene
 
 
 def _moving(film: Film, seed: int) -> Scenes:
-    """A kitchen whose fronts are opened, with a hand on each while it moves."""
+    """Scenes of a kitchen whose fronts are opened, with a hand on each while it moves."""
     joints, opened = list(film.openings), {opening.joint for opening in film.openings}
     patches = build_kitchen(film.kitchen, film.hollows)
     grips = {name: grip_of(film.fronts[name], patches) for name in opened}
     patches += [patch for opening in joints for patch in hand_patches(opening.joint)]
-    away = {hand_mover(name): Rigid3(np.eye(3), np.array([0.0, 0.0, -9.0])) for name in opened}  # lights and shades nothing
+    away = {
+        hand_mover(name): Rigid3(np.eye(3), np.array([0.0, 0.0, -9.0])) for name in opened
+    }  # out of sight: neither lit nor casting shadows
     ajar = {o.joint: film.fronts[o.joint].pose(_AJAR * o.widest) for o in joints}
     closed = light_scene(moved_patches(patches, away), np.random.default_rng([seed, 2]))
     half = light_scene(moved_patches(patches, away | ajar), np.random.default_rng([seed, 2]))
@@ -158,16 +160,16 @@ def _moving(film: Film, seed: int) -> Scenes:
 
 
 class _Taken(NamedTuple):
-    """One frame as it was taken, with what it shows of whom."""
+    """One rendered frame with its instance data."""
 
     scene: LitScene
     view: View
     rgb: Image
     lidar: LidarFrame
-    ids: np.ndarray  # (h, w) instance ids, 0: of nothing that is prompted
+    ids: np.ndarray  # (h, w) instance ids, 0: no prompted object
     is_handle: np.ndarray  # (h, w)
     is_front: np.ndarray  # (h, w)
-    rng: np.random.Generator  # what is left to draw of this frame
+    rng: np.random.Generator  # generator for further random draws of this frame
 
 
 def _take_frame(
@@ -195,7 +197,7 @@ def _take_frame(
 
 
 def _cameras(size: tuple[int, int], frames: int, rng: np.random.Generator) -> list[Intrinsics]:
-    """A phone's pinhole: the principal point near the centre, both wandering a little as the lens refocuses."""
+    """Pinhole cameras of a phone: principal point near the centre, it and the focal length drifting as the lens refocuses."""
     width, height = size
     focal = _FOCAL_PER_LONG_SIDE * max(size) * float(rng.uniform(0.98, 1.03))
     offset = rng.uniform(-0.006, 0.006, 2)
@@ -214,12 +216,12 @@ def _cameras(size: tuple[int, int], frames: int, rng: np.random.Generator) -> li
 
 
 def _depth_camera(camera: Intrinsics) -> Intrinsics:
-    """The LiDAR frame: 256x192, upright when the colour frame is."""
+    """Camera of the LiDAR frame: 256x192, upright when the colour frame is."""
     return camera.resized(192, 256) if camera.height > camera.width else camera.resized(256, 192)
 
 
 def _drifting_poses(shots: list[Shot], to_capture: Rigid3, rng: np.random.Generator) -> list[Rigid3]:
-    """capture_from_camera as the phone believes it: off by a few millimetres that wander slowly."""
+    """capture_from_camera as estimated by the phone: with slowly drifting errors of a few millimetres."""
     from scipy.ndimage import gaussian_filter1d
     from scipy.spatial.transform import Rotation
 

@@ -1,4 +1,4 @@
-"""The looks that all units of a kitchen share: fronts, worktop, tiles, floor, metal."""
+"""Paints common to all units of a kitchen: fronts, worktop, tiles, floor, metal."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from r2c2r_core.synthetic.kitchen import Paint, Style
 
 
 def pick_style(rng: np.random.Generator) -> tuple[Style, bool]:
-    """A kitchen's paints and measures, and whether its fronts are framed."""
+    """Random paints and dimensions of a kitchen, and whether its fronts are framed."""
     fronts: list[Paint] = [
         Paint(kind="laminate", colour=(0.82, 0.81, 0.78), gloss=0.25),
         Paint(kind="laminate", colour=(0.76, 0.72, 0.62), gloss=0.15),
@@ -60,6 +60,6 @@ def pick_style(rng: np.random.Generator) -> tuple[Style, bool]:
 
 
 def rgb(values: object) -> tuple[float, float, float]:
-    """Three numbers as a colour."""
+    """Three numbers as a colour tuple."""
     r, g, b = (float(v) for v in np.asarray(values, dtype=float))
     return (r, g, b)

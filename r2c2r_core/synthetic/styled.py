@@ -1,4 +1,4 @@
-"""Which kitchen a seed gives in a style, a palette and a layout of one's choice."""
+"""Random kitchen of a seed in a chosen style, palette and layout."""
 
 from dataclasses import dataclass, replace
 
@@ -31,15 +31,15 @@ Room = tuple[float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rest:
-    """The further runs of a layout, and how far the room must reach for them."""
+    """The further runs of a layout, and the extent that the room needs for them."""
 
     wings: tuple[Run, ...] = ()
-    x_max: float | None = None  # a wall there; None: anywhere beyond the main run
+    x_max: float | None = None  # x of a wall; None: anywhere beyond the main run
     y_min: float | None = None
 
 
 def plan_styled_kitchen(seed: int, choice: Choice) -> Kitchen:
-    """The kitchen of a seed, made as chosen; what was not chosen is the seed's own, slabs, and one straight run."""
+    """The kitchen of a seed with these choices; by default the seed's own paints, slabs, and one straight run."""
     rng, layout = np.random.default_rng([seed, 9]), choice.layout or DEFAULT_LAYOUT
     paints, _ = pick_style(rng)
     if choice.palette is not None:
@@ -60,7 +60,7 @@ def plan_styled_kitchen(seed: int, choice: Choice) -> Kitchen:
     lower_units, upper_units = _shown_ends(base), _shown_ends(upper)
     props, bottles = fill_worktop(rng, right, microwave, lower_units, measures.depth)
     if layout in ("l", "island"):
-        props = tuple(prop for prop in props if prop.kind != "hob")  # it is on the other run
+        props = tuple(prop for prop in props if prop.kind != "hob")  # the hob is on the other run
     main = standing(base, upper, (0.0 if fridge_left else -0.01, right + (0.01 if fridge_left and layout != "l" else 0.0)))
     main = replace(main, base=lower_units, upper=upper_units, props=(*props, *hang_on_wall(rng, right, upper_units)))
     if layout in ("galley", "island"):
@@ -101,7 +101,7 @@ def _pick_measures(rng: np.random.Generator) -> Measures:
 
 
 def _base_kinds(rng: np.random.Generator) -> list[AnyKind]:
-    """A stack of drawers, two doors, and one or two of any kind, in any order."""
+    """A stack of drawers, two doors, and one or two of any kind, in random order."""
     more: tuple[UnitKind, ...] = ("door", "double", "drawers")
     kinds: list[AnyKind] = ["drawers", "door", "door"]
     kinds += [more[int(rng.integers(3))] for _ in range(int(rng.integers(1, 3)))]
@@ -124,7 +124,7 @@ def _with_corner(base: list[Unit], kit: Kit, rng: np.random.Generator) -> tuple[
 
 
 def _across(layout: str, right: float, kit: Kit, rng: np.random.Generator) -> _Rest:
-    """What stands before the main run: a second run on the wall opposite, or an island with room to walk round it."""
+    """The part in front of the main run: a second run on the wall opposite, or an island with space to walk around it."""
     if layout == "galley":
         wing = opposite_wing(right, kit, rng)
         return _Rest(wings=(wing,), y_min=wing.place[1])
@@ -133,7 +133,7 @@ def _across(layout: str, right: float, kit: Kit, rng: np.random.Generator) -> _R
 
 
 def _pick_room(right: float, fridge: Appliance, fridge_left: bool, rest: _Rest, rng: np.random.Generator) -> Room:
-    """Walls a little beyond everything, or where the layout has them."""
+    """Room bounds slightly beyond everything, or where the layout puts them."""
     beside = fridge.size_m[0] + 0.04
     x_min = -(beside if fridge_left else 0.0) - float(rng.uniform(0.05, 0.9))
     x_max = right + (0.0 if fridge_left else beside) + float(rng.uniform(0.05, 0.9))
@@ -167,7 +167,7 @@ def _with_french_doors(fridge: Appliance, rng: np.random.Generator) -> Appliance
 
 
 def _shown_ends(units: list[Unit]) -> tuple[Furniture, ...]:
-    """The row's furniture; of doors at its ends the outer side is seen."""
+    """The row's furniture; doors at its ends show their outer side."""
     furniture = [list(unit.furniture) for unit in units]
     if len(furniture[0]) == 1:
         furniture[0][0] = replace(furniture[0][0], shows_left_side=True)

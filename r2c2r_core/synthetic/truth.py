@@ -1,4 +1,4 @@
-"""What is true of a sample: boxes, joints, clicks, and which axes the camera could see. Written in the capture frame."""
+"""Ground truth of a sample in the capture frame: boxes, joints, clicks, and the axes that the camera could observe."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -14,11 +14,11 @@ from r2c2r_core.synthetic.kitchen import Appliance, Fixed, Furniture, Hinge, Kit
 from r2c2r_core.synthetic.render import View
 
 _BINS = 16  # slices of an axis
-_MIN_SHARE = 0.002  # a slice counts as seen when this share of all pixels showed it
+_MIN_SHARE = 0.002  # a slice counts as observed when this fraction of all pixels showed it
 _SAMPLE_STEP = 3
 _FEWEST_PX = 12
-_CLICKED_OPEN = 0.3  # of what is filmed open
-_Click = tuple[float, int, float, float]  # how clear the view is, the frame, x, y
+_CLICKED_OPEN = 0.3  # probability of a click on an open front, if it was filmed open
+_Click = tuple[float, int, float, float]  # clarity of the view, frame, x, y
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,14 +36,14 @@ class TrueJoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TrueObject:
-    """One prompted object; its box leaves the handle out."""
+    """One prompted object; its box excludes the handle."""
 
     name: str
     category: str
     dimensions_m: np.ndarray  # width, depth, height
     kitchen_from_object: Rigid3
     joints: tuple[TrueJoint, ...]
-    is_round: bool = False  # about its vertical axis: its yaw means nothing
+    is_round: bool = False  # about its vertical axis: its yaw is undefined
 
 
 def true_objects(kitchen: Kitchen) -> tuple[TrueObject, ...]:
@@ -68,16 +68,16 @@ def true_objects(kitchen: Kitchen) -> tuple[TrueObject, ...]:
 
 
 def capture_from_kitchen(kitchen: Kitchen, first_eye: np.ndarray) -> Rigid3:
-    """ARKit's world: +Y up, its origin where the recording began, its heading arbitrary."""
+    """ARKit's world: +Y up, its origin at the start of the recording, its heading arbitrary."""
     y_up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     rotation = y_up @ rotation_about_z(kitchen.yaw_rad)
     return Rigid3(rotation, -rotation @ first_eye)
 
 
 class Sightings:
-    """What the frames showed of every object: seen extents and possible clicks, gathered frame by frame.
+    """Observed extents and possible clicks of every object, accumulated frame by frame.
 
-    `moved` has the frames in which a front of an object stands elsewhere: they show nothing of its place.
+    `moved` has the frames in which a front of an object is not closed: they do not count for its extents.
     """
 
     def __init__(self, objects: tuple[TrueObject, ...], moved: Mapping[str, frozenset[int]] = MappingProxyType({})) -> None:
@@ -98,7 +98,7 @@ class Sightings:
         kitchen_from_camera: Rigid3,
         rng: np.random.Generator,
     ) -> None:
-        """Take one frame into account; `ids` (h, w) are instance ids, the others mark the pixels of handles and of fronts."""
+        """Add one frame; `ids` (h, w) are instance ids, the others mark the pixels of handles and of fronts."""
         v, u = np.mgrid[_SAMPLE_STEP // 2 : camera.height : _SAMPLE_STEP, _SAMPLE_STEP // 2 : camera.width : _SAMPLE_STEP]
         seen, body = ids[v, u], ~is_handle[v, u]
         for index, thing in enumerate(self._objects):
@@ -118,13 +118,13 @@ class Sightings:
             self._propose_click(self._clicks[index], frame, ids == index + 1, is_handle, rng)
 
     def observed_axes(self, index: int) -> list[bool]:
-        """Whether the object's width, depth and height were seen from end to end: in all of 16 slices but at most one."""
+        """Whether the object's width, depth and height were observed from end to end: in all of 16 slices but at most one."""
         bins = self._bins[index]
         enough = np.maximum(_MIN_SHARE * bins.sum(axis=1, keepdims=True), 1)
         return [bool(seen[0] and seen[-1] and seen.sum() >= _BINS - 1) for seen in bins >= enough]
 
     def click(self, index: int, rng: np.random.Generator) -> tuple[int, float, float] | None:
-        """A frame and pixel where a person might click the object: one of the ten clearest views, now and then of it open."""
+        """A frame and pixel where a person might click the object: one of the ten clearest views, sometimes of it open."""
         clicks, ajar = self._clicks[index], self._open_clicks[index]
         if ajar and rng.random() < _CLICKED_OPEN:
             clicks = ajar
@@ -159,7 +159,7 @@ def truth_document(
     sightings: Sightings,
     motions: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
 ) -> dict[str, object]:
-    """truth.json; `motions` is what is said further of a joint, by its name, where fronts are opened."""
+    """Content of truth.json; `motions` adds entries to a joint, by its name, where fronts are opened."""
     entries = []
     for index, thing in enumerate(objects):
         joints = [{**_joint_entry(joint, capture_from_kitchen), **motions.get(joint.name, {})} for joint in thing.joints]
@@ -182,7 +182,7 @@ def truth_document(
 
 
 def prompts_document(objects: tuple[TrueObject, ...], sightings: Sightings, rng: np.random.Generator) -> dict[str, object]:
-    """prompts.json: one click for every object that can be seen."""
+    """Content of prompts.json: one click for every visible object."""
     entries = []
     for index, thing in enumerate(objects):
         click = sightings.click(index, rng)
@@ -223,7 +223,7 @@ def _posed(joint: TrueJoint, kitchen_from_run: Rigid3) -> TrueJoint:
 
 
 def _leaf_joint(furniture: Furniture, leaf: Leaf) -> TrueJoint:
-    """In the frame of its run."""
+    """Joint of a leaf, in the frame of its run."""
     middle_z, face = leaf.z + leaf.height_m / 2, -furniture.depth_m
     centre = np.array([leaf.x + leaf.width_m / 2, face, middle_z])
     if leaf.slides is not None:

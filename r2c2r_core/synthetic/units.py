@@ -17,7 +17,7 @@ _CHANNEL_DEPTH_M = 0.028
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unit:
-    """What one unit brings to its run; names are given when all units are known."""
+    """Parts of one unit in its run; names are assigned when all units are known."""
 
     furniture: tuple[Furniture, ...]
     carcass: Carcass
@@ -25,7 +25,7 @@ class Unit:
 
 
 def plan_unit(kind: UnitKind, place: Place, style: Style, look: Look, rng: np.random.Generator) -> Unit:
-    """A unit of that kind, made as the kitchen's look says."""
+    """A unit of that kind in the kitchen's look."""
     rows = rows_of(place, look, style.gap_m, shares_of(kind, rng))
     left, right = sides_of(place, look, style.gap_m)
     if kind == "drawers":
@@ -46,7 +46,7 @@ def plan_unit(kind: UnitKind, place: Place, style: Style, look: Look, rng: np.ra
 
 
 def shares_of(kind: UnitKind, rng: np.random.Generator) -> tuple[float, ...]:
-    """Of the height, from top to bottom: a stack has a low drawer over others, or equal ones."""
+    """Fractions of the height, from top to bottom: a stack has a low drawer over others, or equal ones."""
     if kind != "drawers":
         return (1.0,)
     count = int(rng.integers(2, 5))
@@ -93,7 +93,7 @@ def carcass_of(place: Place, look: Look, style: Style) -> Carcass:
 
 
 def boards_of(place: Place, look: Look, style: Style, rows: list[tuple[float, float]]) -> tuple[Board, ...]:
-    """The face frame round the openings, or the profiles at the bottom of the channels."""
+    """The face frame around the openings, or the profiles at the bottom of the channels."""
     face, left, right = -place.depth_m, place.x, place.x + place.width_m
     if look.face_frame is not None:
         stile, paint = look.face_frame.stile_m, style.wall_front if place.upper else style.base_front

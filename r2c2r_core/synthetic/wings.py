@@ -1,4 +1,4 @@
-"""The further runs of a layout, each in its own frame, and the corner where two meet."""
+"""Further runs of a layout, each in its own frame, and the corner where two meet."""
 
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -26,7 +26,7 @@ _HOB = Paint(kind="hob", colour=(0.012, 0.012, 0.013), accent=(0.12, 0.12, 0.12)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measures:
-    """Heights and depths that all units of a kitchen share, metres."""
+    """Heights and depths common to all units of a kitchen, metres."""
 
     plinth: float
     bottom: float
@@ -41,7 +41,7 @@ class Measures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kit:
-    """What every run of a kitchen is made with."""
+    """Dimensions, paints and look common to every run of a kitchen."""
 
     measures: Measures
     style: Style
@@ -82,7 +82,7 @@ def plan_upper_row(low: float, high: float, kinds: list[UnitKind], kit: Kit, rng
 
 
 def right_end(units: list[Unit]) -> float:
-    """X where a row ends."""
+    """X of the right end of a row."""
     return units[-1].carcass.x + units[-1].carcass.width_m
 
 
@@ -96,7 +96,7 @@ def plan_corner(start: float, kit: Kit, rng: np.random.Generator) -> tuple[Unit,
 
 
 def corner_wing(corner_x: float, filler: float, kit: Kit, rng: np.random.Generator) -> Run:
-    """Along the right wall from the corner into the room: a hob under a hood, a dishwasher, and a tall unit at the end."""
+    """Run along the right wall from the corner: a hob under a hood, a dishwasher, and a tall unit at the end."""
     depth, kinds = kit.measures.depth, _shuffled(["drawers", "dishwasher", "door"], rng)
     units = plan_row([*kinds, "tall"], kit, rng)
     worktop_end = units[-1].carcass.x
@@ -116,7 +116,7 @@ def corner_wing(corner_x: float, filler: float, kit: Kit, rng: np.random.Generat
 
 
 def opposite_wing(right: float, kit: Kit, rng: np.random.Generator) -> Run:
-    """Across an aisle: sliding doors, drawers and doors, with wall cabinets and an open shelf over them."""
+    """Run across an aisle: sliding doors, drawers and doors, with wall cabinets and an open shelf over them."""
     measures = kit.measures
     units = plan_row(_shuffled(["sliding", "drawers", "door", "dishwasher"], rng), kit, rng)
     end = right_end(units)
@@ -139,7 +139,7 @@ def opposite_wing(right: float, kit: Kit, rng: np.random.Generator) -> Run:
 
 
 def island(right: float, kit: Kit, rng: np.random.Generator) -> tuple[Run, Run]:
-    """Two rows back to back before the main run: the outer one faces the room, the inner one the main run."""
+    """Two rows back to back in front of the main run: the outer one faces the room, the inner one the main run."""
     outer = plan_row(_shuffled(["double", "drawers"], rng), kit, rng)
     length, depth = right_end(outer), kit.measures.depth
     inner = _stretched(["drawers", "door", "door"], length, kit, rng)
@@ -163,7 +163,7 @@ def island(right: float, kit: Kit, rng: np.random.Generator) -> tuple[Run, Run]:
 
 
 def _stretched(kinds: list[AnyKind], length: float, kit: Kit, rng: np.random.Generator) -> list[Unit]:
-    """A row of those kinds with the widths that fill a length."""
+    """A row of those kinds with widths that fill a length."""
     shares = rng.uniform(0.8, 1.2, len(kinds))
     units, x, measures = [], 0.0, kit.measures
     for kind, width in zip(kinds, length * shares / shares.sum(), strict=True):
@@ -213,7 +213,7 @@ def _end_panels(length: float, kit: Kit) -> tuple[Board, Board]:
 
 
 def _paper_on(furniture: Furniture, rng: np.random.Generator) -> tuple[Board, ...]:
-    """A sheet that two magnets hold on a front, in its lower half."""
+    """A sheet held by two magnets on the lower half of a front."""
     leaf, face = furniture.leaves[0], -furniture.depth_m
     width, height = 0.148, min(0.21, 0.4 * leaf.height_m)
     x = leaf.x + float(rng.uniform(0.2, 0.8)) * (leaf.width_m - width)
@@ -242,7 +242,7 @@ def _shuffled(kinds: list[AnyKind], rng: np.random.Generator) -> list[AnyKind]:
 
 
 def named(runs: tuple[Run, ...]) -> tuple[Run, ...]:
-    """The runs with their objects counted by category: all base units first, then what is on walls, then what is fixed."""
+    """The runs with their objects numbered by category: base units first, then wall units, then fixed objects."""
     counts: dict[str, int] = {}
     runs = tuple(replace(run, base=_numbered(run.base, counts)) for run in runs)
     runs = tuple(replace(run, upper=_numbered(run.upper, counts)) for run in runs)
