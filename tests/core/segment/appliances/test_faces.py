@@ -9,7 +9,7 @@ import pytest
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import SceneSurface
-from r2c2r_core.segment.appliances.edges import FRONT, RIGHT, TOP
+from r2c2r_core.segment.appliances.edges import FRONT, LEFT, RIGHT, TOP
 from r2c2r_core.segment.appliances.faces import patches_on
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.surface import parts_of
@@ -61,6 +61,13 @@ def test_patches_know_their_faces() -> None:
         assert on.sum() > 10
         assert (found.axis[on] == axis).all()
         np.testing.assert_allclose(found.points[on][:, axis], at, atol=1e-6)
+
+
+def test_depth_on_the_front_ends_to_the_left_and_right_unless_it_goes_on() -> None:
+    front = sheet(1, 0.0, (-0.24, 0.33), (-0.14, 0.14), -1)
+    found = patches_on(DEEP, scene_of(front), HERE).ends
+    assert found.keys() == {LEFT}
+    assert found[LEFT] == pytest.approx(-0.24, abs=CELL_M)
 
 
 def test_a_side_ends_at_its_first_gap_not_at_the_wall_behind() -> None:

@@ -7,14 +7,14 @@ from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.segment.appliances import fit
-from r2c2r_core.segment.appliances.edges import BACK, FRONT, LEFT, RIGHT, TOP, YAW, Photo
+from r2c2r_core.segment.appliances.edges import BACK, BOTTOM, FRONT, LEFT, RIGHT, TOP, YAW, Photo
 from r2c2r_core.segment.appliances.faces import Patches
 from r2c2r_core.segment.appliances.fit import Evidence, Params, Solution, covariance_of, solve
 from r2c2r_core.tuning import tuned
 from tests.core.segment.appliances.drawn import BACK_M, EYES, LEFT_M, LINE_Z, RIGHT_M, TOP_M, TRUE, WALL_Y, photo
 
 KIND = category_of("microwave")
-NOTHING = Patches(np.zeros((0, 3)), np.zeros(0, int), np.zeros(0, int), None)
+NOTHING = Patches(np.zeros((0, 3)), np.zeros(0, int), np.zeros(0, int), None, {})
 PIXEL_M = 0.0035  # at 1.5 m a pixel is 2 mm, and edges are drawn to half a pixel
 
 
@@ -23,8 +23,9 @@ def solved(
     photos: list[Photo],
     world_from_front: Rigid3 | None = None,
     patches: Patches = NOTHING,
+    support_m: float | None = None,
 ) -> Solution:
-    evidence = Evidence(start, KIND, patches, WALL_Y, None, 0.0085)
+    evidence = Evidence(start, KIND, patches, WALL_Y, support_m, 0.0085)
     return solve(evidence, photos, world_from_front or Rigid3(np.eye(3), np.zeros(3)))
 
 
@@ -80,6 +81,31 @@ def test_edges_behind_something_nearer_say_nothing() -> None:
     np.testing.assert_allclose(found.box[[YAW, LEFT, RIGHT, FRONT, BACK]], start[[YAW, LEFT, RIGHT, FRONT, BACK]], atol=1e-3)
 
 
+@pytest.mark.parametrize("off_m", [0.045, -0.02])
+def test_a_box_stands_on_the_support_near_its_lower_edge(off_m: float) -> None:
+    """The line taken for its lower edge is that of its window, or a seam of the worktop."""
+    start = TRUE.copy()
+    start[BOTTOM] = TRUE[BOTTOM] + off_m
+    assert solved(start, [], support_m=float(TRUE[BOTTOM])).box[BOTTOM] == pytest.approx(TRUE[BOTTOM], abs=0.008)
+
+
+def test_a_box_that_hangs_keeps_its_lower_edge() -> None:
+    hanging = solved(TRUE, [], support_m=float(TRUE[BOTTOM]) - 0.5)
+    assert hanging.box[BOTTOM] == pytest.approx(TRUE[BOTTOM], abs=0.003)
+
+
+@pytest.mark.parametrize("short_m", [0.02, 0.045])
+def test_depth_beyond_a_line_of_the_front_leads_to_its_edge(short_m: float) -> None:
+    start, seen = TRUE.copy(), Patches(*NOTHING[:4], {RIGHT: RIGHT_M - 0.01})
+    start[RIGHT] = RIGHT_M - short_m
+    assert solved(start, [photo(eye) for eye in EYES], patches=seen).box[RIGHT] == pytest.approx(RIGHT_M, abs=PIXEL_M)
+
+
+def test_a_front_without_depth_beside_its_edge_keeps_it() -> None:
+    dark = Patches(*NOTHING[:4], {LEFT: LEFT_M + 0.3})
+    assert solved(TRUE, [photo(eye) for eye in EYES], patches=dark).box[LEFT] == pytest.approx(LEFT_M, abs=PIXEL_M)
+
+
 @pytest.mark.parametrize("turn_deg", [-4.0, 0.0, 3.0])
 def test_a_side_in_depth_tells_how_a_body_is_turned_whose_front_is_mostly_glass(turn_deg: float) -> None:
     """A strip of keys and the right side, 3 mm rough; no photographs."""
@@ -90,7 +116,7 @@ def test_a_side_in_depth_tells_how_a_body_is_turned_whose_front_is_mostly_glass(
     points[:40, 1] += rng.normal(0, 0.003, 40)
     points[40:, 0] += rng.normal(0, 0.003, 100)
     patches = Patches(
-        points @ rotation_about_z(turn).T, np.repeat([1, 0], [40, 100]), np.repeat([FRONT, RIGHT], [40, 100]), None
+        points @ rotation_about_z(turn).T, np.repeat([1, 0], [40, 100]), np.repeat([FRONT, RIGHT], [40, 100]), None, {}
     )
     found = solved(TRUE, [], patches=patches)
     assert np.degrees(found.box[YAW]) == pytest.approx(turn_deg, abs=0.6)  # drawn a little to the plane that was found
@@ -123,7 +149,7 @@ def test_more_depth_of_a_side_means_less_spread() -> None:
 
 
 def on_the_right(points: Points) -> Patches:
-    return Patches(points, np.zeros(len(points), int), np.full(len(points), RIGHT), None)
+    return Patches(points, np.zeros(len(points), int), np.full(len(points), RIGHT), None, {})
 
 
 def grid(x_m: tuple[float, float], z_m: tuple[float, float]) -> Points:
