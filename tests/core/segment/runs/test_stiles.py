@@ -101,6 +101,18 @@ def test_light_may_hide_a_line_around_a_panel_that_depth_shows_sunk(sunk_m: floa
     assert (door_of(cells) != CUT) == whole
 
 
+def test_grain_on_a_sunk_panel_does_not_part_it_from_its_stile() -> None:
+    """Lines of the grain lie where a panel of its own would begin; the panel's line ends at both rails."""
+    light, level = np.full((340, 320), 170, np.float32), np.zeros((170, 160))
+    light[round(PANEL.top) : round(PANEL.bottom), round(CUT.left)] = 150
+    level[25:145, 55:125] = -0.007
+    grain, relief = lines([110, 140], [50, 290]), replace(FLAT, level_m=level)
+    assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, grain, Contrast(light), relief)).left == pytest.approx(
+        80, abs=2
+    )
+    assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, grain, Contrast(light), FLAT)) == CUT
+
+
 @pytest.mark.parametrize(("rail", "found"), [(30, 30), (15, 22)])
 def test_an_edge_in_a_shadow_is_as_far_from_the_sunk_panel_as_the_others(rail: int, found: float) -> None:
     """The shadow ends at row 30; it was followed up to row 22. All other stiles and rails are 30 cells wide."""
