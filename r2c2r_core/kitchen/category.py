@@ -7,6 +7,7 @@ import numpy as np
 
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.materials import UNKNOWN_THING, Material
+from r2c2r_core.model.motion import Movement
 from r2c2r_core.tuning import param, tuned
 
 Kind = Literal["front", "appliance", "thing"]
@@ -15,9 +16,6 @@ Kind = Literal["front", "appliance", "thing"]
 Opening = Literal["drawer", "side", "pair", "bottom", "sideways", "fixed", "rigid"]
 """How it opens: slides out, one side-hinged door, two doors, a bottom-hinged door, slides along its front, not at all; or it is
 a free-standing object."""
-
-Way = Literal["hinge", "out", "along", "none"]
-"""Motion of a front: rotation about an edge, pulled out, sliding along its own plane, or none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,9 +131,9 @@ class Category:
         return self.opens == "pair" or self.wider is not None
 
     @property
-    def motion(self) -> Way:
+    def motion(self) -> Movement:
         """Motion of its front."""
-        moves: dict[Opening, Way] = {"drawer": "out", "sideways": "along", "fixed": "none", "rigid": "none"}
+        moves: dict[Opening, Movement] = {"drawer": "out", "sideways": "along", "fixed": "none", "rigid": "none"}
         return moves.get(self.opens, "hinge")
 
     @property

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
@@ -26,6 +27,9 @@ DOOR, DRAWER = "door", "drawer"
 """Parts of an object with a drawer below its door."""
 
 MotionKind = Literal["revolute", "prismatic", "fixed"]
+
+Movement = Literal["hinge", "out", "along", "none"]
+"""Motion of a front: rotation about an edge, pulled out, sliding along its own plane, or none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +76,14 @@ class JointMotion:
     stop_seen: bool  # whether it rested at the end of its motion, so that `largest` is its limit
     source: Source  # of axis and pivot: measured, inferred or person
     inside: Inside | None = None
+
+    def movement(self, front_normal: Vector3) -> Movement:
+        """How the front, whose plane has that normal (world, unit), moves."""
+        if self.axis_world is None:
+            return "none"
+        if self.kind == "revolute":
+            return "hinge"
+        return "out" if abs(float(self.axis_world @ front_normal)) > np.sqrt(0.5) else "along"
 
     @property
     def limit_source(self) -> Source:

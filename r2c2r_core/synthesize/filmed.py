@@ -7,7 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.kitchen.category import Category, Way
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.motion import DRAWER, Inside, JointMotion, Source
@@ -48,8 +48,8 @@ def opened_as(spec: Category, motions: tuple[JointMotion, ...], world_from_objec
         return replace(spec, fixture=spec.over_drawer), None
     if spec.kind != "front" or spec.several_fronts or len(motions) != 1:
         return spec, None
-    way = _way(motions[0], world_from_object)
-    if way == spec.motion or (way == "hinge" and spec.motion == "none"):
+    way = motions[0].movement(world_from_object.rotation[:, 1])
+    if way in (spec.motion, "none") or (way == "hinge" and spec.motion == "none"):
         return spec, None
     other = category_of({"hinge": "cabinet", "out": "drawer", "along": "sliding_door"}[way])
     moved = {"hinge": "swings", "out": "is drawn out", "along": "slides along its front"}[way]
@@ -63,7 +63,7 @@ def side_filmed(item: MeasuredObject) -> HingeSide | None:
         return None
     axis = _axis(leaves[0], item.placed_pose)
     across, up = float(axis[0]), float(axis[2])
-    if _way(leaves[0], item.placed_pose) == "hinge":
+    if leaves[0].movement(item.placed_pose.rotation[:, 1]) == "hinge":
         return ("right" if up > 0 else "left") if abs(up) > abs(across) else ("bottom" if across > 0 else "top")
     return ("right" if across > 0 else "left") if abs(across) > abs(up) else ("top" if up > 0 else "bottom")
 
@@ -98,7 +98,7 @@ def drawer_below(item: MeasuredObject) -> Below | None:
     drawer = _drawer(item.motions)
     if drawer is None or drawer.pivot_world is None:
         return None
-    middle = float(item.placed_pose.inverse.apply(drawer.pivot_world[None])[0, 2])
+    middle = float(item.placed_pose.inverse.apply(drawer.pivot_world)[2])
     return Below(seam_m=2 * middle + float(item.dimensions_m[2]) / 2, inside=drawer.inside)
 
 
@@ -156,9 +156,3 @@ def _drawer(motions: tuple[JointMotion, ...]) -> JointMotion | None:
 def _axis(motion: JointMotion, world_from_object: Rigid3) -> np.ndarray:
     assert motion.axis_world is not None  # a fixed part has no motion
     return np.asarray(world_from_object.inverse.turn(motion.axis_world))
-
-
-def _way(motion: JointMotion, world_from_object: Rigid3) -> Way:
-    if motion.kind == "revolute":
-        return "hinge"
-    return "out" if abs(float(_axis(motion, world_from_object)[1])) > np.sqrt(0.5) else "along"

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 
@@ -108,7 +107,7 @@ def _state(motion: JointMotion, frame_index: int) -> float:
 def _with_inside(leaf: Leaf, motion: JointMotion, scene: Scene, depth_m: float) -> JointMotion:
     """Motion with the inside measured behind the leaf, from frames where it is open far enough to see behind it."""
     params, places = tuned(Params), _places(leaf, motion)
-    drawn_out = _way(motion, leaf) == "out"
+    drawn_out = motion.movement(leaf.outward) == "out"
     inside = measure_inside(
         leaf,
         places if drawn_out else lambda frame: leaf.world_from_front if places(frame) is not None else None,
@@ -131,20 +130,14 @@ def _places(leaf: Leaf, motion: JointMotion) -> Callable[[Frame], Rigid3 | None]
     return place
 
 
-def _way(motion: JointMotion, leaf: Leaf) -> Literal["hinge", "out", "along"]:
-    assert motion.axis_world is not None  # a fixed leaf is never open
-    if motion.kind == "revolute":
-        return "hinge"
-    return "out" if abs(float(motion.axis_world @ leaf.outward)) > np.sqrt(0.5) else "along"
-
-
 def _opened(leaf: Leaf, motion: JointMotion, state: float) -> OpenLeaf:
     assert motion.axis_world is not None  # a fixed leaf is never open
     assert motion.pivot_world is not None
     opening = moved(motion.axis_world, motion.pivot_world, motion.kind == "revolute", state)
     depth_m = None if motion.inside is None else motion.inside.depth_m
     rear_m = None if depth_m is None else depth_m + leaf.thickness_m
-    return OpenLeaf(leaf=leaf, world_from_leaf=opening @ leaf.world_from_front, way=_way(motion, leaf), rear_m=rear_m)
+    world_from_leaf, way = opening @ leaf.world_from_front, motion.movement(leaf.outward)
+    return OpenLeaf(leaf=leaf, world_from_leaf=world_from_leaf, way=way, rear_m=rear_m)
 
 
 def _leaves(whole: Leaf, category: Category) -> list[tuple[str, Leaf, tuple[Way, ...]]]:

@@ -1,12 +1,12 @@
 """Movable leaf: the rectangle of a closed front, and sample points on it and around it."""
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.motion import Movement
 from r2c2r_core.tuning import param, tuned
 
 
@@ -64,7 +64,7 @@ class OpenLeaf:
 
     leaf: Leaf
     world_from_leaf: Rigid3  # of its outer face, as `front`
-    way: Literal["hinge", "out", "along"]  # how it was moved there
+    way: Movement  # how it was moved there
     rear_m: float | None = None  # from its outer face to the rear board of the drawer, where that was observed
 
 
