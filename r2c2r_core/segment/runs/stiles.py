@@ -44,6 +44,13 @@ class Params:
     beside_m: tuple[float, float] = param(
         (0.005, 0.025), "m", "Minimum and maximum distance from a line of the depth that is compared beside it"
     )
+    min_observed_ratio: float = param(
+        0.25,
+        "ratio",
+        "Minimum number of depth points on one side of a line, relative to the other, to measure a step",
+        gt=0,
+        lt=1,
+    )
     edge: float = param(-1.0, "log", "Minimum log-odds of a frame's outer edge")
     even_m: float = param(
         0.01,
@@ -117,15 +124,19 @@ def _frame_width(contrast: Contrast, relief: Relief, panel: Cell, side: tuple[in
 
 
 def _step_at(relief: Relief, front: Cell, axis: int, at: float, away: int, cell_m: float) -> float:
-    """Depth step in metres (positive: farther back) beyond a position, along the middle of a front's span."""
+    """Depth step in metres (positive: farther back) beyond a position, along the middle of a front's span.
+
+    0 where depth hardly saw the plane on one of the two sides.
+    """
     params, (low, high) = tuned(Params), across(front, 1 - axis)
-    margin, level = (high - low) * (1 - params.middle) / 2, []
+    margin, counts, level = (high - low) * (1 - params.middle) / 2, [], []
     for side in (-away, away):
         start, stop = sorted(at + side * size / cell_m for size in params.beside_m)
         span = (start, low + margin, stop, high - margin) if axis == 0 else (low + margin, start, high - margin, stop)
         points, total = relief.levels_over(Cell(*span))
+        counts.append(points)
         level.append(total / max(points, 1.0))
-    return float(level[0] - level[1])
+    return float(level[0] - level[1]) if min(counts) > params.min_observed_ratio * max(counts) else 0.0
 
 
 def _strip_beside(field: LineField, cells: Sequence[Cell], front: Cell, axis: int, end: int) -> Cell | None:
