@@ -1,4 +1,4 @@
-"""A calibration one folder up: data sets keep one for all the sequences below it."""
+"""Calibration files from the parent folder: data sets keep one calibration for all sequences below it."""
 
 import hashlib
 import re
@@ -12,7 +12,7 @@ _CALIBRATIONS = (r"camera-intrinsics\.txt", r"intrinsics_color\.txt", r"[^/]+\.y
 
 
 class WithAbove:
-    """The files of a folder, and calibrations from the folder above it where it has none of that kind itself."""
+    """The files of a folder, plus the parent folder's calibrations of kinds that the folder lacks."""
 
     def __init__(self, files: Files, above: Files) -> None:
         self._files, self._above = files, above
@@ -20,7 +20,7 @@ class WithAbove:
         self.borrowed = frozenset(_lacking(files.names(), above.names()))
 
     def names(self) -> frozenset[str]:
-        """All file names, those from above as if they were here."""
+        """All file names, with borrowed files listed as if they were in the folder."""
         return self._files.names() | self.borrowed
 
     def read(self, name: str) -> bytes:
@@ -32,11 +32,11 @@ class WithAbove:
         return self._holder(name).open(name)
 
     def place(self, name: str) -> tuple[str, ...]:
-        """Where the file lies."""
+        """The path of the file."""
         return self._holder(name).place(name)
 
     def sha256(self, names: Iterable[str]) -> str:
-        """Digest of the folder's files, and of what was borrowed where that is among them."""
+        """Digest of the folder's files, and of the borrowed files among `names`."""
         wanted = frozenset(names)
         own = self._files.sha256(wanted - self.borrowed)
         if not wanted & self.borrowed:
@@ -48,12 +48,12 @@ class WithAbove:
 
 
 def with_folder_above(files: Files, source: Path) -> Files:
-    """The files of a recording given as a folder, with the calibration that lies beside that folder; of a zip, its own."""
+    """The files of a recording: of a folder, with the calibration beside it; of a zip, only its own."""
     return WithAbove(files, FolderFiles(source.resolve().parent, deep=False)) if source.is_dir() else files
 
 
 def calibrations_beside(source: Path) -> tuple[Path, ...]:
-    """The files beside a recording's folder that it may borrow: a change of theirs is a change of the recording."""
+    """Calibration files beside a recording's folder that it may borrow; changing them changes the recording."""
     if not source.is_dir():
         return ()
     beside = sorted(source.resolve().parent.iterdir())
@@ -61,12 +61,12 @@ def calibrations_beside(source: Path) -> tuple[Path, ...]:
 
 
 def borrowed_by(files: Files, names: Iterable[str]) -> list[str]:
-    """Which of these files come from above."""
+    """Names of the files borrowed from the parent folder."""
     return sorted(files.borrowed.intersection(names)) if isinstance(files, WithAbove) else []
 
 
 def _lacking(here: frozenset[str], above: frozenset[str]) -> list[str]:
-    """Of each kind of calibration that is not here, the one above; none where several could be meant."""
+    """The parent folder's calibration of each kind missing here; skipped where several files match."""
     lacking = []
     for pattern in _CALIBRATIONS:
         candidates = [name for name in above if re.fullmatch(pattern, name)]

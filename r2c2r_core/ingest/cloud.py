@@ -1,4 +1,4 @@
-"""The whole recording as one surface: fusion of a spread subset of its frames, floating crumbs removed."""
+"""TSDF fusion of an evenly spread subset of frames into one surface, without small floating components."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,12 +20,17 @@ _BLOCK_VOXELS = 8  # Open3D's VoxelBlockGrid allocates cubes of 8 x 8 x 8 voxels
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a room is fused."""
+    """Tuned parameters of surface fusion."""
 
     outlier_deviations: float = param(
-        2.0, "σ", "of the distances to neighbours, beyond which a point is an outlier", source="the paper's"
+        2.0,
+        "σ",
+        "Number of standard deviations of the mean neighbour distance beyond which a point is an outlier",
+        source="the paper's",
     )
-    most_blocks: int = param(48_000, "count", "of 8 x 8 x 8 voxels", source="10 kB each with colour: 0.5 GB", ge=100)
+    most_blocks: int = param(
+        48_000, "count", "Maximum number of blocks of 8 x 8 x 8 voxels", source="10 kB each with colour: 0.5 GB", ge=100
+    )
 
 
 def fuse_frames(
@@ -40,7 +45,7 @@ def fuse_frames(
     outlier_neighbours: int = 0,
     progress: Progress = SILENT,
 ) -> tuple[Surface, float]:
-    """The fused surface in the frames' own world, and the voxel used."""
+    """The fused surface in the frames' world, and the voxel size used, in metres."""
     chosen = spread_frames(frames, most_frames)
     grid = choose_grid(chosen, images, finest_voxel_m, coarsest_voxel_m, depth_max_m)
     views = _views(chosen, images, progress)
@@ -57,7 +62,7 @@ def fuse_frames(
 
 
 def spread_frames(frames: Sequence[Frame], most: int) -> tuple[Frame, ...]:
-    """At most `most` frames, evenly spread; of each stretch the sharpest."""
+    """At most `most` frames, evenly spread: the sharpest frame of each interval."""
     if len(frames) <= most:
         return tuple(frames)
     edges = np.linspace(0, len(frames), most + 1).astype(int)
@@ -65,14 +70,14 @@ def spread_frames(frames: Sequence[Frame], most: int) -> tuple[Frame, ...]:
 
 
 class Grid(NamedTuple):
-    """The voxels to fuse into."""
+    """A voxel grid for fusion."""
 
     voxel_m: float
     blocks: int  # of 8 x 8 x 8 voxels; an estimate, the grid grows when it is too low
 
 
 def choose_grid(frames: Sequence[Frame], images: FrameImages, finest_m: float, coarsest_m: float, depth_max_m: float) -> Grid:
-    """As fine as the depth pixels warrant and the memory allows."""
+    """The finest grid that the depth resolution justifies and the memory allows."""
     sample = frames[:: max(1, len(frames) // 24)]
     footprints, cells = [], []
     for frame in sample:
@@ -93,7 +98,7 @@ def choose_grid(frames: Sequence[Frame], images: FrameImages, finest_m: float, c
 
 
 def _cell_keys(cells: np.ndarray) -> np.ndarray:
-    """One number for each row of whole numbers (n, 3), its own within two million cells: rows are slow to sort."""
+    """One integer key per row of integer cells (n, 3), unique within two million cells per axis: rows are slow to sort."""
     x, y, z = cells.astype(np.int64).T & (2**21 - 1)
     return np.asarray((x << 42) | (y << 21) | z)
 
@@ -117,8 +122,8 @@ def drop_crumbs(surface: Surface, smallest_part_m2: float) -> Surface:
 def drop_outliers(surface: Surface, neighbours: int) -> Surface:
     """The surface without vertices that lie far from their nearest `neighbours` (paper §3: Open3D's statistical removal).
 
-    Far is two standard deviations of that distance over the whole scan. Edges of the scan and thin things look alike to it:
-    on a sample 97 % of what it takes is true surface (method.md row 11), so it is not the default.
+    The threshold is two standard deviations of that distance over the whole scan. Scan borders and thin objects also exceed
+    it: on a sample, 97 % of the removed points are true surface (method.md row 11), so it is off by default.
     """
     import open3d as o3d
 
@@ -131,7 +136,7 @@ def drop_outliers(surface: Surface, neighbours: int) -> Surface:
 
 
 def _with_faces(surface: Surface, kept_faces: np.ndarray) -> Surface:
-    """The surface with some of its faces, and the vertices they use."""
+    """The surface reduced to the kept faces and the vertices they use."""
     used = np.zeros(len(surface.vertices), bool)
     used[surface.faces[kept_faces].ravel()] = True
     renumbered = np.cumsum(used) - 1

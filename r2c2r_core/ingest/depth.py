@@ -1,4 +1,4 @@
-"""Depth images: which pixels can be believed, how they are stored, and a filled copy for display."""
+"""Depth images: rejection of unreliable pixels, encoding for storage, and hole filling for display."""
 
 from dataclasses import dataclass
 
@@ -16,23 +16,30 @@ _FAR = np.float32(1e6)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which depth pixels are believed."""
+    """Tuned parameters of depth rejection."""
 
-    grazing_deg: float = param(84.0, "deg", "between a ray and a surface across it, from where depth says nothing", le=90)
+    grazing_deg: float = param(84.0, "deg", "Angle between the ray and the surface normal above which depth is rejected", le=90)
     least_step_m: float = param(
         0.05,
         "m",
-        "between two surfaces, at 0 m",
+        "Minimum depth step between two surfaces, at 0 m",
         source="handles stand out by 3 to 5 cm and are a pixel or two wide: keep every one",
     )
-    step_more: float = param(0.006, "m", "and more of it at 1 m: noise grows with the squared distance")
-    most_noise_m: float = param(0.015, "m", "of depth that is no step, at 0 m")
+    step_more: float = param(0.006, "m", "Increase of the minimum depth step at 1 m; it grows with the squared distance")
+    most_noise_m: float = param(0.015, "m", "Maximum depth difference that is attributed to noise, at 0 m")
     noise_more: float = param(
-        0.004, "m", "and more of it at 1 m, likewise", source="three sigma of a Kinect: 1.4 mm/m² one sigma"
+        0.004,
+        "m",
+        "Increase of that noise at 1 m; it grows with the squared distance",
+        source="three sigma of a Kinect: 1.4 mm/m² one sigma",
     )
-    inside: float = param(0.2, "share", "of a step, that a mixed pixel lies off both its sides")
-    ridge: float = param(0.3, "share", "of that noise, within which pixels are one ridge")
-    growth: float = param(1.5, "ratio", "of the range of twice the window to that of a step: a slope's doubles")
+    inside: float = param(
+        0.2, "share", "Minimum distance of a mixed pixel from both sides of a step, as a fraction of the step"
+    )
+    ridge: float = param(0.3, "share", "Maximum depth difference within a thin ridge, as a fraction of the noise limit")
+    growth: float = param(
+        1.5, "ratio", "Maximum growth of the depth range at a step when the window doubles (on a slope it doubles)"
+    )
 
 
 def usable_depth(
@@ -44,9 +51,9 @@ def usable_depth(
     near_m: float,
     far_m: float,
 ) -> DepthMetres:
-    """The depth with every pixel that cannot be believed set to 0: unknown, out of range, unsure or flying.
+    """The depth with unreliable pixels set to 0: unknown, out of range, of low confidence, or flying.
 
-    A sensor is never sure of what is two or three pixels wide: its ridge is believed one level of confidence below.
+    Sensors give structures two or three pixels wide low confidence, so thin ridges are kept one confidence level below.
     """
     depth = np.nan_to_num(metres, nan=0.0, posinf=0.0, neginf=0.0).astype(np.float32, copy=False)
     depth = np.where((depth >= near_m) & (depth <= far_m), depth, np.float32(0))
@@ -57,7 +64,7 @@ def usable_depth(
 
 
 def ridges(depth_m: DepthMetres) -> Mask:
-    """Pixels on what is up to four wide and stands before farther surface on both sides, along a row or a column."""
+    """Pixels on structures up to four pixels wide in front of farther surface on both sides, along a row or a column."""
     valid = depth_m > 0
     for_min, for_max = np.where(valid, depth_m, _FAR), np.where(valid, depth_m, -_FAR)
     step, margin = _least_step(depth_m), tuned(Params).ridge * _most_noise(depth_m)
@@ -70,11 +77,11 @@ def ridges(depth_m: DepthMetres) -> Mask:
 
 
 def flying_pixels(depth_m: DepthMetres, camera: Intrinsics) -> Mask:
-    """Pixels that hang between two surfaces, or lie on one seen too flatly to be measured.
+    """Flying pixels: between two surfaces, or on a surface seen at too grazing an angle.
 
     Along a row or a column, a mixed pixel lies well inside the range of its two neighbours on either side, while that range
-    hardly grows when the window is doubled: a step. On a slanted surface the range doubles with the window, so it is kept.
-    The nearest and the farthest pixel of a window never fly, which keeps handles one pixel wide.
+    hardly grows when the window is doubled, as at a step. On a slanted surface the range doubles with the window, so the
+    pixel is kept. The nearest and the farthest pixel of a window are always kept, which preserves handles one pixel wide.
     """
     valid = depth_m > 0
     for_min, for_max = np.where(valid, depth_m, _FAR), np.where(valid, depth_m, -_FAR)
@@ -92,17 +99,17 @@ def flying_pixels(depth_m: DepthMetres, camera: Intrinsics) -> Mask:
 
 
 def encode_depth(depth_m: DepthMetres) -> np.ndarray:
-    """uint16 steps of 0.25 mm; 0 is unknown."""
+    """Depth as uint16 in steps of 0.25 mm; 0 is unknown."""
     return np.clip(np.rint(depth_m / DEPTH_STEP_M), 0, 65535).astype(np.uint16)
 
 
 def decode_depth(stored: np.ndarray) -> DepthMetres:
-    """Metres of stored steps; 0 is unknown."""
+    """Depth in metres from stored uint16 steps; 0 is unknown."""
     return stored.astype(np.float32) * np.float32(DEPTH_STEP_M)
 
 
 def fill_for_display(depth_m: DepthMetres) -> DepthMetres:
-    """Unknown pixels take their nearest known neighbour. For looking at and pixel look-ups only: never fuse it."""
+    """Depth with unknown pixels set to the nearest known one. For display and pixel look-ups only: never fuse it."""
     from scipy.ndimage import distance_transform_edt
 
     unknown = depth_m == 0
@@ -120,13 +127,13 @@ def _farthest_beside(for_max: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _least_step(depth_m: DepthMetres) -> DepthMetres:
-    """Between two surfaces, metres."""
+    """Minimum depth step between two surfaces at each pixel's depth, metres."""
     params = tuned(Params)
     return np.float32(params.least_step_m) + np.float32(params.step_more) * depth_m * depth_m
 
 
 def _most_noise(depth_m: DepthMetres) -> DepthMetres:
-    """Metres."""
+    """Maximum depth difference attributed to noise at each pixel's depth, metres."""
     params = tuned(Params)
     return np.float32(params.most_noise_m) + np.float32(params.noise_more) * depth_m * depth_m
 
@@ -139,7 +146,7 @@ def _range(for_min: np.ndarray, for_max: np.ndarray, radius: int, across: bool) 
 
 
 def _steepness(depth_m: DepthMetres, across: bool) -> np.ndarray:
-    """Metres of depth per pixel where both neighbours continue the slope, else 0."""
+    """Depth gradient in metres per pixel where both neighbours continue the slope, else 0."""
     ahead = np.zeros_like(depth_m)
     behind = np.zeros_like(depth_m)
     if across:

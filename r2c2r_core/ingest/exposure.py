@@ -1,8 +1,8 @@
-"""How each picture's exposure and white balance differ from the others', by the surface that several of them show.
+"""Per-frame exposure and white-balance gains, estimated jointly from surface points seen in several frames.
 
-A phone adapts both while it films, so that doors of one colour come out in several. The logarithm of a stored value is taken
-for the surface's less the frame's gain; both are solved for at once, by least squares that let outliers go (highlights, what
-moved, poses a pixel off). Stored values are gamma-encoded, under which a gain of light stays a gain of them.
+A phone adapts both while filming, so doors of one colour differ between frames. The logarithm of a stored value is modelled
+as the surface's log colour minus the frame's log gain; both are solved together by robust least squares (outliers: highlights,
+moved objects, poses a pixel off). Stored values are gamma-encoded, under which a gain of light remains a gain of values.
 """
 
 from collections.abc import Sequence
@@ -24,26 +24,32 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How gains are estimated."""
+    """Tuned parameters of gain estimation."""
 
-    frames: int = param(120, "count", "spread over the recording; those between them are interpolated", ge=2)
-    points: int = param(4000, "count", "of the surface, spread by area", ge=10)
-    width_px: int = param(160, "px", "of the pictures that are compared: poses are off by a pixel or two at full size", ge=16)
-    darkest: int = param(20, "grey", "below, noise and black offset hide the gain")
-    brightest: int = param(235, "grey", "above, a channel is clipped")
-    hidden_m: float = param(0.03, "m", "beyond the depth's noise, before or behind the surface: something else is seen")
-    outlier: float = param(0.12, "log", "residual at which a look counts half", source="a highlight is 0.3 and more")
-    held: float = param(
-        0.5, "log", "one sigma of gains that nothing else tells", source="a stop of light is 0.32 of stored value"
+    frames: int = param(
+        120, "count", "Maximum number of frames used, spread over the recording; gains in between are interpolated", ge=2
     )
-    most: float = param(0.7, "log", "largest gain that is believed: two stops")
-    least_looks: int = param(200, "count", "of a frame, fewer tell nothing about it")
-    least_gain: float = param(0.1, "share", "of the spread that must go before pictures are touched")
-    rounds: int = param(8, "count", "of reweighting", ge=1)
+    points: int = param(4000, "count", "Number of surface points sampled by area", ge=10)
+    width_px: int = param(160, "px", "Width of the downscaled images; at full size, poses are a pixel or two off", ge=16)
+    darkest: int = param(
+        20, "grey", "Channel value at or below which a sample is rejected, as noise and black offset hide the gain"
+    )
+    brightest: int = param(235, "grey", "Channel value at or above which a sample is rejected as clipped")
+    hidden_m: float = param(0.03, "m", "Depth difference beyond the noise, in front or behind, at which a point is not seen")
+    outlier: float = param(
+        0.12, "log", "Cauchy scale: residual at which an observation's weight is halved", source="a highlight is 0.3 and more"
+    )
+    held: float = param(
+        0.5, "log", "Standard deviation of the zero-mean prior on gains", source="a stop of light is 0.32 of stored value"
+    )
+    most: float = param(0.7, "log", "Maximum absolute log gain (two stops); larger ones are clipped")
+    least_looks: int = param(200, "count", "Minimum number of observations in a frame for its gain to be estimated")
+    least_gain: float = param(0.1, "share", "Minimum reduction of the colour spread for gains to be applied")
+    rounds: int = param(8, "count", "Number of IRLS iterations", ge=1)
 
 
 class Balance(NamedTuple):
-    """The frames with their gains, and what they do to the surface's colour."""
+    """The frames with their gains, and the colour spread before and after."""
 
     frames: tuple[Frame, ...]
     spread_before: float  # median over the surface of one sigma of log colour across frames
@@ -51,7 +57,7 @@ class Balance(NamedTuple):
 
 
 class Looks(NamedTuple):
-    """What frames show of points: one row a look."""
+    """Colour observations of surface points, one row per point and frame."""
 
     point: np.ndarray  # (n,)
     frame: np.ndarray  # (n,) position
@@ -67,7 +73,7 @@ def balance_exposure(
     rng: np.random.Generator,
     progress: Progress = SILENT,
 ) -> Balance:
-    """Gains that bring the frames to one exposure and white; none where they would hardly change the surface's colours."""
+    """Gains that equalise exposure and white balance over the frames; none where they hardly reduce the colour spread."""
     params = tuned(Params)
     chosen = frames[:: max(1, len(frames) // params.frames)]
     points = sample_surface(vertices, faces, params.points, rng).points
@@ -83,7 +89,7 @@ def balance_exposure(
 
 
 def see(frames: Sequence[Frame], images: FrameImages, points: Points, noise: DepthNoise, progress: Progress = SILENT) -> Looks:
-    """The colours that frames show of points their depth confirms, neither clipped nor black."""
+    """Colour observations of points confirmed by each frame's depth, neither clipped nor black."""
     params = tuned(Params)
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for position, frame in enumerate(frames):
@@ -105,7 +111,7 @@ def see(frames: Sequence[Frame], images: FrameImages, points: Points, noise: Dep
 
 
 def solve_gains(looks: Looks, frames: int) -> np.ndarray:
-    """Log gains (frames, 3) under which the looks at each point agree best; 0 for frames that show too little."""
+    """Log gains (frames, 3) by IRLS with Cauchy weights; 0 for frames with too few observations."""
     params = tuned(Params)
     shows = np.bincount(looks.frame, minlength=frames) >= params.least_looks
     gains = np.zeros((frames, 3))
@@ -122,7 +128,7 @@ def solve_gains(looks: Looks, frames: int) -> np.ndarray:
 
 
 def spread(looks: Looks, gains: np.ndarray) -> float:
-    """Median over points seen five times of one robust sigma of log colour across the frames that show it."""
+    """Median over points seen at least five times of the robust standard deviation (MAD) of their log colour over frames."""
     value = looks.log_rgb + gains[looks.frame]
     counts = np.bincount(looks.point)
     enough = counts >= 5
@@ -136,7 +142,7 @@ def spread(looks: Looks, gains: np.ndarray) -> float:
 
 
 def _medians(value: np.ndarray, group: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """The medians (groups, channels) of each group's rows; all at once, since calls for a few rows each take seconds."""
+    """Median (groups, channels) of each group's rows, vectorised: separate calls for a few rows each take seconds."""
     ends = np.cumsum(counts)
     low, high = ends - counts + (counts - 1) // 2, ends - counts + counts // 2
     ordered = np.stack([channel[np.lexsort((channel, group))] for channel in value.T], axis=1)
@@ -144,7 +150,7 @@ def _medians(value: np.ndarray, group: np.ndarray, counts: np.ndarray) -> np.nda
 
 
 def _solved(looks: Looks, value: np.ndarray, weight: np.ndarray, frames: int, held: float) -> np.ndarray:
-    """Gains of one channel: the normal equations with the points' own values eliminated."""
+    """Gains of one channel: normal equations with the points' values eliminated (Schur complement)."""
     points = int(looks.point.max()) + 1
     table = np.zeros((points, frames))
     np.add.at(table, (looks.point, looks.frame), weight)
@@ -156,7 +162,7 @@ def _solved(looks: Looks, value: np.ndarray, weight: np.ndarray, frames: int, he
 
 
 def _surface(looks: Looks, gains: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Each point's log colour (points, 3): the weighted mean of its looks."""
+    """Log colour of each point (points, 3): the weighted mean of its observations."""
     points = int(looks.point.max()) + 1
     total = np.maximum(np.bincount(looks.point, weight, points), 1e-12)
     value = looks.log_rgb + gains[looks.frame]

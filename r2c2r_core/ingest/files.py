@@ -1,4 +1,4 @@
-"""The files of a recording, whether it came as a folder or as a zip; nothing is ever unpacked onto the disk."""
+"""The files of a recording, given as a folder or a zip; nothing is unpacked to disk."""
 
 import hashlib
 import os
@@ -39,10 +39,10 @@ class Files(Protocol):
         """The content as a stream that can seek; raises CaptureError when it cannot be read."""
 
     def place(self, name: str) -> tuple[str, ...]:
-        """Where the content lies, for another process: an absolute path, and the member's name where that is a zip."""
+        """The file's location for another process: an absolute path, followed by the member's name if that is a zip."""
 
     def sha256(self, names: Iterable[str]) -> str:
-        """Identity of the recording: of the zip itself, or of the named files with their sizes and content."""
+        """Digest that identifies the recording: of the zip itself, or of the named files with their sizes and content."""
 
 
 def open_files(source: Path) -> Files:
@@ -51,7 +51,7 @@ def open_files(source: Path) -> Files:
         return FolderFiles(source)
     if not source.exists():
         raise CaptureError(f"{source}: no such file or folder", hint="check the path of the recording")
-    if not source.is_file():  # a pipe would be waited for
+    if not source.is_file():  # reading a pipe would block
         raise CaptureError(f"{source}: {kind_of_file(source.stat().st_mode)}", hint="give a folder or a file")
     return ZipFiles(source)
 
@@ -111,7 +111,7 @@ class FolderFiles:
 
 
 class ZipFiles:
-    """The members of a zip, read in memory one at a time; names that Windows packed with backslashes are read with slashes."""
+    """The members of a zip, read into memory one at a time; backslashes in names (from Windows) are read as slashes."""
 
     def __init__(self, source: Path) -> None:
         self.source = source
@@ -199,7 +199,7 @@ class ZipFiles:
 
 
 class SubFiles:
-    """A folder of other files, seen as a root of its own (a zip of a folder has one on top)."""
+    """A subfolder of other files, presented as a root (a zip of a folder has one at its top)."""
 
     def __init__(self, files: Files, folder: str) -> None:
         self._files, self._prefix = files, f"{folder}/"
@@ -219,7 +219,7 @@ class SubFiles:
         return self._files.open(self._prefix + name)
 
     def place(self, name: str) -> tuple[str, ...]:
-        """Where the content lies."""
+        """The file's location."""
         return self._files.place(self._prefix + name)
 
     def sha256(self, names: Iterable[str]) -> str:

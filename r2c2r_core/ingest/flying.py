@@ -1,4 +1,4 @@
-"""Flying pixels that several frames agree on: nothing else stands where they hang, and others look right through them."""
+"""Multi-view rejection of flying pixels: other frames see through them, and none observes a surface there."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,31 +21,35 @@ _KEPT = 40  # depth images in memory
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which depth pixels hang in the air."""
+    """Tuned parameters of flying-pixel rejection."""
 
-    judges: int = param(6, "count", "frames that judge one", ge=1)
-    longest_away: int = param(60, "count", "frames from one to its judges")
-    least_apart_m: float = param(0.04, "m", "between cameras", source="nearer ones repeat the mistake")
-    most_apart_m: float = param(0.5, "m", "between cameras", source="farther ones see other edges")
-    most_turn_deg: float = param(35.0, "deg", "between cameras")
+    judges: int = param(6, "count", "Maximum number of other frames that test a frame", ge=1)
+    longest_away: int = param(60, "count", "Maximum distance in frames between a frame and those that test it")
+    least_apart_m: float = param(
+        0.04, "m", "Minimum distance between the cameras of two compared frames", source="nearer ones repeat the mistake"
+    )
+    most_apart_m: float = param(
+        0.5, "m", "Maximum distance between the cameras of two compared frames", source="farther ones see other edges"
+    )
+    most_turn_deg: float = param(35.0, "deg", "Maximum angle between the viewing directions of two compared frames")
     least_through: int = param(
         4,
         "count",
-        "judges that look through it",
+        "Minimum number of frames that must see through a pixel to reject it",
         source="two or three also fall for the wobbling outline of a handle as a phone sees it",
     )
-    edge_px: int = param(3, "px", "from a step, within which flying pixels lie", ge=1)
-    step: float = param(0.04, "ratio", "of a step to the depth")
-    least_step_m: float = param(0.02, "m", "of a step, besides")
-    noise_m: float = param(0.015, "m", "by which two frames' depth of one surface may differ: noise and poses, at 0 m")
-    noise_more: float = param(0.006, "m", "and more of it at 1 m: the noise of depth by parallax grows with its square")
-    through: float = param(2.0, "ratio", "of it, that a judge must see behind a pixel")
-    there: float = param(1.5, "ratio", "of it, within which a judge sees the pixel's surface itself")
-    nearest_m: float = param(0.05, "m", "from a judge, at least")
+    edge_px: int = param(3, "px", "Maximum distance of flying pixels from a depth step", ge=1)
+    step: float = param(0.04, "ratio", "Minimum depth step as a fraction of the depth, added to the constant part")
+    least_step_m: float = param(0.02, "m", "Constant part of the minimum depth step")
+    noise_m: float = param(0.015, "m", "Tolerance between two frames' depth of one surface (noise and pose error), at 0 m")
+    noise_more: float = param(0.006, "m", "Increase of that tolerance at 1 m; noise of depth by parallax grows with its square")
+    through: float = param(2.0, "ratio", "Minimum depth behind a pixel, in tolerances, for a frame to see through it")
+    there: float = param(1.5, "ratio", "Maximum depth difference, in tolerances, for a frame to confirm a pixel")
+    nearest_m: float = param(0.05, "m", "Minimum depth of a pixel in another frame for it to be tested there")
 
 
 class Depths(NamedTuple):
-    """A frame's depth, and the least and greatest known depth around each pixel."""
+    """A frame's depth, with the minimum and maximum known depth around each pixel."""
 
     metres: DepthMetres
     least: DepthMetres  # +inf where nothing is known
@@ -54,7 +58,7 @@ class Depths(NamedTuple):
 
 
 def drop_flying(frames: Sequence[Frame], images: FrameImages, store: Path, progress: Progress = SILENT) -> int:
-    """Clear such pixels in the stored depth; how many there were. All frames are judged as they were before."""
+    """Clear flying pixels in the stored depth and return their number. All frames are tested before any is changed."""
     depths = lru_cache(maxsize=_KEPT)(lambda position: read_depths(frames[position], images))
     dropped: list[np.ndarray] = []
     for position, frame in enumerate(frames):
@@ -70,7 +74,7 @@ def drop_flying(frames: Sequence[Frame], images: FrameImages, store: Path, progr
 
 
 def flying_in_others(frame: Frame, depths: Depths, judges: Sequence[tuple[Frame, Depths]]) -> Mask:
-    """Pixels beside a step that at least four judges see through and none sees there itself."""
+    """Pixels near a depth step that at least four other frames see through and none confirms."""
     params, flying = tuned(Params), np.zeros(depths.metres.shape, dtype=bool)
     rows, columns = np.nonzero(_beside_steps(depths))
     if not len(rows) or not judges:
@@ -93,7 +97,7 @@ def flying_in_others(frame: Frame, depths: Depths, judges: Sequence[tuple[Frame,
 
 
 def read_depths(frame: Frame, images: FrameImages) -> Depths:
-    """The frame's depth, ready to be asked."""
+    """The frame's depth with its 3 x 3 neighbourhood extrema."""
     metres = images.depth(frame.index).metres
     known = metres > 0
     window = np.ones((3, 3), np.uint8)
@@ -103,7 +107,7 @@ def read_depths(frame: Frame, images: FrameImages) -> Depths:
 
 
 def judges_of(frames: Sequence[Frame], position: int) -> list[int]:
-    """Positions of the frames that see what this one sees from a little aside; those near in time first."""
+    """Positions of frames with similar direction and a small baseline, nearest in time first."""
     params = tuned(Params)
     me = frames[position].world_from_camera
     found: list[int] = []

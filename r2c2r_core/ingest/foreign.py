@@ -1,4 +1,4 @@
-"""Files that people bring for a recording and that are none: what each is, and how a recording is had from it."""
+"""File types often mistaken for recordings, with advice on how to export a recording instead."""
 
 from collections.abc import Iterable
 from pathlib import PurePath
@@ -8,7 +8,7 @@ from r2c2r_core.errors import CaptureError
 
 
 class Foreign(NamedTuple):
-    """A kind of file that is no recording."""
+    """A file type that is not a recording."""
 
     what: str
     bring: str  # what to do instead
@@ -77,18 +77,18 @@ _KINDS: tuple[tuple[Foreign, tuple[str, ...]], ...] = (
 
 
 def foreign(name: PurePath) -> Foreign | None:
-    """What a file of that name is, if it is known to be no recording."""
+    """The known non-recording type of a file name, or None."""
     return next((kind for kind, endings in _KINDS if name.suffix.lower() in endings), None)
 
 
 def refuse_foreign(name: PurePath) -> None:
-    """Raise CaptureError for a file that its name tells to be no recording."""
+    """Raise CaptureError for a file whose name shows that it is not a recording."""
     if kind := foreign(name):
         raise kind.refusal(str(name), name.name)
 
 
 def foreign_among(names: Iterable[str]) -> tuple[str, Foreign] | None:
-    """The file among these that best tells what a folder holds instead of a recording; None where there may be depth."""
+    """The file that best shows what a folder contains instead of a recording; None where a name suggests depth."""
     names = sorted(names)
     if any("depth" in name.lower() for name in names):
         return None

@@ -1,4 +1,4 @@
-"""Which way is up, where the floor lies, how the room is turned, and its walls."""
+"""Levelling of a room: up direction, floor height, Manhattan yaw and walls."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,26 +20,28 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a room is levelled."""
+    """Tuned parameters of levelling."""
 
-    aligned_deg: float = param(4.0, "deg", "planes farther off are not meant to be level, upright or along the room")
+    aligned_deg: float = param(
+        4.0, "deg", "Maximum angle of a plane from level, upright or the room's axes to count as aligned"
+    )
     floor_below_camera_m: float = param(
         0.75,
         "m",
-        "height of the lowest camera over the floor",
-        source="nobody films from lower; keeps a table top from being the floor",
+        "Minimum height of the median camera above the floor",
+        source="people do not film from lower; keeps a table top from being taken for the floor",
     )
     lining_m: tuple[float, float] = param(
         (0.03, 0.18),
         "m",
-        "before a wall, where a plane is its lining: panels, casings of pipes, chimney breasts",
-        source="beyond the walls' own unevenness, and less than any cupboard is deep",
+        "Range of distances in front of a wall at which a parallel plane is its lining: panels, pipe casings, chimney breasts",
+        source="more than the walls' unevenness, and less than the depth of any cupboard",
     )
-    least_lining_m2: float = param(0.3, "m²", "of what is seen of a lining")
+    least_lining_m2: float = param(0.3, "m²", "Minimum visible area of a lining")
 
 
 class Levelled(NamedTuple):
-    """The room, and how the recording's own world leads to it."""
+    """The levelled room, and the transform from the recording's own world to it."""
 
     world_from_capture: Rigid3
     room: Room
@@ -55,9 +57,9 @@ def level_room(
     *,
     other_ups: Sequence[Vector3] = (),
 ) -> Levelled:
-    """Level a recording: `sample` and `cameras` (capture_from_camera) are in its own world, and so is `file_up`.
+    """Level a recording; `sample`, `cameras` (capture_from_camera) and `file_up` are in its own world.
 
-    `other_ups`: what the file's gravity may mean instead.
+    `other_ups`: alternative interpretations of the file's gravity.
     """
     said = overrides or Overrides(objects={})
     planes = find_planes(sample, rng)
@@ -95,12 +97,12 @@ def level_room(
 
 
 def find_floor(planes: Sequence[Plane], points: Points, centres: Points) -> float | None:
-    """Height of the floor: the lowest level plane under the cameras with next to nothing beneath it."""
+    """Height of the floor: the lowest level plane under the cameras with almost no points below it."""
     params = tuned(Params)
     camera_z = float(np.median(centres[:, 2]))
     level = [(float(np.median(p.points[:, 2])), p.area_m2) for p in planes if p.normal[2] > np.cos(np.radians(8.0))]
     for z, _ in sorted(level):
-        # A floor bent by far, biased depth falls apart into several planes: the largest of them speaks for all
+        # A floor bent by biased far depth splits into several planes: the largest of them represents all
         height = max((other for other in level if abs(other[0] - z) < 0.06), key=lambda other: other[1])[0]
         beneath = float((points[:, 2] < height - 0.08).mean())
         if camera_z - height > params.floor_below_camera_m and beneath < 0.03:
@@ -109,10 +111,10 @@ def find_floor(planes: Sequence[Plane], points: Points, centres: Points) -> floa
 
 
 def find_yaw(normals: Points, planes: Sequence[Plane]) -> float | None:
-    """Yaw in [0, pi/2) of one of the two dominant horizontal directions; None when nothing stands upright.
+    """Yaw in [0, pi/2) of one of the two dominant horizontal directions; None without upright surface.
 
-    The upright surface's normals vote in a histogram of 1 deg, which is robust; the large planes near the winner then say it
-    exactly, as a plane's direction is far surer than a patch's.
+    Normals of upright surface vote in a histogram of 1 deg bins, which is robust; the large planes near its peak then refine
+    the yaw, as a plane's direction is far more accurate than a patch's.
     """
     upright = normals[np.abs(normals[:, 2]) < 0.2]
     fitted = [p for p in planes if abs(p.normal[2]) < 0.15]
@@ -132,7 +134,9 @@ def find_yaw(normals: Points, planes: Sequence[Plane]) -> float | None:
     if near.any():
         order = np.argsort(off[near])
         half = np.cumsum(leverage[near][order]) >= leverage[near].sum() / 2
-        yaw += float(off[near][order][int(np.argmax(half))])  # a median: two fronts taken for one plane give a wrong direction
+        yaw += float(
+            off[near][order][int(np.argmax(half))]
+        )  # a median, as two fronts merged into one plane give a wrong direction
     return float(np.mod(yaw, np.pi / 2))
 
 
@@ -142,9 +146,9 @@ def _off_axis(directions: np.ndarray, yaw: float) -> np.ndarray:
 
 
 def find_walls(planes: Sequence[Plane], points: Points, centres: Points) -> tuple[Wall, ...]:
-    """Large upright planes with next to nothing behind them, and what lines them.
+    """Large upright planes with almost no points behind them, and their linings.
 
-    Fronts of furniture have a wall or a worktop behind.
+    Furniture fronts are excluded, as they have a wall or a worktop behind them.
     """
     walls: list[Wall] = []
     upright = [_Upright.of(plane, centres) for plane in planes if abs(plane.normal[2]) <= np.sin(np.radians(8.0))]
@@ -188,7 +192,7 @@ class _Upright(NamedTuple):
 
 
 def _lines(sheet: _Upright, wall: Wall) -> bool:
-    """Whether a plane stands before a wall by less than any furniture does."""
+    """Whether a plane is parallel to a wall and closer in front of it than any furniture."""
     params = tuned(Params)
     before = sheet.offset_m - wall.offset_m
     parallel = float(sheet.normal @ wall.normal) > np.cos(np.radians(params.aligned_deg))
@@ -196,7 +200,7 @@ def _lines(sheet: _Upright, wall: Wall) -> bool:
 
 
 def _given_walls(walls: Sequence[Vector3]) -> tuple[Wall, ...]:
-    """Walls a person gave as (x, y, offset): an upright plane's normal in plan, and its distance from the origin."""
+    """Walls given manually as (x, y, offset): an upright plane's normal in plan, and its distance from the origin."""
     lengths = [float(np.linalg.norm(wall[:2])) for wall in walls]
     if not np.isfinite(np.array(walls)).all() or any(length < 1e-6 for length in lengths):
         raise OverrideError("overrides: a wall has no direction", hint="give [x, y, offset], such as [0, -1, -2.4]")
@@ -207,21 +211,21 @@ def _given_walls(walls: Sequence[Vector3]) -> tuple[Wall, ...]:
 
 
 def _up_spread_deg(planes: Sequence[Plane]) -> float | None:
-    """Area-weighted rms angle by which nearly level and nearly upright planes miss it."""
+    """Area-weighted RMS angle of nearly level and nearly upright planes from level or upright."""
     off_level = np.degrees([np.arccos(min(abs(float(p.normal[2])), 1.0)) for p in planes])
     off = np.minimum(off_level, np.abs(90.0 - off_level))
     return _rms(off, np.array([p.area_m2 for p in planes]), off < tuned(Params).aligned_deg)
 
 
 def _yaw_spread_deg(planes: Sequence[Plane], yaw: float) -> float | None:
-    """Area-weighted rms angle by which upright planes that nearly face along the yaw miss it."""
+    """Area-weighted RMS angle from the yaw of upright planes nearly aligned with it."""
     upright = [p for p in planes if abs(p.normal[2]) < 0.15]
     off = np.degrees(_off_axis(np.array([np.arctan2(p.normal[1], p.normal[0]) for p in upright]), yaw))
     return _rms(off, np.array([p.area_m2 for p in upright]), np.abs(off) < tuned(Params).aligned_deg)
 
 
 def _floor_spread_m(planes: Sequence[Plane]) -> float | None:
-    """Area-weighted rms height of level planes within 6 cm of the floor."""
+    """Area-weighted RMS height of level planes within 6 cm of the floor."""
     heights = [p.points[:, 2] for p in planes if p.normal[2] > np.cos(np.radians(8.0))]
     near = [z for z in heights if abs(float(np.median(z))) < 0.06]
     return float(np.sqrt(np.mean(np.concatenate(near) ** 2))) if near else None

@@ -1,4 +1,4 @@
-"""Points of a colour image that can be found again, with their depth, and the motion between two frames they tell."""
+"""SIFT keypoints with depth, and the rigid motion between two frames estimated from their matches."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,25 +18,31 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a landmark is."""
+    """Tuned parameters of landmarks."""
 
     width_px: int = param(
-        480, "px", "of the searched image", source="larger ones take longer and find no more that is found again", ge=64
+        480,
+        "px",
+        "Width to which images are scaled for detection",
+        source="larger ones take longer without more repeatable points",
+        ge=64,
     )
-    most: int = param(600, "count", "landmarks of an image", ge=8)
-    ratio: float = param(0.8, "ratio", "of the nearest to the second nearest descriptor", source="Lowe 2004")
-    least: int = param(12, "count", "agreeing landmarks", source="by chance a handful does", ge=4)
+    most: int = param(600, "count", "Maximum number of landmarks of an image", ge=8)
+    ratio: float = param(
+        0.8, "ratio", "Maximum ratio of the nearest to the second-nearest descriptor distance of a match", source="Lowe 2004"
+    )
+    least: int = param(12, "count", "Minimum number of inlier matches of a motion", source="by chance a handful agrees", ge=4)
 
 
 class Landmarks(NamedTuple):
-    """SIFT key points that have depth: where they are in the camera's frame, and what they look like (RootSIFT)."""
+    """SIFT keypoints with depth: positions in the camera frame, and RootSIFT descriptors."""
 
     points: Points
     descriptors: np.ndarray  # (n, 128), unit length
 
 
 class Motion(NamedTuple):
-    """How one camera stands to another, and how many landmarks say so."""
+    """Relative pose of two cameras, and its number of inlier landmarks."""
 
     first_from_second: Rigid3
     agreeing: int
@@ -60,7 +66,7 @@ def find_landmarks(frame: Frame, images: FrameImages, far_m: float) -> Landmarks
 
 
 def motion_between(first: Landmarks, second: Landmarks, rng: np.random.Generator) -> Motion | None:
-    """The rigid motion most of their common landmarks agree on; None when fewer than a dozen do."""
+    """The rigid motion with most inliers among their landmark matches; None with fewer than a dozen."""
     params = tuned(Params)
     there, here = _common(first, second)
     if len(there) < params.least:
@@ -84,7 +90,7 @@ def motion_between(first: Landmarks, second: Landmarks, rng: np.random.Generator
 
 
 def _common(first: Landmarks, second: Landmarks) -> tuple[np.ndarray, np.ndarray]:
-    """Indices into both of landmarks that are each other's best match, clearly better than the next."""
+    """Indices of mutual nearest-neighbour matches that pass the ratio test."""
     params = tuned(Params)
     if min(len(first.points), len(second.points)) < params.least:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)

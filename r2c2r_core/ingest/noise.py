@@ -1,4 +1,4 @@
-"""How much this recording's depth errs: each frame against the surface that all of them make."""
+"""Depth noise model of a recording, estimated from frame residuals against the fused surface."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,25 +18,25 @@ _MAD_TO_SIGMA = 1.4826  # of a normal distribution
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How a recording's depth noise is estimated."""
+    """Tuned parameters of depth noise estimation."""
 
     frames: int = param(
         24,
         "count",
-        "spread over the recording",
+        "Number of frames used, spread over the recording",
         source="the figures of 24 and of all frames of the sample differ by less than 5 %",
         ge=1,
     )
-    gross_m: float = param(0.10, "m", "further off is something else: what moved, or an edge seen past")
-    least_pixels: int = param(2000, "count", "fewer say nothing about how error grows with distance")
-    bins: int = param(8, "count", "of distance, each with as many pixels", ge=2)
+    gross_m: float = param(0.10, "m", "Residual beyond which a pixel is rejected: something moved, or an edge was missed")
+    least_pixels: int = param(2000, "count", "Minimum number of pixels for an estimate of how noise grows with distance")
+    bins: int = param(8, "count", "Number of distance bins with equal pixel counts", ge=2)
 
 
 def estimate_depth_noise(frames: Sequence[Frame], images: FrameImages, vertices: Points, faces: Faces) -> DepthNoise:
-    """Standard deviation a + b * z of depth about the fused surface; the usual phone's where too little is seen to say.
+    """Standard deviation a + b * z of depth about the fused surface; a usual phone's where there are too few pixels.
 
-    `vertices` (n, 3) in the frame that `world_from_camera` of the frames leads to. What is left of pose errors counts as
-    noise, since whoever compares a frame with geometry from other frames meets both.
+    `vertices` (n, 3) are in the frames' world (`world_from_camera`). Remaining pose error counts as noise, since any
+    comparison of a frame with geometry from other frames contains both.
     """
     params = tuned(Params)
     chosen = frames[:: max(1, len(frames) // params.frames)]
@@ -52,7 +52,7 @@ def estimate_depth_noise(frames: Sequence[Frame], images: FrameImages, vertices:
 
 
 def _residuals(frame: Frame, images: FrameImages, vertices: Points, faces: Faces) -> tuple[np.ndarray, np.ndarray]:
-    """(surface depth, measured minus surface depth) of the pixels where both are known and the surface is no edge."""
+    """(surface depth, measured minus surface depth) of the pixels where both are known, away from surface edges."""
     depth = images.depth(frame.index)
     camera = frame.depth_camera
     nothing = np.zeros((len(vertices), 3), np.float32)

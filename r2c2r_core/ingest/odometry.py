@@ -1,4 +1,4 @@
-"""Poses for a recording that has none: landmarks and depth from frame to frame and keyframe, loops closed on a pose graph."""
+"""RGB-D odometry for recordings without poses: landmark and depth tracking against keyframes, loop closure by pose graph."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,28 +20,35 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Poses of a recording that has none."""
+    """Tuned parameters of RGB-D odometry."""
 
-    agreeing: float = param(0.7, "share", "of the common surface that must coincide", source="right motions reach 0.75 to 0.95")
-    key_overlap: float = param(0.6, "share", "below which a frame becomes the next keyframe")
-    loop_landmarks: int = param(20, "count", "that close a loop")
-    most_loop_keys: int = param(60, "count", "every two of them are compared", source="at about 10 ms", ge=2)
+    agreeing: float = param(
+        0.7,
+        "share",
+        "Fraction of the common surface that must coincide above which a motion is accepted",
+        source="right ones: 0.75 to 0.95",
+    )
+    key_overlap: float = param(0.6, "share", "Overlap with the last keyframe below which a frame becomes the next keyframe")
+    loop_landmarks: int = param(20, "count", "Minimum number of inlier landmarks for a loop closure")
+    most_loop_keys: int = param(
+        60, "count", "Maximum number of keyframes compared pairwise for loops", source="about 10 ms per pair", ge=2
+    )
     pair_reaches_m: tuple[float, float, float] = param(
-        (0.08, 0.05, 0.03), "m", "within which points of two frames are matched, round by round"
+        (0.08, 0.05, 0.03), "m", "Maximum matching distance between points of two frames in each round"
     )
     return_m: float = param(
-        0.015, "m", "how near there and back must end where it began", source="wrong motions end centimetres off"
+        0.015, "m", "Maximum forward-backward translation error of a dense motion", source="wrong motions end centimetres off"
     )
-    return_deg: float = param(0.7, "deg", "how near there and back must end where it began")
-    loose_m: float = param(0.01, "m", "how far the depth may move a motion told by landmarks, one sigma", gt=0)
-    loose_deg: float = param(0.5, "deg", "how far the depth may turn a motion told by landmarks, one sigma", gt=0)
-    least_frames: int = param(5, "count", "that are placed")
-    least_share: float = param(0.5, "share", "of the frames that are placed")
+    return_deg: float = param(0.7, "deg", "Maximum forward-backward rotation error of a dense motion")
+    loose_m: float = param(0.01, "m", "Standard deviation of the prior on the translation when depth refines a motion", gt=0)
+    loose_deg: float = param(0.5, "deg", "Standard deviation of the prior on the rotation when depth refines a motion", gt=0)
+    least_frames: int = param(5, "count", "Minimum number of tracked frames")
+    least_share: float = param(0.5, "share", "Minimum fraction of frames that are tracked in one piece")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sight:
-    """What one frame offers for tracking."""
+    """One frame's depth view and landmarks for tracking."""
 
     frame: Frame
     view: SmallView
@@ -60,7 +67,7 @@ class _Track:
 def estimate_poses(
     frames: Sequence[Frame], images: FrameImages, *, most_keyframes: int, far_m: float, progress: Progress = SILENT
 ) -> SettledPoses:
-    """Poses by RGB-D odometry. A recording with breaks is cut to its longest stretch; raises CaptureError below half of it."""
+    """Poses by RGB-D odometry, of the longest unbroken stretch; raises CaptureError if that is less than half the frames."""
     params = tuned(Params)
     rng = np.random.default_rng(0)
     track = max(_tracks(frames, images, far_m, rng, progress.part(0.0, 0.7)), key=lambda t: len(t.poses))
@@ -92,7 +99,7 @@ def estimate_poses(
 def _tracks(
     frames: Sequence[Frame], images: FrameImages, far_m: float, rng: np.random.Generator, progress: Progress
 ) -> list[_Track]:
-    """Stretches of frames that could be tracked without a gap."""
+    """Tracks of consecutive frames without a gap."""
     params = tuned(Params)
     tracks: list[_Track] = []
     for position, frame in enumerate(frames):
@@ -113,7 +120,7 @@ def _tracks(
 
 
 def _next_pose(track: _Track, sight: _Sight, images: FrameImages, rng: np.random.Generator) -> Rigid3 | None:
-    """Pose of the next frame, to the keyframe where the depth confirms it, else to the frame before; None when it is lost."""
+    """Pose of the next frame, relative to the keyframe if depth confirms it, else to the previous frame; None if lost."""
     before = len(track.poses) - 1
     for position in dict.fromkeys((track.keys[-1], before)):
         known = track.sights[position]
@@ -130,7 +137,7 @@ def _next_pose(track: _Track, sight: _Sight, images: FrameImages, rng: np.random
 
 
 def _confirmed(first: _Sight, second: _Sight, first_from_second: Rigid3) -> Rigid3 | None:
-    """The motion, settled on the depth of both frames; None when their surfaces then do not coincide."""
+    """The motion refined on the depth of both frames; None if their surfaces do not coincide afterwards."""
     params = tuned(Params)
     a, b = bring_together(
         [first.view, second.view],
@@ -145,9 +152,9 @@ def _confirmed(first: _Sight, second: _Sight, first_from_second: Rigid3) -> Rigi
 
 
 def _dense_motion(first: _Sight, second: _Sight, images: FrameImages, guess: Rigid3) -> Rigid3 | None:
-    """first_from_second by the colour and depth of every pixel, where landmarks are too few; None unless both ways agree.
+    """first_from_second by dense RGB-D odometry, for too few landmarks; None unless forward and backward results agree.
 
-    Plain surfaces fit wherever they are slid to, so coinciding depth alone proves nothing here.
+    Planar surfaces fit each other when shifted along themselves, so coinciding depth alone is no confirmation.
     """
     params = tuned(Params)
     there = _rgbd_odometry(first.frame, second.frame, images, guess)
@@ -162,7 +169,7 @@ def _dense_motion(first: _Sight, second: _Sight, images: FrameImages, guess: Rig
 
 
 def _rgbd_odometry(first: Frame, second: Frame, images: FrameImages, guess: Rigid3) -> Rigid3 | None:
-    """first_from_second by Open3D's colour and depth odometry (Park et al. 2017); None where it finds nothing in common."""
+    """first_from_second by Open3D's RGB-D odometry (Park et al. 2017); None where its linear system is singular."""
     import open3d as o3d
 
     odometry: Any = o3d.t.pipelines.odometry
@@ -198,7 +205,7 @@ def _rgbd(frame: Frame, images: FrameImages) -> Any:
 
 
 def _close_loops(track: _Track, rng: np.random.Generator) -> list[Rigid3]:
-    """The track's poses after its keyframes were held together by every loop that landmarks and depth confirm."""
+    """The track's poses after pose-graph optimisation with every loop closure that landmarks and depth confirm."""
     params = tuned(Params)
     import open3d as o3d
 

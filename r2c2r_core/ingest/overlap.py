@@ -1,4 +1,4 @@
-"""Frames that see the same place: small depth views with normals, which of them overlap, and where they disagree."""
+"""Overlap and disagreement of frames: downscaled depth views with normals, matched by projection."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,19 +17,27 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How frames are compared by their depth."""
+    """Tuned parameters of depth view comparison."""
 
     width_px: int = param(
-        128, "px", "of a small view", source="a normal needs several LiDAR pixels, and a thousand points fix a pose", ge=16
+        128,
+        "px",
+        "Approximate width of a downscaled view",
+        source="a normal needs several LiDAR pixels, and a thousand points fix a pose",
+        ge=16,
     )
-    matched: int = param(1200, "count", "points of a view that look for their like in another", ge=10)
-    probes: int = param(80, "count", "points that tell how much two views overlap", ge=4)
-    normal_cos: float = param(float(np.cos(np.radians(35.0))), "cosine", "between normals of one surface: 35 degrees")
+    matched: int = param(1200, "count", "Maximum number of points of a view that are matched to another", ge=10)
+    probes: int = param(80, "count", "Minimum number of points that measure the overlap of two views", ge=4)
+    normal_cos: float = param(
+        float(np.cos(np.radians(35.0))),
+        "cosine",
+        "Cosine of the angle between two matched normals above which they agree (35 degrees)",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SmallView:
-    """A depth image made small and smooth, with normals; all in its camera's frame."""
+    """A downscaled, smoothed depth image with normals, in its camera's frame."""
 
     camera: Intrinsics
     depth_m: DepthMetres  # 0 where unknown
@@ -39,7 +47,7 @@ class SmallView:
 
 
 class Match(NamedTuple):
-    """Points of one view and the surface another view shows there; everything in the world."""
+    """Point-to-plane correspondences of two views, in the world frame."""
 
     moved: Points  # of the first view
     still: Points  # of the second
@@ -53,14 +61,14 @@ class Match(NamedTuple):
 
 
 def small_view(frame: Frame, images: FrameImages, far_m: float) -> SmallView:
-    """The frame's depth, made small."""
+    """The frame's depth, downscaled, with smoothed depth and normals."""
     params = tuned(Params)
     depth = images.depth(frame.index).metres
     step = max(1, round(depth.shape[1] / params.width_px))
     nearby = np.where(depth < far_m, depth, np.float32(0))
     small = _smoothed(nearby[step // 2 :: step, step // 2 :: step])
     full = frame.depth_camera
-    # subsampling keeps the pixel centres of the large image: column k stands for k * step + step // 2
+    # subsampling keeps the pixel centres of the large image: column k is column k * step + step // 2 there
     shift = 0.5 - (step // 2 + 0.5) / step
     camera = Intrinsics(
         fx=full.fx / step,
@@ -84,7 +92,7 @@ def small_view(frame: Frame, images: FrameImages, far_m: float) -> SmallView:
 
 
 def overlaps(views: Sequence[SmallView], poses: Sequence[Rigid3]) -> np.ndarray:
-    """Share (n, n) of view i's points that view j sees too, within 20 cm, under the given poses."""
+    """Fraction (n, n) of view i's points that view j also sees, within 20 cm, under the given poses."""
     params = tuned(Params)
     shares = np.zeros((len(views), len(views)))
     inverses = [p.inverse for p in poses]
@@ -103,7 +111,7 @@ def overlaps(views: Sequence[SmallView], poses: Sequence[Rigid3]) -> np.ndarray:
 
 
 def match(first: SmallView, second: SmallView, world_from_first: Rigid3, world_from_second: Rigid3, reach_m: float) -> Match:
-    """What `second` shows where it should see the points of `first`, within `reach_m`; by projection."""
+    """Projective point-to-plane correspondences of `first` on `second`, within `reach_m`."""
     moved = world_from_first.apply(first.points)
     there = world_from_second.inverse.apply(moved)
     uv = project(there, second.camera)
@@ -125,14 +133,14 @@ def match(first: SmallView, second: SmallView, world_from_first: Rigid3, world_f
 
 
 class Agreement(NamedTuple):
-    """How two views fit under a relative pose."""
+    """Agreement of two views under a relative pose."""
 
     seen: float  # share of the first one's points that fall on known depth of the second
     coincide: float  # share of those that lie on its surface, within 3 cm
 
 
 def agreement(first: SmallView, second: SmallView, first_from_second: Rigid3) -> Agreement:
-    """How well `second` fits `first`."""
+    """Fraction of the points of `first` that `second` sees, and of those that coincide with its surface."""
     if not len(first.points):
         return Agreement(0.0, 0.0)
     there = first_from_second.inverse.apply(first.points)
@@ -143,7 +151,7 @@ def agreement(first: SmallView, second: SmallView, first_from_second: Rigid3) ->
 
 
 def _smoothed(depth_m: DepthMetres) -> DepthMetres:
-    """Depth averaged over its own surface; unknown stays unknown."""
+    """Depth smoothed by a bilateral filter; unknown pixels stay unknown."""
     wide = np.where(depth_m > 0, depth_m, np.float32(-10))  # farther from every depth than the filter reaches
     smooth = cv2.bilateralFilter(wide.astype(np.float32), 7, 0.05, 1.7)
     return np.where(depth_m > 0, smooth, np.float32(0))

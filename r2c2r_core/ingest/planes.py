@@ -1,4 +1,4 @@
-"""The large planes of a surface: floor, worktops, fronts, walls."""
+"""RANSAC detection of the large planes of a surface: floor, worktops, fronts, walls."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,25 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What a large plane is."""
+    """Tuned parameters of plane detection."""
 
     tolerance_m: float = param(
-        0.02, "m", "off it, within which surface is its", source="fused Kinect and LiDAR surfaces wobble by about 1 cm", gt=0
+        0.02,
+        "m",
+        "Maximum distance of an inlier from its plane",
+        source="fused Kinect and LiDAR surfaces wobble by about 1 cm",
+        gt=0,
     )
-    normal_cos: float = param(float(np.cos(np.radians(25.0))), "cosine", "between normals of one plane: 25 degrees")
+    normal_cos: float = param(
+        float(np.cos(np.radians(25.0))),
+        "cosine",
+        "Minimum cosine of the angle between an inlier's normal and its plane's (25 degrees)",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SurfaceSample:
-    """Points spread evenly over a surface, each standing for the same area."""
+    """Points spread evenly over a surface, each representing the same area."""
 
     points: Points
     normals: Points  # smoothed, pointing into free space
@@ -30,7 +38,7 @@ class SurfaceSample:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plane:
-    """normal @ x = offset; the normal points into free space."""
+    """A plane normal @ x = offset; the normal points into free space."""
 
     normal: Vector3
     offset_m: float
@@ -55,7 +63,7 @@ def sample_surface(vertices: Points, faces: Faces, count: int, rng: np.random.Ge
 def find_planes(
     sample: SurfaceSample, rng: np.random.Generator, *, smallest_m2: float = 0.15, most: int = 30, tries: int = 150
 ) -> tuple[Plane, ...]:
-    """The largest planes, biggest first: RANSAC from single oriented points, each refined by least squares."""
+    """The largest planes, by area in descending order: RANSAC from single oriented points, refined by least squares."""
     params = tuned(Params)
     left = np.arange(len(sample.points))
     planes: list[Plane] = []
@@ -77,7 +85,7 @@ def find_planes(
 
 
 def _refine(points: Points, normals: Points, normal: Vector3, offset: float) -> tuple[Vector3, float]:
-    """Least squares over the inliers, four rounds with a shrinking band."""
+    """Least-squares plane over the inliers, in four rounds with a shrinking tolerance."""
     params = tuned(Params)
     for band in (3.0, 2.0, 1.0, 1.0):
         on_it = _lies_on(points, normals, normal, offset, band * params.tolerance_m)

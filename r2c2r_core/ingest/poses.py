@@ -1,8 +1,8 @@
-"""Poses that agree with the depth: drift shows where one place is seen at different times, and is taken out where it is clear.
+"""Pose refinement against drift: pose-graph optimisation with point-to-plane factors and an odometry prior.
 
-All keyframes are moved at once by point-to-plane steps between every two that overlap, held together by the given chain: a
-correction may change only slowly from one keyframe to the next. Against fitting frame by frame to a fused model this needs no
-model that the drift has already doubled, and closes loops by itself.
+All overlapping keyframe pairs are aligned jointly; the prior lets a correction change only slowly from one keyframe to the
+next. Unlike frame-to-model fitting, this needs no fused model, in which drift would already have doubled surfaces, and it
+closes loops without a separate step.
 """
 
 from collections.abc import Sequence
@@ -25,48 +25,54 @@ Pair = tuple[int, int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When poses are refined."""
+    """Tuned parameters of pose refinement."""
 
-    least_overlap: float = param(0.3, "share", "of two views that are matched")
-    least_matches: int = param(50, "count", "points of a pair that tells something")
-    least_loops: int = param(8, "count", "pairs that see one place at different times")
-    held_out: int = param(4, "count", "every so manieth loop pair judges and takes no part", ge=2)
+    least_overlap: float = param(0.3, "share", "Minimum mutual overlap of two views to be matched")
+    least_matches: int = param(50, "count", "Minimum number of matched points of a pair to be used")
+    least_loops: int = param(
+        8, "count", "Minimum number of loop pairs (one place seen at different times) for poses to be refined"
+    )
+    held_out: int = param(4, "count", "Stride of loop pairs that are excluded from the fit and validate it", ge=2)
     least_gain: float = param(
         0.15,
         "share",
-        "of the disagreement that must go",
+        "Minimum relative reduction of the disagreement for refined poses to be accepted",
         source="exact poses gain 5 to 8 % (noise is fitted), a phone's 20 to 25 %, 3 cm of drift 50 % and more",
     )
     most_gap_m: float = param(
         0.012,
         "m",
-        "of disagreement that may stay",
+        "Maximum disagreement after refinement for refined poses to be accepted",
         source="depth noise leaves 3 to 5 mm, wrong axes or inverted poses 16 to 100",
     )
     most_change: float = param(
         0.2,
         "share",
-        "of the motion between keyframes that poses may change",
+        "Maximum change of the relative motions, as a fraction of the motion, for refined poses to be accepted",
         source="drift of 8 cm takes 0.02 to 0.12, wrong axes before one door 0.27",
     )
     independent: float = param(
         15.0,
         "count",
-        "points of a pair that tell something new",
+        "Effective number of independent points of a pair",
         source="a sensor's error is the same over whole surfaces",
         gt=0,
     )
-    step_m: float = param(0.002, "m", "how much a correction may change from one keyframe to the next, one sigma", gt=0)
-    step_deg: float = param(0.1, "deg", "how much a correction may turn from one keyframe to the next, one sigma", gt=0)
-    stay_m: float = param(0.3, "m", "keeps the whole from floating away, one sigma", gt=0)
-    stay_deg: float = param(10.0, "deg", "keeps the whole from floating away, one sigma", gt=0)
+    step_m: float = param(
+        0.002, "m", "Standard deviation of the change of a correction's translation between successive keyframes", gt=0
+    )
+    step_deg: float = param(
+        0.1, "deg", "Standard deviation of the change of a correction's rotation between successive keyframes", gt=0
+    )
+    stay_m: float = param(0.3, "m", "Standard deviation of the absolute translation prior, which fixes the gauge", gt=0)
+    stay_deg: float = param(10.0, "deg", "Standard deviation of the absolute rotation prior, which fixes the gauge", gt=0)
     reaches_m: tuple[float, float, float, float, float, float] = param(
-        (0.15, 0.12, 0.08, 0.06, 0.04, 0.04), "m", "within which points of two frames are matched, round by round"
+        (0.15, 0.12, 0.08, 0.06, 0.04, 0.04), "m", "Maximum matching distance between points of two frames in each round"
     )
 
 
 class SettledPoses(NamedTuple):
-    """The frames with the poses to use, and why."""
+    """The frames with their final poses, and the evidence for them."""
 
     frames: tuple[Frame, ...]
     evidence: PoseEvidence
@@ -76,7 +82,7 @@ class SettledPoses(NamedTuple):
 def refine_poses(
     frames: Sequence[Frame], images: FrameImages, *, most_keyframes: int, far_m: float, progress: Progress = SILENT
 ) -> SettledPoses:
-    """Poses moved to agree with the depth where that clearly helps pairs which had no part in it; else the given ones."""
+    """Poses refined on depth if that clearly improves held-out loop pairs; otherwise the given ones."""
     params = tuned(Params)
     keyframes = spread_frames(frames, most_keyframes)
     views = [small_view(f, images, far_m) for f in progress.each(keyframes, "checking the poses, frame")]
@@ -101,9 +107,9 @@ def refine_poses(
 
 
 def _held_level(given: Sequence[Rigid3], moved: Sequence[Rigid3]) -> list[Rigid3]:
-    """The moved poses, turned and shifted as a whole so that they keep the given ones' mean: the depth tells nothing about it.
+    """The refined poses, moved as a whole to the given poses' mean rotation and position, which depth leaves undetermined.
 
-    A phone's gravity is exact, and a room that turned by half a degree would stand askew in it.
+    A phone's gravity is accurate, and a room turned by half a degree would be tilted in it.
     """
     turn = nearest_rotation(sum((a.rotation @ b.rotation.T for a, b in zip(given, moved, strict=True)), np.zeros((3, 3))))
     turned = [Rigid3(turn, np.zeros(3)) @ pose for pose in moved]
@@ -112,7 +118,7 @@ def _held_level(given: Sequence[Rigid3], moved: Sequence[Rigid3]) -> list[Rigid3
 
 
 def _is_drift(given: Sequence[Rigid3], moved: Sequence[Rigid3], before_m: float, after_m: float) -> bool:
-    """Whether the correction clearly helps, ends in agreement, and is small against the motion: wrong conventions are not."""
+    """Whether a correction is drift: clear gain, small final error, small against the motion (a wrong convention is not)."""
     params = tuned(Params)
     motion = changed = 0.0
     for (a, b), (c, d) in zip(pairwise(given), pairwise(moved), strict=True):
@@ -125,7 +131,7 @@ def _is_drift(given: Sequence[Rigid3], moved: Sequence[Rigid3], before_m: float,
 
 
 def overlapping_pairs(shares: np.ndarray, *, near: int = 3, each: int = 3) -> tuple[list[Pair], list[Pair]]:
-    """Pairs of keyframes that follow each other, and pairs that meet again later; from the share (n, n) they overlap."""
+    """Pairs of successive keyframes, and loop pairs that meet again later, from the overlap matrix (n, n)."""
     params = tuned(Params)
     count = len(shares)
     apart = max(near + 1, count // 10)
@@ -149,9 +155,9 @@ def bring_together(
     step_m: float | None = None,
     step_deg: float | None = None,
 ) -> list[Rigid3]:
-    """Poses (world_from_camera) moved so that the views of `pairs` agree, by Gauss-Newton with a shrinking reach.
+    """Poses (world_from_camera) that align the views of `pairs`: Gauss-Newton with a shrinking matching distance.
 
-    What is not said of the reaches, and of how much a correction may change from pose to pose, is as for keyframes.
+    Defaults of the matching distances and of the prior on successive corrections are those for keyframes.
     """
     params = tuned(Params)
     count = len(views)
@@ -184,7 +190,7 @@ def bring_together(
 
 
 def median_gap(views: Sequence[SmallView], poses: Sequence[Rigid3], pairs: Sequence[Pair]) -> float | None:
-    """Median over pairs of the median distance (m) between what both views show; None when too few points meet."""
+    """Median over pairs of the median point-to-plane distance (m) of both views; None with too few matches."""
     params = tuned(Params)
     found = [match(views[i], views[j], poses[i], poses[j], params.reaches_m[0]) for i, j in pairs]
     gaps = [float(np.median(np.abs(m.gaps_m))) for m in found if len(m.weights) >= params.least_matches]
@@ -192,7 +198,7 @@ def median_gap(views: Sequence[SmallView], poses: Sequence[Rigid3], pairs: Seque
 
 
 def carried(frames: Sequence[Frame], keyframes: Sequence[Frame], moved: Sequence[Rigid3]) -> tuple[Frame, ...]:
-    """All frames with the corrections of the keyframes, interpolated by frame number in between."""
+    """All frames with the keyframes' corrections, interpolated by frame number in between."""
     from scipy.spatial.transform import Rotation
 
     numbers = np.array([f.index for f in keyframes], dtype=np.float64)
@@ -214,7 +220,7 @@ def _corrected(pose: Rigid3, correction: np.ndarray) -> Rigid3:
 
 
 def _size(motion: Rigid3) -> float:
-    """Metres moved, and radians turned times one metre."""
+    """Size of a motion: metres translated plus radians rotated times one metre."""
     cosine = (float(np.trace(motion.rotation)) - 1.0) / 2.0
     return float(np.linalg.norm(motion.translation)) + float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 

@@ -1,8 +1,8 @@
-"""Depth laid onto the colour images, by the fit that the doctor finds: where a person asked for it.
+"""Registration of depth to the colour images with the calibration fitted by the capture doctor; only on request.
 
-Frame and Capture hold one pose and treat depth as seen from the colour camera. A recording whose depth comes from a camera of
-its own is made so here: the colour camera gets the fitted focal length and principal point, poses move to its centre, and each
-depth image is drawn again as that camera would have measured it.
+Frame and Capture have one pose and treat depth as seen from the colour camera. For a recording with a separate depth camera,
+the colour camera gets the fitted focal length and principal point, poses move to its centre, and each depth image is
+reprojected into it.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ _MEASURED = 30  # frames, as the doctor takes
 
 
 class Registered(NamedTuple):
-    """The frames as the colour camera sees them, and what to tell."""
+    """The registered frames, and a notice about them."""
 
     frames: tuple[Frame, ...]
     notice: str
@@ -33,7 +33,7 @@ class Registered(NamedTuple):
 def register_depth(
     frames: Sequence[Frame], images: FrameImages, store: Path, rng: np.random.Generator, progress: Progress = SILENT
 ) -> Registered:
-    """Redraw the stored depth where the fit is clearly better than the calibration; else leave all as it is and say so."""
+    """Reproject the stored depth if the fit is clearly better than the calibration; otherwise change nothing, with a notice."""
     spread = frames[:: -(-len(frames) // _MEASURED)]
     found = measure_registration(spread, images, rng)
     if found is None:
@@ -62,7 +62,7 @@ def register_depth(
 
 
 def as_colour_sees(frame: Frame, found: Registration) -> Frame:
-    """The frame with the fitted colour camera at its own place, and a depth camera that is the same one at depth's size."""
+    """The frame posed at the fitted colour camera, with the same camera at depth resolution as its depth camera."""
     rgb, depth = frame.rgb_camera, frame.depth_camera
     by = max(rgb.width, rgb.height) / WIDTH  # the fit's pixels are those of an image 640 wide
     camera = replace(
@@ -83,9 +83,9 @@ def as_colour_sees(frame: Frame, found: Registration) -> Frame:
 
 
 def redrawn(depth_m: DepthMetres, source: Intrinsics, target: Intrinsics, target_at_m: np.ndarray) -> DepthMetres:
-    """The depth image as a camera at `target_at_m` in the source's frame would have measured it; where nothing falls, unknown.
+    """The depth image reprojected into a camera at `target_at_m` in the source's frame; unknown where nothing projects.
 
-    Each pixel is drawn as the square it covers, in as many pieces as leave no gaps; of several, the nearest stays.
+    Each pixel is splatted over the square it covers, in enough pieces to leave no gaps; the nearest depth is kept.
     """
     pieces = max(1, int(np.ceil(max(target.fx * source.width / (source.fx * target.width), 1.0) + 0.2)))
     offsets = (np.arange(pieces) + 0.5) / pieces

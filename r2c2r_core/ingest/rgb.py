@@ -1,4 +1,4 @@
-"""Colour images: checked, copied untouched where they are JPEG, and rated for sharpness."""
+"""Colour images: validation, unchanged storage of JPEG, and a sharpness score."""
 
 import io
 
@@ -43,7 +43,7 @@ def _encoded(rgb: Image) -> tuple[bytes, float]:
 
 
 def _sharpness(grey: np.ndarray) -> float:
-    """Variance of the Laplacian at 320 px width; only its order within a recording means something."""
+    """Variance of the Laplacian at 320 px width; only comparable within a recording."""
     height = round(grey.shape[0] * _RATED_WIDTH / grey.shape[1])
     small = cv2.resize(grey, (_RATED_WIDTH, height), interpolation=cv2.INTER_AREA)
     return float(cv2.Laplacian(small, cv2.CV_32F).var())

@@ -1,6 +1,6 @@
-"""Ingest (paper §3): one recording in, one levelled Capture out; every foreign convention ends here.
+"""Ingest (paper §3): reads one recording into one levelled Capture; all foreign conventions are converted here.
 
-Reading and levelling are apart: what a person says of the room never decodes the recording again.
+Reading and levelling are separate steps, so a manual correction of the room does not decode the recording again.
 """
 
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ __all__ = ["IngestConfig", "level_scan", "open_images", "read_capture", "read_re
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IngestConfig:
-    """How a recording is read."""  # a LiDAR's handle of 2 x 20 cm stays; the outliers of the paper are mostly true surface
+    """Settings of ingest."""  # a LiDAR's handle of 2 x 20 cm stays; the outliers of the paper are mostly true surface
 
     most_frames: int = setting(600, "frames kept of a longer recording, every n-th; numbers stay", ge=1, le=100_000)
     near_m: float = setting(0.08, "least depth believed, in m: a phone's LiDAR starts at about 0.1", ge=0, le=100)
@@ -77,13 +77,13 @@ class IngestConfig:
 def read_capture(
     source: Path, store: Path, config: IngestConfig, *, overrides: Overrides | None = None, progress: Progress = SILENT
 ) -> Capture:
-    """Read a recording and level it; its images make the folder `store`. Raises CaptureError, EnvironmentProblem, Cancelled."""
+    """Read a recording and level it; images go to the folder `store`. Raises CaptureError, EnvironmentProblem, Cancelled."""
     scan = read_recording(source, store, config, progress=progress.part(0.0, 0.95))
     return level_scan(scan, overrides or Overrides(objects={}), config, progress=progress.part(0.95, 1.0))
 
 
 def read_recording(source: Path, store: Path, config: IngestConfig, *, progress: Progress = SILENT) -> Scan:
-    """Decode a recording and fuse it, in its own world; its images make the folder `store`."""
+    """Decode a recording and fuse its surface, in its own world frame; its images are written to the folder `store`."""
     progress.at(0.0, "opening the recording")
     recording = open_recording(source)
     raw, thinned = _thinned(recording.frames, config.most_frames)
@@ -134,7 +134,7 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
 
 
 def level_scan(scan: Scan, overrides: Overrides, config: IngestConfig, *, progress: Progress = SILENT) -> Capture:
-    """The scan with +Z up, its floor, yaw and walls found or as a person said: one motion of its poses and surface."""
+    """The scan with +Z up: floor, yaw and walls are estimated or overridden; one rigid motion moves its poses and surface."""
     progress.at(0.0, "levelling")
     rng = np.random.default_rng(config.seed)
     sample = sample_surface(scan.surface.vertices_world, scan.surface.faces, 30_000, rng)
@@ -159,7 +159,7 @@ def level_scan(scan: Scan, overrides: Overrides, config: IngestConfig, *, progre
 def _store_frames(
     recording: Recording, raw: Sequence[RawFrame], store: Path, least_confidence: int, config: IngestConfig, progress: Progress
 ) -> tuple[tuple[Frame, ...], tuple[str, ...]]:
-    """Write every frame's images; the frames (still in the capture's world) and a notice about those left out."""
+    """Write every frame's images; return the frames (still in the capture's world) and a notice about skipped ones."""
     frames: list[Frame] = []
     problems: list[str] = []
     for position, frame in enumerate(raw):
@@ -193,7 +193,7 @@ def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confi
     )
     write_rgb(store, frame.index, jpeg)
     write_depth(store, frame.index, depth)
-    given = frame.capture_from_camera or Rigid3()  # settled once all frames are there
+    given = frame.capture_from_camera or Rigid3()  # finally set once all frames are read
     return Frame(
         index=frame.index,
         timestamp_s=frame.timestamp_s,
@@ -211,7 +211,7 @@ def _scaled(scale: float) -> tuple[str, ...]:
 def _settle_poses(
     frames: tuple[Frame, ...], raw: Sequence[RawFrame], images: StoredImages, config: IngestConfig, progress: Progress
 ) -> SettledPoses:
-    """The recording's poses, refined where they drift; estimated where it has none at all."""
+    """The recording's poses, refined where they drift, or estimated by RGB-D odometry where it has none."""
     posed = {f.index for f in raw if f.capture_from_camera is not None}
     if not posed:
         return estimate_poses(frames, images, most_keyframes=config.fused_frames, far_m=config.fused_far_m, progress=progress)
@@ -232,7 +232,7 @@ def _thinned(frames: tuple[RawFrame, ...], most: int) -> tuple[tuple[RawFrame, .
 
 
 def _least_confidence(recording: Recording, frames: Sequence[RawFrame], config: IngestConfig) -> tuple[int, tuple[str, ...]]:
-    """High confidence (2), or medium (1) with a notice where high alone leaves too little of the median frame."""
+    """Minimum confidence: high (2), or medium (1) with a notice where high alone leaves too little of the median frame."""
     shares = [s for s in (_sure_share(recording, f) for f in frames[:: max(1, len(frames) // 25)]) if s is not None]
     if not shares or float(np.median(shares)) >= config.least_valid_share:
         return 2, ()

@@ -1,4 +1,4 @@
-"""A recording's pixels on disk: rgb/<index:06d>.jpg and depth/<index:06d>.png below a folder that is whole or absent."""
+"""A recording's pixels on disk: rgb/<index:06d>.jpg and depth/<index:06d>.png in a folder that is written atomically."""
 
 import errno
 import shutil
@@ -21,7 +21,7 @@ _PARTIAL = ".partial"
 
 
 class StoredImages:
-    """Images read from disk on demand; the last few are kept. Safe to share between threads."""
+    """Images read from disk on demand, with the last few cached. Safe to share between threads."""
 
     def __init__(self, store: Path) -> None:
         self.store = store
@@ -42,7 +42,7 @@ class StoredImages:
 
 
 def open_images(store: Path, frames: tuple[Frame, ...]) -> StoredImages:
-    """The images of a capture that was read before; raises CaptureError when a file is missing."""
+    """The stored images of a capture; raises CaptureError when a file is missing."""
     for frame in frames:
         for path in (rgb_path(store, frame.index), depth_path(store, frame.index)):
             if not path.is_file():
@@ -53,18 +53,18 @@ def open_images(store: Path, frames: tuple[Frame, ...]) -> StoredImages:
 
 
 def rgb_path(store: Path, index: int) -> Path:
-    """Where a frame's colour image lies."""
+    """Path of a frame's colour image."""
     return store / "rgb" / f"{index:06d}.jpg"
 
 
 def depth_path(store: Path, index: int) -> Path:
-    """Where a frame's depth image lies."""
+    """Path of a frame's depth image."""
     return store / "depth" / f"{index:06d}.png"
 
 
 @contextmanager
 def new_store(store: Path) -> Iterator[Path]:
-    """A folder to write a recording's images into; it becomes `store`, by one rename, only when the block ends well."""
+    """A temporary folder for a recording's images, renamed to `store` only if the block succeeds."""
     partial = store.with_name(store.name + _PARTIAL)
     try:
         shutil.rmtree(partial, ignore_errors=True)
@@ -100,7 +100,7 @@ def write_depth(store: Path, index: int, depth_m: DepthMetres) -> None:
 
 
 class _Recent:
-    """The last few results of a function of one number."""
+    """An LRU cache of a function of one number."""
 
     def __init__(self, load: Callable[[int], np.ndarray], size: int) -> None:
         self._load, self._size = load, size

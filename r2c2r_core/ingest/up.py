@@ -1,4 +1,4 @@
-"""Which way is up: what the recording says of gravity, checked against level and upright planes and against how people film."""
+"""Estimate of the up direction from recorded gravity, level and upright planes, and typical camera handling."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,40 +16,47 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When planes are believed about gravity, and when cameras are."""
+    """Tuned parameters of the up direction."""
 
     least_correction_deg: float = param(
-        1.0, "deg", "below which a file's gravity stays", source="a phone's gravity is better than fitted planes"
+        1.0,
+        "deg",
+        "Minimum deviation of the planes for the file's gravity to be corrected",
+        source="a phone's gravity is better than fitted planes",
     )
     few_planes_deg: float = param(
-        3.0, "deg", "most correction where a level surface and few planes agree", source="the real kitchen's file is off by 2.1"
+        3.0, "deg", "Maximum correction by a level surface and few planes", source="the real kitchen's file is off by 2.1"
     )
-    widest_deg: float = param(12.0, "deg", "around a file's gravity, within which planes are looked for at first")
+    widest_deg: float = param(12.0, "deg", "Initial search angle for planes around the file's gravity")
     agree_deg: float = param(
-        1.5, "deg", "rms by which planes that settle up may disagree", source="a Kinect's bent walls give 0.8"
+        1.5, "deg", "Maximum RMS disagreement of the planes that determine up", source="a Kinect's bent walls give 0.8"
     )
-    many: int = param(3, "count", "level and upright planes that outweigh a file's gravity")
-    many_m2: float = param(2.0, "m²", "their area", source="three fronts and a worktop")
-    many_share: float = param(0.6, "share", "of the area of all planes that they make")
-    aligned_deg: float = param(2.5, "deg", "off level or upright, within which a plane speaks for a direction")
-    level_m2: float = param(0.3, "m²", "level surface without which planes correct nothing")
-    clear_share: float = param(0.2, "share", "of the planes' area by which one reading of a file must beat the other")
+    many: int = param(3, "count", "Minimum number of level and upright planes that override the file's gravity")
+    many_m2: float = param(
+        2.0, "m²", "Minimum total area of the planes that override the file's gravity", source="three fronts and a worktop"
+    )
+    many_share: float = param(0.6, "share", "Minimum fraction of all planes' area that those planes make up")
+    aligned_deg: float = param(2.5, "deg", "Maximum angle from level or upright for a plane to support an up direction")
+    level_m2: float = param(0.3, "m²", "Minimum level area for planes to correct the file's gravity")
+    clear_share: float = param(
+        0.2, "share", "Minimum lead in supporting plane area for another reading of the file to replace the first"
+    )
     walks_within_m: float = param(
         0.25,
         "m",
-        "one sigma of a camera's height that people keep to",
+        "Standard deviation of camera height above which an up direction is implausible",
         source="0.02 to 0.10 m on four real recordings, 0.5 to 1.0 m of the same on their side",
     )
     held_within_deg: float = param(
         8.0,
         "deg",
-        "mean roll of a camera that is held upright",
+        "Mean camera roll above which an up direction is implausible",
         source="2 to 5 degrees on four real recordings, 11 to 26 of the same on their side",
     )
 
 
 class Up(NamedTuple):
-    """The way up in the capture's own frame, and its evidence."""
+    """The up direction in the capture's own frame, and its evidence."""
 
     direction: Vector3
     source: Literal["file", "floor", "person", "assumed"]
@@ -65,9 +72,9 @@ def choose_up(
     readings: Sequence[Vector3],
     said_up: Vector3 | None,
 ) -> Up:
-    """Up by a person, else by the file where its planes do not contradict it, else by planes, else by the cameras.
+    """Up as given manually, else by the file unless planes contradict it, else by planes, else by the cameras.
 
-    `readings`: what the file's gravity may mean, the likeliest first; none where it has none.
+    `readings`: possible interpretations of the file's gravity, the likeliest first; empty where it has none.
     """
     params = tuned(Params)
     if said_up is not None:
@@ -81,9 +88,9 @@ def choose_up(
 
 
 def find_up(planes: Sequence[Plane], guess: Vector3, within_deg: float) -> tuple[Vector3, float] | None:
-    """The direction that makes planes horizontal or vertical, near `guess`, and the rms angle (deg) by which they disagree.
+    """The direction near `guess` that makes planes horizontal or vertical, and their RMS angular residual (deg).
 
-    None when the planes do not settle it: no level plane, and no two upright ones that face differently.
+    None when the planes do not determine it: no level plane, and no two upright ones that face differently.
     """
     up = guess / np.linalg.norm(guess)
     for reach_deg in (within_deg + 5.0, within_deg + 2.0, 4.0, 4.0, 4.0):
@@ -98,7 +105,7 @@ def find_up(planes: Sequence[Plane], guess: Vector3, within_deg: float) -> tuple
             area_m2 += plane.area_m2
             miss += weight * off_deg**2
         values, vectors = np.linalg.eigh(matrix)
-        # The winner must stand clear of the runner-up: one wall alone leaves a circle of directions
+        # The best must clearly beat the second best: one wall alone leaves a circle of directions
         if area_m2 < 0.5 or values[2] - values[1] < 0.15:
             return None
         found = vectors[:, 2]
@@ -107,7 +114,7 @@ def find_up(planes: Sequence[Plane], guess: Vector3, within_deg: float) -> tuple
 
 
 def _from_file(planes: Sequence[Plane], file_up: Vector3, params: Params) -> Up:
-    """The file's gravity; corrected where planes agree on it, a lot only where they are many."""
+    """The file's gravity, corrected where planes agree; large corrections need many planes."""
     found = find_up(planes, file_up, params.widest_deg)
     if found is None or found[1] > params.agree_deg:
         far = _up_from_planes(planes, file_up)
@@ -125,7 +132,7 @@ def _from_file(planes: Sequence[Plane], file_up: Vector3, params: Params) -> Up:
 
 
 def _many(planes: Sequence[Plane], up: Vector3, params: Params) -> bool:
-    """Whether enough level and upright planes stand by a direction to outweigh what a file says."""
+    """Whether enough level and upright planes support a direction to override the file's gravity."""
     aligned = [(p, sign) for p in planes for off, sign in (_off_deg(p, up),) if off < params.aligned_deg]
     area = sum(p.area_m2 for p, _ in aligned)
     level = sum(p.area_m2 for p, sign in aligned if sign > 0)
@@ -134,14 +141,14 @@ def _many(planes: Sequence[Plane], up: Vector3, params: Params) -> bool:
 
 
 def _supported(planes: Sequence[Plane], readings: Sequence[Vector3], params: Params) -> Vector3:
-    """The first reading, unless the planes clearly stand by another."""
+    """The first reading, unless the planes clearly support another."""
     shares = [_share(planes, reading, params.few_planes_deg + params.aligned_deg) for reading in readings]
     best = int(np.argmax(shares))
     return readings[best] if shares[best] > shares[0] + params.clear_share else readings[0]
 
 
 def _share(planes: Sequence[Plane], up: Vector3, within_deg: float) -> float:
-    """Share of the planes' area that is level or upright; what is level counts double, as every wall is upright twice."""
+    """Fraction of the planes' area that is level or upright; level area counts double, as a wall suits two directions."""
     offs = [_off_deg(p, up) for p in planes]
     areas = np.array([p.area_m2 * (2.0 if sign > 0 else 1.0) for p, (_, sign) in zip(planes, offs, strict=True)])
     near = np.array([off < within_deg for off, _ in offs])
@@ -149,8 +156,8 @@ def _share(planes: Sequence[Plane], up: Vector3, within_deg: float) -> float:
 
 
 def _without_gravity(planes: Sequence[Plane], cameras: Sequence[Rigid3], params: Params) -> Up:
-    """Up by planes, near the images' own; or near another of their sides where people would not have filmed otherwise."""
-    ends = [way for side in (0, 2) if (way := _way(planes, cameras, side)) is not None]  # as stored, or on its head
+    """Up by planes near the images' top, or near another image side if the camera's height and roll clearly favour it."""
+    ends = [way for side in (0, 2) if (way := _way(planes, cameras, side)) is not None]  # as stored, or upside down
     stored = max(ends, key=lambda way: way.seen_from_above_m2, default=None) if _on_its_head(ends) else _way(planes, cameras, 0)
     found = [way for side in (1, 3) if (way := _way(planes, cameras, side)) is not None]  # a quarter turn to either side
     if stored is None and not found:
@@ -170,7 +177,7 @@ def _without_gravity(planes: Sequence[Plane], cameras: Sequence[Rigid3], params:
 
 
 class _Way(NamedTuple):
-    """One way up, and how the camera was held and carried if it is the right one."""
+    """A candidate up direction, with the camera's roll and height spread under it."""
 
     up: Vector3
     height_spread_m: float  # one sigma
@@ -178,19 +185,19 @@ class _Way(NamedTuple):
     seen_from_above_m2: float  # level surface that faces up, less what faces down: floors are filmed, ceilings rarely
 
     def clear_of(self, other: "_Way", params: Params, *, both: bool) -> bool:
-        """Whether people film so rather than the other way: by its height, by its roll, or by both."""
+        """Whether this candidate is clearly more plausible than the other by height spread, by roll, or by both."""
         level = other.height_spread_m > params.walks_within_m and self.height_spread_m < 0.5 * other.height_spread_m
         held = other.roll_deg > params.held_within_deg and self.roll_deg < 0.5 * other.roll_deg
         return (level and held) if both else (level or held)
 
 
 def _on_its_head(ends: "Sequence[_Way]") -> bool:
-    """Whether a scan is filmed from below as it is stored: its level surfaces nearly all face down."""
+    """Whether the images are stored upside down: as stored, nearly all level surfaces face down."""
     return len(ends) == 2 and ends[0].up @ ends[1].up < 0 and ends[0].seen_from_above_m2 < 0 < ends[1].seen_from_above_m2
 
 
 def _way(planes: Sequence[Plane], cameras: Sequence[Rigid3], side: int) -> _Way | None:
-    """Up by planes near a side of the images: 0 their top, 1 their right, 2 their bottom, 3 their left."""
+    """Candidate up by planes near a side of the images: 0 top, 1 right, 2 bottom, 3 left."""
     up = _up_from_planes(planes, _mean_side(cameras, side))
     if up is None:
         return None
@@ -202,7 +209,7 @@ def _way(planes: Sequence[Plane], cameras: Sequence[Rigid3], side: int) -> _Way 
 
 
 def _up_from_planes(planes: Sequence[Plane], camera_up: Vector3) -> Vector3 | None:
-    """The direction near the cameras' own up that makes most area level or upright."""
+    """The direction near the cameras' up that makes most area level or upright."""
     candidates = [s * p.normal for p in planes for s in (1.0, -1.0)]
     large = planes[:6]
     candidates += [s * np.cross(a.normal, b.normal) for i, a in enumerate(large) for b in large[:i] for s in (1.0, -1.0)]
@@ -217,7 +224,7 @@ def _up_from_planes(planes: Sequence[Plane], camera_up: Vector3) -> Vector3 | No
         up = found[0]
         cosines = np.array([float(p.normal @ up) for p in planes])
         areas = np.array([p.area_m2 for p in planes])
-        # What faces up counts double: floors and worktops are seen from above, ceilings and undersides rarely
+        # Area facing up counts double: floors and worktops are seen from above, ceilings and undersides rarely
         share = areas @ ((np.abs(cosines) < 0.1) + 2.0 * (cosines > 0.995) + 0.5 * (cosines < -0.995))
         score = float(share) * (0.5 + float(up @ camera_up))
         if score > best_score:
@@ -236,7 +243,7 @@ def _side(camera: Rigid3, side: int) -> Vector3:
 
 
 def _off_deg(plane: Plane, up: Vector3) -> tuple[float, float]:
-    """By how much (deg) a plane misses being level (then 1) or upright (then -1), whichever is nearer."""
+    """Angle (deg) of a plane from level (then 1) or upright (then -1), whichever is nearer."""
     off_level = float(np.degrees(np.arccos(min(abs(float(plane.normal @ up)), 1.0))))
     return (off_level, 1.0) if off_level < 45.0 else (90.0 - off_level, -1.0)
 

@@ -1,4 +1,4 @@
-"""Images turned by quarter turns so that up is up: phones store what their sensor saw, however the person held them."""
+"""Rotation of images by quarter turns to stand upright: phones store sensor orientation, however they were held."""
 
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -15,14 +15,16 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When images are turned."""
+    """Tuned parameters of image rotation."""
 
-    clear: float = param(0.5, "share", "of up that lies in the image plane: looking straight down tells nothing")
-    least_share: float = param(0.6, "share", "of the frames that tell, which must agree")
+    clear: float = param(
+        0.5, "share", "Minimum component of up in the image plane for a frame to vote (none when looking straight down)"
+    )
+    least_share: float = param(0.6, "share", "Minimum fraction of the voting frames that must agree")
 
 
 def upright(recording: Recording) -> Recording:
-    """The recording with colour, depth, cameras and poses turned alike, by the turn most frames need; often itself."""
+    """The recording with colour, depth, cameras and poses rotated by the turn most frames need; unchanged if that is none."""
     turns = needed_turns(recording.frames, recording.up_capture)
     if turns == 0 or any(needed_turns(recording.frames, up) != turns for up in recording.other_ups):
         return recording  # upright, or it is not known yet which of its readings the scan supports

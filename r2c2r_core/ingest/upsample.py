@@ -1,4 +1,4 @@
-"""Depth at colour resolution without a single invented surface: every pixel continues one measured surface or stays unknown."""
+"""Joint bilateral upsampling of depth to colour resolution; each pixel continues one measured surface or stays unknown."""
 
 from dataclasses import dataclass
 
@@ -11,21 +11,23 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which depth pixels continue one surface."""
+    """Tuned parameters of depth upsampling."""
 
-    sigma_colour: float = param(12.0, "grey", "noise and texture of one surface against the step to another", gt=0)
-    sigma_px: float = param(0.9, "px", "of depth, within which neighbours vote", gt=0)
+    sigma_colour: float = param(
+        12.0, "grey", "Standard deviation of the colour difference within one surface (noise and texture)", gt=0
+    )
+    sigma_px: float = param(0.9, "px", "Standard deviation of the spatial weight, in depth pixels", gt=0)
     same_surface: float = param(
-        0.02, "ratio", "of a step to the depth, along the viewing ray, within which neighbours continue one surface"
+        0.02, "ratio", "Maximum relative difference of inverse depth for two candidates to be one surface"
     )
 
 
 def upsample_depth(depth_m: DepthMetres, guide: Image) -> DepthMetres:
     """`depth_m` (0 unknown) at the size of `guide`, its colour image; 0 where the nearest depth pixel is unknown.
 
-    Joint bilateral upsampling (Kopf et al. 2007) with a choice in place of the mean: each of the 3 x 3 depth pixels around
-    votes, by distance and by likeness of colour, for the surface it lies on, continued along its own slope; the surface
-    with most votes wins and only its members are averaged. A mean of both sides of an edge would hang in the air.
+    Joint bilateral upsampling (Kopf et al. 2007) with a selection instead of the mean: each of the 3 x 3 surrounding depth
+    pixels votes, weighted by distance and colour similarity, for its own surface, extrapolated along its slope; only the
+    members of the surface with most votes are averaged. A mean of both sides of an edge would give flying pixels.
     """
     params = tuned(Params)
     height, width = guide.shape[:2]
@@ -56,7 +58,7 @@ def upsample_depth(depth_m: DepthMetres, guide: Image) -> DepthMetres:
 
 
 def _winning_surface(said: list[np.ndarray], weight: list[np.ndarray]) -> np.ndarray:
-    """The mean inverse depth of the candidates that agree with the one most agree with."""
+    """Mean inverse depth of the candidates on the surface with most votes."""
     params = tuned(Params)
     most = np.zeros_like(said[0])
     best = np.zeros_like(said[0])

@@ -1,4 +1,4 @@
-"""The capture doctor: is this recording good enough, and if not, why not."""
+"""The capture doctor: quality assessment of a recording, with reasons and advice."""
 
 from r2c2r_core.ingest.doctor.examine import examine
 from r2c2r_core.ingest.doctor.picture import draw_scan, side_by_side

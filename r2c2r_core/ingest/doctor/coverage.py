@@ -1,4 +1,4 @@
-"""From how many sides, and from how near, the surface was filmed."""
+"""Coverage of the surface: number of viewing directions and distance of the nearest camera."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -13,30 +13,32 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How well a surface was filmed."""
+    """Tuned parameters of surface coverage."""
 
-    sample: int = param(3000, "count", "points of the surface that are asked", ge=1)
-    apart_deg: float = param(10.0, "deg", "between directions that count as different")
-    close_m: float = param(2.0, "m", "from which on a camera is too far for detail")
-    behind: tuple[float, float] = param((0.04, 0.02), "m", "depth that still shows the point: at 0 m, and more for each metre")
+    sample: int = param(3000, "count", "Approximate number of surface points tested", ge=1)
+    apart_deg: float = param(10.0, "deg", "Minimum angle between two viewing directions to count as different")
+    close_m: float = param(2.0, "m", "Camera distance below which a point counts as seen from close")
+    behind: tuple[float, float] = param(
+        (0.04, 0.02), "m", "Depth tolerance for a point to be visible: at 0 m, and increase per metre"
+    )
 
 
 class Cover(NamedTuple):
-    """Shares of the seen surface."""
+    """Coverage as fractions of the visible surface."""
 
     from_three: float  # seen from three directions, 10 deg apart
     close: float  # seen from within 2 m
 
 
 def cover(points_world: Points, views: Views) -> Cover:
-    """How well the views cover points of the fused surface, each weighing the same."""
+    """Coverage of the fused surface's points by the views, with equal weights."""
     points = points_world[:: max(1, len(points_world) // tuned(Params).sample)]
     if not len(points):
         return Cover(0.0, 0.0)
     seen, toward, distance = _sight(points, views)
     picked, count = np.zeros((len(points), 3, 3)), np.zeros(len(points), dtype=np.int64)
     cosine = np.cos(np.radians(tuned(Params).apart_deg))
-    for view in range(len(views.position)):  # greedily: a direction counts when it is far from those counted
+    for view in range(len(views.position)):  # greedily: a direction counts if it is far enough from those already counted
         new = seen[view] & (count < 3) & (np.einsum("nkd,nd->nk", picked, toward[view]).max(axis=1) < cosine)
         rows = np.flatnonzero(new)
         picked[rows, count[rows]] = toward[view, rows]

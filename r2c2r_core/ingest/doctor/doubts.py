@@ -1,4 +1,4 @@
-"""What speaks against computing anything from a recording."""
+"""Reasons not to process a recording."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -12,10 +12,10 @@ _NOTHING_COMES_OF = ("depth_unit", "confidence", "depth_coverage")  # no surface
 
 
 class Doubts(NamedTuple):
-    """Why a recording is unusable, worst first; empty where it is not."""
+    """Reasons why a recording is unusable, worst first; empty if it is usable."""
 
-    reasons: tuple[str, ...]  # one line each, with what would mend it
-    hopeless: bool  # nothing can come of it
+    reasons: tuple[str, ...]  # one line each, with a remedy
+    hopeless: bool  # no result is possible
 
 
 def find_doubts(source: Path, capture: Capture, *, progress: Progress = SILENT) -> Doubts:

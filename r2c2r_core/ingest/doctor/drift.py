@@ -1,4 +1,4 @@
-"""How far poses are off: views are aligned to each other, and what it takes to do so is the poses' disagreement."""
+"""Pose drift, measured by point-to-plane alignment of views that revisit a surface."""
 
 from dataclasses import dataclass, replace
 
@@ -12,27 +12,31 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When the poses place one surface twice."""
+    """Tuned parameters of drift measurement."""
 
-    rounds: int = param(5, "count", "steps of aligning one view to another", ge=1)
-    apart: float = param(0.25, "share", "of the recording between two visits")
-    overlap: float = param(0.3, "share", "of a view that another must see again")
-    damping: float = param(0.02, "ratio", "to the mean weight: directions that the surface does not tell stay where they are")
-    least_points: int = param(80, "count", "that both views see")
+    rounds: int = param(5, "count", "Number of Gauss-Newton steps that align one view to another", ge=1)
+    apart: float = param(0.25, "share", "Minimum separation of two visits, as a fraction of the recording")
+    overlap: float = param(0.3, "share", "Minimum overlap of two visits")
+    damping: float = param(
+        0.02, "ratio", "Damping relative to the total weight; it holds directions that the surface leaves unconstrained"
+    )
+    least_points: int = param(80, "count", "Minimum number of points comparable in both views")
     step: tuple[float, float] = param(
-        (0.05, 0.05), "m", "between neighbours, from where they are two surfaces: and for each metre"
+        (0.05, 0.05),
+        "m",
+        "Depth difference of neighbours above which they are separate surfaces: at 0 m, and increase per metre",
     )
 
 
 def revisits(views: Views, most: int) -> Pairs:
-    """Pairs that see the same surface from alike places at very different times, those most alike first."""
+    """Pairs of views of the same surface at very different times, by descending overlap."""
     every, overlap = overlaps(views)
     later = every[:, 1] - every[:, 0] >= max(tuned(Params).apart * len(views.position), 2)
     return spread(every, np.where(later & (overlap > tuned(Params).overlap), overlap, 0.0), most)
 
 
 def misplaced_m(views: Views, pairs: Pairs) -> np.ndarray:
-    """By how much (pairs,) the first view's surface must be moved, at its middle, to lie on the second's.
+    """Displacement (pairs,) in metres at the middle of the first view's surface that aligns it to the second's.
 
     Point-to-plane alignment by depth look-up (Chen and Medioni 1992; KinectFusion 2011); NaN where it finds too little.
     """

@@ -1,4 +1,4 @@
-"""The capture doctor: is this recording good enough, and if not, why not."""
+"""Capture doctor: measures a recording, tests for wrong conventions, and derives a verdict."""
 
 from dataclasses import dataclass
 
@@ -19,15 +19,15 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How much of a recording is looked at."""
+    """Tuned parameters of the examination."""
 
-    views: int = param(60, "count", "frames that are looked at", ge=2)
-    far_pairs: int = param(30, "count", "pairs with a wide baseline", ge=4)
-    registered: int = param(30, "count", "frames on which depth is laid over colour", ge=1)
+    views: int = param(60, "count", "Maximum number of frames examined", ge=2)
+    far_pairs: int = param(30, "count", "Maximum number of wide-baseline pairs for the scale test", ge=4)
+    registered: int = param(30, "count", "Maximum number of frames for the registration of depth to colour", ge=1)
 
 
 def examine(capture: Capture, recording: Recording | None = None) -> CaptureReport:
-    """Look a recording over, by sixty of its frames; `recording` adds confidence and frames that thinning left out."""
+    """Examine a recording by up to sixty of its frames; `recording` adds confidence and frames that thinning left out."""
     capture = capture.as_recorded  # refined poses would hide what is wrong with the recording
     rng = np.random.default_rng(0)
     params, count = tuned(Params), len(capture.frames)

@@ -1,4 +1,4 @@
-"""What if the recording was read wrongly? The usual mistakes, each tried, and the one that fits better named."""
+"""Hypothesis tests for common reading errors: pose conventions, image rotation, frame shift, scale, focal length."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -28,22 +28,32 @@ _SCALES = np.geomspace(0.8, 1.25, 23)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When another reading of a recording is believed."""
+    """Tuned parameters of the hypothesis tests."""
 
-    gain: float = param(0.1, "share", "of the points that must come to agree before a convention is called wrong")
+    gain: float = param(0.1, "share", "Minimum increase of the fraction of agreeing points for a convention to be called wrong")
     gain_ratio: float = param(
-        1.25, "ratio", "of the agreement under it to the given one", source="frames that barely move agree under any"
+        1.25,
+        "ratio",
+        "Minimum ratio of the agreement under another convention to the given one",
+        source="frames that barely move agree under any",
     )
-    least_log: float = param(0.04, "log", "off the given scale or focal length, nearer than which it is not called wrong")
-    least_pairs: int = param(4, "count", "with a wide baseline, that tell a scale", ge=1)
-    cost: float = param(0.85, "ratio", "of the disagreement under another scale to the given one, at most")
-    better: float = param(0.7, "share", "of the pairs it must help", source="wrong calibration hurts nearly all, chance some")
-    alike: float = param(1.05, "ratio", "of the disagreements of two scales that cannot be told apart")
+    least_log: float = param(
+        0.04, "log", "Minimum log factor between the best and the given scale or focal length to call it wrong"
+    )
+    least_pairs: int = param(4, "count", "Minimum number of wide-baseline pairs for a scale test", ge=1)
+    cost: float = param(0.85, "ratio", "Maximum ratio of the disagreement under another scale to the given one")
+    better: float = param(
+        0.7,
+        "share",
+        "Minimum fraction of pairs that another scale must improve",
+        source="wrong calibration hurts nearly all, chance some",
+    )
+    alike: float = param(1.05, "ratio", "Ratio to the least disagreement below which another hypothesis is also named")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """Another way to read the recording that fits better than the given one."""
+    """An alternative interpretation of the recording that fits better than the given one."""
 
     cause: Cause
     text: str  # what is wrong, for a person
@@ -61,10 +71,10 @@ class _Change(NamedTuple):
 
 
 def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Poses]]) -> tuple[Finding | None, Views]:
-    """The wrong convention that explains the disagreement of neighbouring frames, and the views as they should be.
+    """The wrong convention that explains the disagreement of neighbouring frames, and the views corrected for it.
 
-    The views' poses are in the recording's own world: levelled ones no longer tell what their quaternions were.
-    `shifted`: poses of the frames so many places later, to tell images that belong to another frame's pose.
+    The views' poses are in the recording's own world: levelled ones no longer contain the original quaternions.
+    `shifted`: poses of the frames so many places later, to detect images paired with another frame's pose.
     """
     if not len(pairs):
         return None, views
@@ -94,9 +104,9 @@ def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Pos
 
 
 def find_scale(views: Views, pairs: Pairs) -> Finding | None:
-    """Depth in another unit or off by some percent, a wrong focal length, or depth along the ray: the best of them.
+    """The best of these hypotheses: wrong depth unit, depth scale off by some percent, wrong focal length, depth along the ray.
 
-    Needs pairs with a wide baseline: without parallax, depth of any scale agrees with itself.
+    Needs wide-baseline pairs: without parallax, depth of any scale is consistent.
     """
     params = tuned(Params)
     if len(pairs) < params.least_pairs:
@@ -110,7 +120,7 @@ def find_scale(views: Views, pairs: Pairs) -> Finding | None:
     if best.factor is not None and abs(np.log(best.factor)) < params.least_log:
         return None
     so = compare(views, pairs, **best.change)
-    # A short path hardly tells a scale from a focal length: then both are named
+    # A short path hardly separates a scale from a focal length: then both are named
     alike = [t.text for t in tries if t.cause != best.cause and t.cost.mean() < params.alike * best.cost.mean()]
     return Finding(
         cause=best.cause,
@@ -161,7 +171,7 @@ _READER_AXES = tuple(
 
 
 def _in_file(change: Callable[[Poses], Poses], axes: np.ndarray) -> Callable[[Poses], Poses]:
-    """A change to poses as the file has them, if `axes` is what ingest made of its cameras."""
+    """The change applied to poses as stored in the file, if ingest multiplied its rotations by `axes`."""
 
     def changed(poses: Poses) -> Poses:
         rotation, translation = change((poses[0] @ axes.T, poses[1]))
@@ -229,7 +239,7 @@ def _fine_tries(views: Views, pairs: Pairs) -> list[_Try]:
 
 
 def _best_factor(views: Views, pairs: Pairs, name: str) -> tuple[float, np.ndarray]:
-    """The factor with the least cost: a scan, then the vertex of the parabola through the three best neighbours."""
+    """The factor with the least cost: a grid scan, then the vertex of the parabola through the minimum and its neighbours."""
 
     def cost(factor: float) -> np.ndarray:
         return compare(views, pairs, **{name: factor}).cost  # type: ignore[arg-type]  # both are numbers
@@ -244,7 +254,7 @@ def _best_factor(views: Views, pairs: Pairs, name: str) -> tuple[float, np.ndarr
 
 
 def _percent_off(factor: float) -> str:
-    """How a value that must be multiplied by `factor` is off."""
+    """Deviation in percent, as text, of a value that must be multiplied by `factor`."""
     percent = 100.0 * (1.0 / factor - 1.0)
     return f"{abs(percent):.0f} % too {'large' if percent > 0 else 'small'}"
 

@@ -1,4 +1,4 @@
-"""Exposure: too bright, too dark, or changing from frame to frame."""
+"""Exposure measures: overexposure, underexposure and flicker between frames."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -16,17 +16,17 @@ Greys = UInt8[np.ndarray, "views rows columns"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What of a picture is badly exposed."""
+    """Tuned parameters of exposure measures."""
 
-    stops: float = param(0.5, "log", "change of brightness that shows in textures, in powers of two")
-    white: int = param(250, "grey", "above, a pixel is white")
-    black: int = param(5, "grey", "below, a pixel is black")
-    fair: tuple[int, int] = param((20, 235), "grey", "least and most of a pixel whose brightness can be compared")
-    least_points: int = param(30, "count", "that two neighbours show alike")
+    stops: float = param(0.5, "log", "Brightness change between neighbours, in stops (powers of two), above which they flicker")
+    white: int = param(250, "grey", "Value above which a pixel is white")
+    black: int = param(5, "grey", "Value below which a pixel is black")
+    fair: tuple[int, int] = param((20, 235), "grey", "Range of values within which a pixel's brightness is compared")
+    least_points: int = param(30, "count", "Minimum number of comparable points of two neighbours")
 
 
 class Light(NamedTuple):
-    """Shares of pixels at white and at black in the median frame, and of neighbours that differ by half a stop."""
+    """Fractions of white and of black pixels in the median frame, and of neighbours that differ by half a stop."""
 
     white: float
     black: float
@@ -34,14 +34,14 @@ class Light(NamedTuple):
 
 
 def grey_views(capture: Capture, views: Views) -> Greys:
-    """The colour images of the views in grey, at the size of their thinned depth."""
+    """The views' images in grey, at the size of their subsampled depth."""
     size = (views.depth_m.shape[2], views.depth_m.shape[1])
     rgb = (capture.images.rgb(capture.frames[p].index) for p in views.position)
     return np.stack([cv2.cvtColor(cv2.resize(image, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY) for image in rgb])
 
 
 def measure_light(grey: Greys, views: Views, pairs: Pairs) -> Light:
-    """Exposure of the views, and how often neighbours show one surface in another brightness."""
+    """Exposure of the views, and the fraction of neighbours with a brightness change on the same surface."""
     params, compared = tuned(Params), compare(views, pairs)
     low, high = params.fair
     here = views.point_uv[pairs[:, 0]].astype(np.int64)

@@ -1,4 +1,4 @@
-"""The figures of a recording: what can be counted, before anything is judged."""
+"""Quality measures of a recording, before any verdict."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,17 +20,19 @@ from r2c2r_core.tuning import param, tuned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """What of a recording is counted."""
+    """Tuned parameters of the quality measures."""
 
-    level_m2: float = param(0.15, "m²", "of a level surface: a smaller one is a thing's top")
-    furniture_m: tuple[float, float] = param((0.25, 1.9), "m", "least and most height of a level surface of furniture")
-    jump_m: float = param(0.2, "m", "of a step that may be a jump")
-    pace: tuple[float, float] = param((6.0, 2.5), "ratio", "of a jump to the usual pace, and to that of the steps beside it")
-    blurred: float = param(1 / 3, "ratio", "of a blurred frame's sharpness to the usual one")
+    level_m2: float = param(0.15, "m²", "Minimum area of a level surface; a smaller one is the top of an object")
+    furniture_m: tuple[float, float] = param((0.25, 1.9), "m", "Range of heights of level furniture surfaces")
+    jump_m: float = param(0.2, "m", "Minimum length of a camera step to be a tracking jump")
+    pace: tuple[float, float] = param(
+        (6.0, 2.5), "ratio", "Minimum ratio of a jump's pace to the median pace, and to that of the adjacent steps"
+    )
+    blurred: float = param(1 / 3, "ratio", "Ratio to the median sharpness below which a frame is blurred")
 
 
 def measure(capture: Capture, views: Views, pairs: Pairs, grey: Greys, recording: Recording | None) -> CaptureFigures:
-    """The figures of a recording; `pairs` are neighbours among `views`, `grey` their pictures."""
+    """The measures of a recording; `pairs` are neighbours among `views`, `grey` their images."""
     frames, room = capture.frames, capture.room
     centres = np.array([f.world_from_camera.translation for f in frames])
     steps = np.linalg.norm(np.diff(centres, axis=0), axis=1)
@@ -99,7 +101,7 @@ def measure(capture: Capture, views: Views, pairs: Pairs, grey: Greys, recording
 
 
 def moments(capture: Capture, views: Views, pairs: Pairs, grey: Greys) -> tuple[Moment, ...]:
-    """What the looked-at frames were like, in their order."""
+    """Per-frame measures of the examined frames, in order."""
     errors: dict[int, float] = dict(zip(pairs[:, 0].tolist(), compare(views, pairs).error_m.tolist(), strict=True))
     known = (views.depth_m > 0).mean(axis=(1, 2))
     frames = [capture.frames[p] for p in views.position]
@@ -127,7 +129,7 @@ class _Heights(NamedTuple):
 
 
 def _heights(capture: Capture) -> _Heights:
-    """Heights of large level surfaces above the floor, and of a ceiling: things that have the size of people's rooms."""
+    """Heights of large level surfaces above the floor, and of a ceiling: cues to the scale of the recording."""
     if not capture.room.floor_found or not len(capture.surface.faces):
         return _Heights((), None)
     a, b, c = (capture.surface.vertices_world[capture.surface.faces[:, k]] for k in range(3))
@@ -151,7 +153,7 @@ def _heights(capture: Capture) -> _Heights:
 
 
 def _jumps(frames: Sequence[Frame], steps: np.ndarray) -> np.ndarray:
-    """Steps much longer than the pace of the recording and of the steps beside them allows."""
+    """Camera steps much faster than the median pace and than the adjacent steps."""
     usual, nearby = tuned(Params).pace
     if len(steps) < 3:
         return np.zeros(len(steps), dtype=bool)

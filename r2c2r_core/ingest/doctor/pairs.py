@@ -1,6 +1,6 @@
-"""Frames that see the same surface, and how well their depth agrees there: the measure behind every other finding.
+"""Depth agreement of frame pairs that see the same surface: the measure behind all other findings.
 
-Everything is stacked, so that judging another convention, scale or calibration on all pairs at once costs milliseconds.
+Arrays are stacked, so that testing another convention, scale or calibration on all pairs at once takes milliseconds.
 """
 
 import warnings
@@ -20,29 +20,33 @@ _NEAR_M = 0.05
 
 Rotations = Float[np.ndarray, "views 3 3"]
 Centres = Float[np.ndarray, "views 3"]
-Pairs = Integer[np.ndarray, "pairs 2"]  # positions of the view whose points are taken and of the view that judges them
+Pairs = Integer[np.ndarray, "pairs 2"]  # positions of the view whose points are taken and of the view they are compared with
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """How two views are compared."""
+    """Tuned parameters of pairwise comparison."""
 
-    width_px: int = param(160, "px", "of a depth image, thinned to no less", ge=16)
-    points: int = param(700, "count", "of each view", ge=30)
-    noise: tuple[float, float] = param((0.01, 0.01), "m", "by which good depth may differ: at 0 m, and more for each metre")
-    hidden: tuple[float, float] = param((0.1, 0.1), "m", "beyond which one of two views sees something else, likewise")
-    cut: float = param(3.0, "ratio", "of a disagreement to what is allowed, at which it counts no more")
-    least_points: int = param(30, "count", "that both views see")
-    moved_m: float = param(0.15, "m", "from a view, after which its neighbour is taken")
-    turned_deg: float = param(8.0, "deg", "from a view, after which its neighbour is taken")
-    later: int = param(6, "count", "views after it, of which the last is taken where none has moved on", ge=1)
-    overlap: float = param(0.2, "share", "of a view that a far one must see")
-    parallax: float = param(0.1, "ratio", "of a baseline to the distance, at least")
+    width_px: int = param(160, "px", "Minimum width of a subsampled depth image", ge=16)
+    points: int = param(700, "count", "Maximum number of points of each view", ge=30)
+    noise: tuple[float, float] = param(
+        (0.01, 0.01), "m", "Tolerance between two depths of one surface: at 0 m, and increase per metre"
+    )
+    hidden: tuple[float, float] = param(
+        (0.1, 0.1), "m", "Depth difference above which a point is occluded in one view: at 0 m, and increase per metre"
+    )
+    cut: float = param(3.0, "ratio", "Truncation of a disagreement, in tolerances")
+    least_points: int = param(30, "count", "Minimum number of points that both views see")
+    moved_m: float = param(0.15, "m", "Camera translation above which a later view becomes the neighbour")
+    turned_deg: float = param(8.0, "deg", "Camera rotation above which a later view becomes the neighbour")
+    later: int = param(6, "count", "Maximum number of later views searched; the last is taken if none has moved enough", ge=1)
+    overlap: float = param(0.2, "share", "Minimum overlap of a wide-baseline pair")
+    parallax: float = param(0.1, "ratio", "Minimum ratio of baseline to distance of a wide-baseline pair")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Views:
-    """Some frames of a recording, thinned and stacked; lengths in metres, pixels of the thinned depth images."""
+    """Frames of a recording, subsampled and stacked; lengths in metres, pixels of the subsampled depth images."""
 
     position: Integer[np.ndarray, " views"]  # in the capture's list of frames
     depth_m: Float[np.ndarray, "views rows columns"]
@@ -54,21 +58,21 @@ class Views:
     point_z: Float[np.ndarray, "views points"]  # 0 where a view has fewer points
 
     def camera(self, view: int) -> Intrinsics:
-        """Of its thinned depth image."""
+        """The camera of a view's subsampled depth image."""
         (fx, fy), (cx, cy), (rows, columns) = self.focal[view], self.centre[view], self.depth_m.shape[1:]
         return Intrinsics(fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy), width=columns, height=rows)
 
     def world_from_camera(self, view: int) -> Rigid3:
-        """Where it was taken."""
+        """The pose of a view."""
         return Rigid3(self.rotation[view], self.translation[view])
 
     def posed(self, rotation: Rotations, translation: Centres) -> "Views":
-        """The same images from other places."""
+        """The same images with other poses."""
         return replace(self, rotation=rotation, translation=translation)
 
 
 class Disagreement(NamedTuple):
-    """Depth of one view's points as the other should see them, less what it saw, and whether that says anything."""
+    """Differences between measured and predicted depth of one view's points in the other view, with validity."""
 
     apart_m: Float[np.ndarray, "pairs points"]
     expected_m: Float[np.ndarray, "pairs points"]  # depth at which the other view should see the point
@@ -79,28 +83,28 @@ class Disagreement(NamedTuple):
 
     @property
     def agrees(self) -> np.ndarray:
-        """Points on which both views agree, within what a depth sensor's noise allows."""
+        """Points on which both views agree within the depth tolerance."""
         return self.seen & (np.abs(self.apart_m) < tolerance_m(self.expected_m))
 
     @property
     def agreement(self) -> np.ndarray:
-        """Share (pairs,) of the first view's points that the second confirms."""
+        """Fraction (pairs,) of the first view's points that the second confirms."""
         return np.asarray(self.agrees.sum(axis=1) / np.maximum(self.known.sum(axis=1), 1))
 
     @property
     def comparable(self) -> np.ndarray:
-        """Points both see: what lies far off is hidden from one of the two."""
+        """Points that both views see: larger differences mean occlusion in one of the two."""
         least, more = tuned(Params).hidden
         return self.seen & (np.abs(self.apart_m) < least + more * self.expected_m)
 
     @property
     def overlap(self) -> np.ndarray:
-        """Share (pairs,) of the first view's points that the second sees at roughly their distance."""
+        """Fraction (pairs,) of the first view's points that the second sees at roughly their distance."""
         return np.asarray(self.comparable.sum(axis=1) / np.maximum(self.known.sum(axis=1), 1))
 
     @property
     def error_m(self) -> np.ndarray:
-        """Median disagreement (pairs,) over comparable points; NaN where they are too few."""
+        """Median disagreement (pairs,) in metres over comparable points; NaN with too few."""
         comparable = self.comparable
         errors = np.full(len(comparable), np.nan)
         for k in np.flatnonzero(comparable.sum(axis=1) >= tuned(Params).least_points):
@@ -109,7 +113,7 @@ class Disagreement(NamedTuple):
 
     @property
     def cost(self) -> np.ndarray:
-        """Mean disagreement (pairs,) in tolerances, cut off, over points both see; as much where they are too few."""
+        """Mean truncated disagreement (pairs,) in tolerances, over points both see; the truncation value with too few."""
         comparable = self.comparable
         counts = comparable.sum(axis=1)
         params = tuned(Params)
@@ -119,13 +123,13 @@ class Disagreement(NamedTuple):
 
 
 def tolerance_m(depth_m: np.ndarray) -> np.ndarray:
-    """By how much two good depth images may differ: 2 cm at 1 m, 4 cm at 3 m."""
+    """Tolerance between two depth images at a depth: 2 cm at 1 m, 4 cm at 3 m."""
     least, more = tuned(Params).noise
     return np.asarray(least + more * depth_m)
 
 
 def stack_views(frames: Sequence[Frame], images: FrameImages, positions: Sequence[int], rng: np.random.Generator) -> Views:
-    """The frames at those positions, thinned; all must have depth images of one size."""
+    """The frames at those positions, subsampled; all must have depth images of one size."""
     parts = [_thinned(frames[p], images, rng) for p in positions]
     return Views(
         position=np.asarray(positions, dtype=np.int64),
@@ -142,7 +146,7 @@ def stack_views(frames: Sequence[Frame], images: FrameImages, positions: Sequenc
 def compare(
     views: Views, pairs: Pairs, *, depth_scale: float = 1.0, focal_scale: float = 1.0, along_ray: bool = False
 ) -> Disagreement:
-    """How the depth of each pair's first view fits the second's, if depth and calibration were so much larger.
+    """Disagreement of each pair's depth, with depth and focal length multiplied by the given scales.
 
     `along_ray`: the depth images hold distances from the camera instead of along its axis.
     """
@@ -177,10 +181,10 @@ def compare(
 
 
 def neighbours(views: Views) -> Pairs:
-    """For each view a later one that has moved on a little: turned or moved enough, or else the last of a few.
+    """Pairs of each view with the first later one that has moved or turned enough, else the last of a few.
 
-    Chosen by the order of the frames and by angles between them, which survive inverted poses, flipped camera axes and
-    reordered quaternions: the pairs overlap even where the poses are nonsense.
+    The choice by frame order and relative angles is invariant to inverted poses, flipped camera axes and reordered
+    quaternions, so the pairs overlap even where the poses are wrong.
     """
     params, pairs = tuned(Params), []
     for k in range(len(views.position) - 1):
@@ -193,9 +197,9 @@ def neighbours(views: Views) -> Pairs:
 
 
 def far_pairs(views: Views, most: int) -> Pairs:
-    """Pairs with a wide baseline that see the same surface: what tells scale and focal length. By the given poses.
+    """Wide-baseline pairs that see the same surface under the given poses, which determine scale and focal length.
 
-    Rather those near in time: over a long time drift looks like scale.
+    Pairs near in time are preferred: over a long time, drift looks like scale.
     """
     every, overlap = overlaps(views)
     known = np.where(views.point_z > 0, views.point_z, np.nan)
@@ -214,7 +218,7 @@ def far_pairs(views: Views, most: int) -> Pairs:
 
 
 def overlaps(views: Views) -> tuple[Pairs, np.ndarray]:
-    """Every ordered pair of views, and the share of the first's points that the second sees at roughly their distance."""
+    """All ordered pairs of views, and the fraction of the first's points that the second sees at roughly their distance."""
     count = len(views.position)
     first, second = np.nonzero(~np.eye(count, dtype=bool))
     every = np.stack([first, second], axis=1)
@@ -226,7 +230,7 @@ def overlaps(views: Views) -> tuple[Pairs, np.ndarray]:
 
 
 def spread(pairs: Pairs, wanted: np.ndarray, most: int) -> Pairs:
-    """The most wanted pairs, no view in more than a few of them."""
+    """The highest-scoring pairs, with no view in more than a few of them."""
     views = int(pairs.max()) + 1 if len(pairs) else 1
     uses, limit = np.zeros(views, dtype=np.int64), max(2, -(-3 * most // views))
     chosen: list[np.ndarray] = []
@@ -250,7 +254,7 @@ def _thinned(
     """(depth, focal lengths, principal point, pixels of some known points, their depth) at a fraction of the resolution."""
     params, camera = tuned(Params), frame.depth_camera
     step = max(1, camera.width // params.width_px)
-    start = step // 2  # thinned pixel k stands for the full one at start + k * step, whose centre lies half a pixel further
+    start = step // 2  # subsampled pixel k is the full one at start + k * step, whose centre lies half a pixel further
     depth = np.asarray(images.depth(frame.index).metres[start::step, start::step])
     off_centre = (start + 0.5) / step - 0.5
     focal = np.array([camera.fx, camera.fy]) / step

@@ -1,4 +1,4 @@
-"""The fused scan to look at: from above and from where it was filmed, with the camera's path; transparent around it."""
+"""Renderings of the fused scan from above and from the filming side, with the camera path, on a transparent background."""
 
 from typing import NamedTuple
 
@@ -22,14 +22,14 @@ _INK = (128, 136, 148)  # of the scale: to be read on white and on black
 
 
 class ScanPictures(NamedTuple):
-    """Two pictures of a scan."""
+    """Two renderings of a scan."""
 
     plan: Picture
     view: Picture
 
 
 def draw_scan(capture: Capture, size: tuple[int, int] = (960, 640)) -> ScanPictures:
-    """Pictures (width, height) of the fused surface from above and from the side it was filmed from."""
+    """Renderings of `size` (width, height) of the fused surface from above and from the side it was filmed from."""
     centres = np.array([f.world_from_camera.translation for f in capture.frames])
     points = capture.surface.vertices_world
     held = np.vstack([_bulk(points), centres]) if len(points) else centres
@@ -45,20 +45,20 @@ def draw_scan(capture: Capture, size: tuple[int, int] = (960, 640)) -> ScanPictu
 
 
 def side_by_side(pictures: ScanPictures) -> UInt8[np.ndarray, "h w 3"]:
-    """Both pictures on white, as one."""
+    """Both renderings side by side on white."""
     both = np.concatenate(pictures, axis=1)
     alpha = both[..., 3:].astype(np.float32) / 255
     return np.rint(both[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
 
 
 def _plan_up(away: Vector3, yaw: float) -> Vector3:
-    """What is up in the plan: away from the cameras, along the walls."""
+    """Direction that points up in the plan: away from the cameras, along the walls."""
     directions = [np.array([np.cos(yaw + k * np.pi / 2), np.sin(yaw + k * np.pi / 2), 0.0]) for k in range(4)]
     return min(directions, key=lambda d: float(d @ away))
 
 
 def _bulk(points: Points) -> Points:
-    """Some of the points, without the few that lie far out."""
+    """A subset of the points without outliers (0.5 % quantiles on both sides)."""
     some = points[:: max(1, len(points) // 20_000)]
     low, high = np.quantile(some, (0.005, 0.995), axis=0)
     return some[((some >= low) & (some <= high)).all(axis=1)]
@@ -67,7 +67,7 @@ def _bulk(points: Points) -> Points:
 def _framing(
     points: Points, backward: Vector3, up: Vector3, size: tuple[int, int], distance_m: float | None
 ) -> tuple[Intrinsics, Rigid3]:
-    """A camera that looks against `backward` and just holds the points, and camera_from_world; so far away, or near."""
+    """A camera looking against `backward` that frames the points, and camera_from_world; at `distance_m`, or close."""
     back = backward / np.linalg.norm(backward)
     right = np.cross(up, back)
     right /= np.linalg.norm(right)
@@ -87,7 +87,7 @@ def _framing(
 
 
 def _drawn(capture: Capture, centres: Points, camera: Intrinsics, camera_from_world: Rigid3) -> Picture:
-    """The surface, its far sides left out, lit from the camera; the path of the camera over it."""
+    """The surface without back faces, lit from the camera, with the camera path drawn on top."""
     vertices, faces = capture.surface.vertices_world, capture.surface.faces
     image = np.zeros((camera.height, camera.width, 4), np.uint8)
     if len(faces):
@@ -106,7 +106,7 @@ def _drawn(capture: Capture, centres: Points, camera: Intrinsics, camera_from_wo
         image[..., 3] = np.where(raster.depth_m > 0, 255, 0)
     _draw_path(image, project(camera_from_world.apply(centres), camera))
     size = (camera.width // _SUPERSAMPLE, camera.height // _SUPERSAMPLE)
-    # Colours are weighed by opacity while shrinking: black must not bleed in from where there is nothing
+    # Colours are weighted by opacity while shrinking, so that the empty background does not darken the borders
     alpha = cv2.resize(image[..., 3].astype(np.float32), size, interpolation=cv2.INTER_AREA)
     weighed = cv2.resize(image[..., :3] * (image[..., 3:] / np.float32(255)), size, interpolation=cv2.INTER_AREA)
     colour = weighed / np.maximum(alpha[..., None] / 255, 1e-3)
@@ -114,7 +114,7 @@ def _drawn(capture: Capture, centres: Points, camera: Intrinsics, camera_from_wo
 
 
 def _draw_path(image: np.ndarray, path_px: np.ndarray) -> None:
-    """The path, white beneath and coloured from its start to its end above."""
+    """Draw the path with a white outline and a colour gradient from start to end."""
     dots = np.rint(path_px * 16).astype(np.int32)
     share = np.linspace(0.0, 1.0, len(dots))[:, None]
     colours = np.rint((1 - share) * _PATH[0] + share * _PATH[1])
@@ -128,7 +128,7 @@ def _draw_path(image: np.ndarray, path_px: np.ndarray) -> None:
 
 
 def _scale(image: Picture, camera: Intrinsics, distance_m: float) -> Picture:
-    """The plan with a bar of one metre."""
+    """The plan with a scale bar of one metre."""
     metre = round(camera.fx / _SUPERSAMPLE / distance_m)
     left, bottom = 16, image.shape[0] - 16
     ink = (*_INK, 255)

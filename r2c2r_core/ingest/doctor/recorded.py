@@ -1,4 +1,4 @@
-"""What a recording holds and what it lacks: frame rate, gaps, lost poses, damaged frames, depth as recorded."""
+"""Measures of the recording itself: frame rate, gaps, lost poses, damaged frames, depth before rejection."""
 
 import re
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.readers.protocol import Recording, UnreadableFrame
 from r2c2r_core.model.capture import Frame
 
-_FRAMES = 12  # that tell what depth was recorded
+_FRAMES = 12  # sampled for the depth as recorded
 
 
 class Timing(NamedTuple):
-    """When frames were taken, and which are not there."""
+    """Frame timing, and fractions of missing and of unposed frames."""
 
     missing_share: float
     without_pose_share: float
@@ -24,7 +24,7 @@ class Timing(NamedTuple):
 
 
 def measure_timing(recording: Recording | None, frames: Sequence[Frame]) -> Timing:
-    """Frame rate and gaps, of the recording itself where it is at hand: a long one is thinned on reading."""
+    """Frame rate and gaps, from the recording if given, as reading thins a long one."""
     every = recording.frames if recording else frames
     numbers = np.array([f.index for f in every])
     times = np.array([f.timestamp_s for f in every if f.timestamp_s is not None])
@@ -43,7 +43,7 @@ def measure_timing(recording: Recording | None, frames: Sequence[Frame]) -> Timi
 
 
 def _expected_numbers(numbers: np.ndarray) -> np.ndarray:
-    """The numbers a recording without gaps would have; those it has, where they follow no step (such as times)."""
+    """Frame numbers of the recording without gaps; the given ones if they follow no step (such as times)."""
     gaps = np.diff(numbers)
     if not len(gaps):
         return numbers
@@ -54,7 +54,7 @@ def _expected_numbers(numbers: np.ndarray) -> np.ndarray:
 
 
 def _still_there(recording: Recording, numbers: np.ndarray) -> int:
-    """How many of these frames have their files and yet were not read: those without a usable pose."""
+    """Number of these frames whose files exist although they were not read: those without a usable pose."""
     names, first = recording.files.names(), recording.frames[0]
 
     def numbered(name: str, number: int) -> str:
@@ -64,7 +64,7 @@ def _still_there(recording: Recording, numbers: np.ndarray) -> int:
 
 
 def unreadable_share(recording: Recording, frames: int) -> float:
-    """Share of the frames that ingest could not read, of those it tried: a long recording is thinned evenly.
+    """Fraction of the tried frames that ingest could not read; a long recording is thinned evenly first.
 
     Frames without a pose are tried only where the whole recording has none.
     """
@@ -74,14 +74,14 @@ def unreadable_share(recording: Recording, frames: int) -> float:
 
 
 class Recorded(NamedTuple):
-    """Depth as it was recorded."""
+    """Recorded depth before rejection: median, and confidence fractions."""
 
     median_m: float | None
     confidence: tuple[float, float, float] | None
 
 
 def measure_recorded(recording: Recording) -> Recorded:
-    """Depth as it was recorded, before anything was rejected: its median, and the shares of low, medium, high confidence."""
+    """Median of the recorded depth before rejection, and the fractions of low, medium and high confidence."""
     counts, medians = np.zeros(3), []
     for frame in recording.frames[:: max(1, len(recording.frames) // _FRAMES)]:
         try:

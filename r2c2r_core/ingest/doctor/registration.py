@@ -1,7 +1,7 @@
-"""Does depth lie on colour? Where a near thing hides a far one, depth jumps and the picture usually shows an edge.
+"""Registration check of depth against colour, by the distance of depth discontinuities to image edges.
 
-The jumps are back-projected into the colour image under another focal length, principal point and sideways shift of the
-camera; the calibration for which they come to lie nearest to image edges is compared with the given one. On the 7-Scenes
+Discontinuities are projected into the colour image under other focal lengths, principal points and sideways camera shifts;
+the calibration that brings them nearest to image edges is compared with the given one. On the 7-Scenes
 kitchen, whose raw depth is not registered, this finds 526 px and 32 mm where 585 px and 0 mm are assumed.
 """
 
@@ -22,26 +22,41 @@ WIDTH = 640  # px across the colour image's longer side, at which distances are 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """When depth does not lie on colour."""
+    """Tuned parameters of the registration check."""
 
-    far_px: float = param(6.0, "px", "of 640: an edge farther away says nothing", gt=0)
-    points: int = param(500, "count", "a frame, at most", ge=1)
-    least: tuple[int, int] = param((60, 5), "count", "points of a frame, and frames, that tell")
-    limit_px: float = param(2.0, "px", "of 640, that are as good as none", source="the gap between two fronts is about as wide")
-    gain: float = param(0.15, "share", "of the edge distance that must go", source="good recordings gain up to 0.12 by chance")
-    fits_px: float = param(3.0, "px", "of 640, of a fit", source="edges laid at random are 3.5 px and more from the next one")
-    near_m: tuple[float, float] = param((0.3, 3.0), "m", "least and most depth of an edge that is looked at")
-    jump: tuple[float, float] = param((0.1, 0.03), "m", "of an edge: at 0 m, and more for each metre")
+    far_px: float = param(6.0, "px", "Truncation of the distance to an image edge, in pixels of a 640 px wide image", gt=0)
+    points: int = param(500, "count", "Maximum number of depth edge points of a frame", ge=1)
+    least: tuple[int, int] = param((60, 5), "count", "Minimum number of edge points of a frame, and of such frames")
+    limit_px: float = param(
+        2.0,
+        "px",
+        "Minimum mean offset to report, in pixels of a 640 px wide image",
+        source="the gap between two fronts is about as wide",
+    )
+    gain: float = param(
+        0.15,
+        "share",
+        "Minimum relative reduction of the edge distance for another calibration to be accepted",
+        source="good recordings gain up to 0.12 by chance",
+    )
+    fits_px: float = param(
+        3.0,
+        "px",
+        "Maximum edge distance of an accepted fit, in pixels of a 640 px wide image",
+        source="random points: 3.5 px and more",
+    )
+    near_m: tuple[float, float] = param((0.3, 3.0), "m", "Range of depths of edges used")
+    jump: tuple[float, float] = param((0.1, 0.03), "m", "Minimum depth step of an edge: at 0 m, and increase per metre")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Registration:
-    """How the depth images lie on the colour images."""
+    """Registration of the depth images to the colour images."""
 
     edge_px: float  # mean distance of depth edges to image edges as calibrated, cut off at 6 px of 640
     edge_best_px: float  # and under the calibration that fits best
     off_px: float  # how far depth pixels move, on average, from the given calibration to the best, in px of 640
-    limit_px: float  # what is still as good as none: 2 px, or a pixel of the depth image where that is larger
+    limit_px: float  # largest negligible offset: 2 px, or a pixel of the depth image where that is larger
     focal_factor: float  # best focal length over the given one
     shift_px: tuple[float, float]  # of the principal point
     shift_mm: tuple[float, float]  # of the colour camera, right and down
@@ -49,14 +64,14 @@ class Registration:
 
     @property
     def wrong(self) -> bool:
-        """Whether depth clearly lies elsewhere than the calibration says, and the better one truly fits."""
+        """Whether the given calibration is clearly wrong and the best one fits well."""
         params, gain = tuned(Params), self.edge_px - self.edge_best_px
         clear = gain > params.gain * self.edge_px and self.edge_best_px < params.fits_px
         return self.off_px > self.limit_px and clear
 
 
 class _Edges(NamedTuple):
-    """One frame: points on depth edges over their depth, and how far each pixel is from an image edge."""
+    """One frame's depth edge points as normalised rays with depth, and each pixel's distance to an image edge."""
 
     ray: np.ndarray  # (n, 2) x/z, y/z
     z: np.ndarray  # (n,)
@@ -65,7 +80,7 @@ class _Edges(NamedTuple):
 
 
 def measure_registration(frames: Sequence[Frame], images: FrameImages, rng: np.random.Generator) -> Registration | None:
-    """How depth lies on colour over these frames; None when too few depth edges are seen."""
+    """Registration of depth to colour over these frames; None with too few depth edges."""
     edges = [e for f in frames if (e := _edges(f, images.rgb(f.index), images.depth(f.index).metres, rng)) is not None]
     if len(edges) < tuned(Params).least[1]:
         return None
@@ -121,7 +136,7 @@ def _projected(stack: _Stack, parameters: np.ndarray) -> np.ndarray:
 
 
 def _distances(stack: _Stack, parameters: np.ndarray) -> np.ndarray:
-    """Distance (k, n) of the edge points to image edges."""
+    """Distance (k, n) in pixels of the edge points to image edges."""
     uv = _projected(stack, parameters)
     rows, columns = stack.distance_px.shape[1:]
     u, v = uv[..., 0], uv[..., 1]
@@ -131,7 +146,7 @@ def _distances(stack: _Stack, parameters: np.ndarray) -> np.ndarray:
 
 
 def _minimise(stack: _Stack, step: np.ndarray) -> np.ndarray:
-    """Parameters that bring the edges nearest: a coarse scan of focal length and sideways shift, then Nelder-Mead."""
+    """Parameters that minimise edge distance: a coarse scan of focal length and sideways shift, then Nelder-Mead."""
     from scipy.optimize import minimize
 
     free = np.flatnonzero(step)
@@ -173,9 +188,9 @@ def _edges(frame: Frame, rgb: Image, depth_m: DepthMetres, rng: np.random.Genera
 
 
 def _depth_edges(depth_m: DepthMetres, camera: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
-    """(x/z and y/z (n, 2), near depth (n,)) of the borders between neighbouring pixels across which depth jumps.
+    """(x/z and y/z (n, 2), near depth (n,)) of borders between neighbouring pixels with a depth discontinuity.
 
-    Unknown pixels between the two sides are bridged, up to three: where sensors see mixed depth, ingest has removed it.
+    Up to three unknown pixels between the two sides are bridged, as ingest has removed mixed depth there.
     """
     (least, more), (nearest, farthest) = tuned(Params).jump, tuned(Params).near_m
     rays, depths = [], []

@@ -1,4 +1,4 @@
-"""What the capture doctor says about a recording."""
+"""The capture doctor's report on a recording."""
 
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
@@ -14,7 +14,7 @@ VERSION = 2  # of the document that `to_json` returns
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Remark:
-    """One thing about a recording, how much it matters, and what to do about it."""
+    """One finding about a recording, with its severity and advice."""
 
     verdict: Verdict
     cause: str  # a word for programs, such as "poses_inverted"
@@ -23,13 +23,13 @@ class Remark:
 
     @property
     def line(self) -> str:
-        """For a person: what, and what to do."""
+        """The finding and its advice as one line of text."""
         return f"{self.text}; {self.advice}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaptureFigures:
-    """What was measured."""
+    """Quality measures of a recording."""
 
     frames: int
     first_frame: int
@@ -56,7 +56,7 @@ class CaptureFigures:
     largest_jump_m: float
     pair_error_mm: float | None  # median disagreement of the depth of neighbouring frames; None: no overlap
     pair_overlap: float  # share of a frame's pixels its neighbour sees too
-    drift_mm: float | None  # by how much the poses place the same surface apart on another visit; None: none is revisited
+    drift_mm: float | None  # displacement of the same surface between two visits; None: none is revisited
     poses_source: str
     up_source: str
     up_spread_deg: float | None
@@ -83,7 +83,7 @@ class CaptureFigures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Moment:
-    """One of the frames that were looked at."""
+    """Measures of one examined frame."""
 
     frame_index: int
     sharpness: float  # over the median frame's
@@ -104,7 +104,7 @@ class CaptureReport:
     convention: Finding | None  # another way to read the poses that fits better
     scale: Finding | None  # another scale of depth or focal length that fits better
     registration: Registration | None  # how depth lies on colour; None: too few edges in depth to tell
-    notices: tuple[str, ...]  # what the reader had to say
+    notices: tuple[str, ...]  # from the reader
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -112,7 +112,7 @@ class CaptureReport:
         return tuple(r.line for r in self.remarks)
 
     def rows(self) -> list[tuple[str, str]]:
-        """The figures for a table: names in words, numbers as a person reads them."""
+        """The measures as table rows: names in words, formatted numbers."""
         return [(name.replace("_", " "), _plain(value)) for name, value in asdict(self.figures).items()]
 
     def to_json(self) -> dict[str, Any]:
@@ -121,7 +121,7 @@ class CaptureReport:
 
 
 def refusal_to_json(problem: CaptureError) -> dict[str, Any]:
-    """The same document for a recording that cannot be read at all: a verdict and a reason, no figures."""
+    """The same document for an unreadable recording: a verdict and a reason, without measures."""
     remark = Remark(verdict="unusable", cause="unreadable", text=problem.message, advice=problem.hint)
     document = dict.fromkeys(field.name for field in fields(CaptureReport))
     filled = {"verdict": "unusable", "remarks": [asdict(remark)], "reasons": [remark.line], "notices": [], "moments": []}

@@ -1,4 +1,4 @@
-"""Depth in another unit than its format's: which one, by what the frames agree on."""
+"""Detection of a depth unit other than the format's, by agreement of the frames."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFr
 from r2c2r_core.model.capture import Capture, Depth
 from r2c2r_core.tuning import param, tuned
 
-_UNITS = {  # factor to metres: what was read as something else
+_UNITS = {  # factor to metres: description
     0.001: "millimetres read as metres",
     0.01: "centimetres read as metres",
     0.0125: "1/10000 m turned by three bits (as in APC) read as 1/1000 m",
@@ -29,25 +29,27 @@ _UNITS = {  # factor to metres: what was read as something else
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Which unit is believed."""
+    """Tuned parameters of unit detection."""
 
-    near_m: tuple[float, float] = param((0.4, 5.0), "m", "least and most median depth of what is filmed with a depth camera")
-    usual_m: float = param(1.5, "m", "median depth of a room", gt=0)
-    clear: float = param(0.8, "ratio", "of the best unit's disagreement to the next's: then the frames have told")
-    views: int = param(24, "count", "frames that are compared", ge=2)
-    pairs: int = param(16, "count", "of them with a wide baseline", ge=1)
+    near_m: tuple[float, float] = param((0.4, 5.0), "m", "Range of plausible median depths of a recording")
+    usual_m: float = param(1.5, "m", "Typical median depth in a room; the nearest unit is taken if frames do not decide", gt=0)
+    clear: float = param(
+        0.8, "ratio", "Ratio of the best unit's disagreement to the second best's below which the frames decide"
+    )
+    views: int = param(24, "count", "Maximum number of frames compared", ge=2)
+    pairs: int = param(16, "count", "Maximum number of wide-baseline pairs", ge=1)
 
 
 class Unit(NamedTuple):
-    """What the recorded depth should be multiplied by."""
+    """A unit of the recorded depth, as a factor to metres."""
 
     factor: float
     text: str
-    measured: bool  # by views that agree, rather than by how far off things usually are
+    measured: bool  # by agreement of views, rather than by the typical depth in a room
 
 
 def likely_unit(capture: Capture, recording: Recording, median_m: float, rng: np.random.Generator) -> Unit | None:
-    """The unit under which things are as far as they are in rooms, and under which most views agree; None where none fits."""
+    """The unit with a plausible median depth and the best agreement of views; None where none fits."""
     params = tuned(Params)
     nearest, farthest = params.near_m
     fitting = [f for f in _UNITS if nearest < f * median_m < farthest]
@@ -62,7 +64,7 @@ def likely_unit(capture: Capture, recording: Recording, median_m: float, rng: np
 
 
 def _disagreement(capture: Capture, recording: Recording, factor: float, rng: np.random.Generator) -> float | None:
-    """Mean disagreement of views, in what sensors are allowed, if depth were so much larger; None where none overlap."""
+    """Mean disagreement of views, in tolerances, with depth multiplied by `factor`; None without pairs."""
     raw = {frame.index: frame for frame in recording.frames}
     positions = [p for p, frame in enumerate(capture.frames) if frame.index in raw]
     positions = positions[:: -(-len(positions) // tuned(Params).views)] if positions else []
@@ -81,13 +83,13 @@ def _disagreement(capture: Capture, recording: Recording, factor: float, rng: np
 
 
 class _Rescaled:
-    """The recording's own depth, times a factor."""
+    """Images of the recording with its depth multiplied by a factor."""
 
     def __init__(self, recording: Recording, raw: dict[int, RawFrame], factor: float) -> None:
         self._recording, self._raw, self._factor = recording, raw, factor
 
     def rgb(self, frame_index: int) -> Image:
-        """Never asked for."""
+        """Not available: raises KeyError."""
         raise KeyError(frame_index)
 
     def depth(self, frame_index: int) -> Depth:

@@ -1,4 +1,4 @@
-"""From figures to a verdict: what matters, worst first, and what to do about it."""
+"""Verdict on a recording from its measures: findings, worst first, with advice."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,41 +10,72 @@ from r2c2r_core.ingest.doctor.report import VERDICTS, CaptureFigures, Remark, Ve
 from r2c2r_core.ingest.doctor.unit import Unit
 from r2c2r_core.tuning import param, tuned
 
-_FIRST = ("gravity_off",)  # heights, the floor and everything that stands follow from it
+_FIRST = ("gravity_off",)  # heights, the floor and all upright directions depend on it
 _REGISTER = "read it with --register-depth, which moves the depth there by this fit"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """From which figure on a recording is remarked upon."""
+    """Tuned parameters of the verdict."""
 
-    plausible_m: tuple[float, float] = param((0.1, 10.0), "m", "of a median depth; else its unit is not its format's")
-    depth: tuple[float, float] = param((0.1, 0.35), "share", "of the median frame with depth: unusable, with care below")
-    unsure: float = param(0.5, "share", "of the depth with low confidence")
-    gravity_deg: float = param(1.5, "deg", "off the planes", source="phones: half a degree, fitted planes: one")
-    tilt_deg: float = param(3.0, "deg", "corrected without care", source="a worktop of 60 cm is then 3 cm higher at its back")
-    masks_px: float = param(4.0, "px", "of 640, off colour: masks suffer", source="a handle's width at 2 m")
-    lost: float = param(0.05, "share", "of the frames that may be lost")
-    frames: tuple[int, int] = param((5, 20), "count", "of frames: unusable, with care below")
-    overlap: float = param(0.03, "share", "of neighbours' overlap that checks anything")
-    noise_mm: tuple[float, float] = param((8.0, 3.0), "score", "mm by which good frames disagree: at 0 m, and more per m²")
-    wrong: float = param(3.0, "ratio", "of the disagreement to the noise's, from which on it is unusable")
-    drift_mm: tuple[float, float] = param((45.0, 150.0), "score", "mm of drift: with care, unusable above")
-    drift_scale: float = param(0.075, "ratio", "off one that may be drift", source="3 cm over 2.5 m of a walk read as 5 %")
-    blurred: float = param(0.2, "share", "of the frames")
-    white: float = param(0.2, "share", "of the median picture")
-    black: float = param(0.3, "share", "of the median picture")
-    flicker: float = param(0.25, "share", "of the steps between frames")
-    path_m: float = param(0.15, "m", "that the camera moves at least")
-    sides: float = param(0.15, "share", "of the surface seen from three sides")
-    held_m: tuple[float, float] = param((0.7, 2.2), "m", "least and most height of a camera over the floor")
-    worktop_m: float = param(0.9, "m", "usual height of a worktop", source="0.85 to 0.95 m")
-    usual_m: tuple[float, float] = param((0.68, 0.98), "m", "of tables and worktops, and what a scan is off")
-    furniture_m: tuple[float, float] = param((0.5, 1.4), "m", "above seats, below shelves")
+    plausible_m: tuple[float, float] = param(
+        (0.1, 10.0), "m", "Range of plausible median depths; outside it the unit differs from the format's"
+    )
+    depth: tuple[float, float] = param(
+        (0.1, 0.35),
+        "share",
+        "Fraction of the median frame with depth below which a recording is unusable, and usable with care",
+    )
+    unsure: float = param(0.5, "share", "Fraction of depth with low confidence above which it is reported")
+    gravity_deg: float = param(
+        1.5, "deg", "Deviation of gravity from the planes above which it is reported", source="phones: 0.5, fitted planes: 1"
+    )
+    tilt_deg: float = param(
+        3.0,
+        "deg",
+        "Maximum corrected gravity deviation without a warning",
+        source="a worktop of 60 cm is then 3 cm higher at its back",
+    )
+    masks_px: float = param(
+        4.0,
+        "px",
+        "Offset of depth from colour, in pixels of 640, above which it is unusable for masks",
+        source="a handle's width at 2 m",
+    )
+    lost: float = param(0.05, "share", "Fraction of damaged, unposed or dropped frames above which it is reported")
+    frames: tuple[int, int] = param(
+        (5, 20), "count", "Number of frames below which a recording is unusable, and usable with care"
+    )
+    overlap: float = param(0.03, "share", "Minimum overlap of neighbours for poses and depth to be checked")
+    noise_mm: tuple[float, float] = param(
+        (8.0, 3.0), "score", "Expected disagreement of good frames in mm: at 0 m, and increase per m²"
+    )
+    wrong: float = param(3.0, "ratio", "Ratio of the disagreement to the expected one above which a recording is unusable")
+    drift_mm: tuple[float, float] = param(
+        (45.0, 150.0), "score", "Drift in mm above which a recording is usable with care, and unusable"
+    )
+    drift_scale: float = param(
+        0.075,
+        "ratio",
+        "Maximum deviation of a scale factor from one that drift can explain",
+        source="3 cm over 2.5 m of a walk read as 5 %",
+    )
+    blurred: float = param(0.2, "share", "Fraction of blurred frames above which it is reported")
+    white: float = param(0.2, "share", "Fraction of white pixels in the median frame above which it is reported")
+    black: float = param(0.3, "share", "Fraction of black pixels in the median frame above which it is reported")
+    flicker: float = param(0.25, "share", "Fraction of steps between frames with flicker above which it is reported")
+    path_m: float = param(0.15, "m", "Minimum length of the camera path")
+    sides: float = param(0.15, "share", "Minimum fraction of the surface seen from three sides")
+    held_m: tuple[float, float] = param((0.7, 2.2), "m", "Range of plausible median camera heights above the floor")
+    worktop_m: float = param(0.9, "m", "Typical height of a worktop", source="0.85 to 0.95 m")
+    usual_m: tuple[float, float] = param((0.68, 0.98), "m", "Range of heights of tables and worktops, including scan error")
+    furniture_m: tuple[float, float] = param(
+        (0.5, 1.4), "m", "Range of heights searched for a worktop, above seats and below shelves"
+    )
 
 
 class _Share(NamedTuple):
-    """A figure that counts something bad, and what is said from a limit on (a field of Params)."""
+    """A measure of a defect, with the remark made above a limit (a field of Params)."""
 
     figure: str
     limit: str
@@ -81,7 +112,7 @@ def judge(
     registration: Registration | None,
     unit: Unit | None = None,
 ) -> tuple[Remark, ...]:
-    """Remarks, worst first; among equals, the cause before its symptoms. A gravity that is off comes before all of them."""
+    """Remarks, worst first; among equals, causes before symptoms. A remark on wrong gravity comes first."""
     params = tuned(Params)
     depth, recording = _depth(figures, unit), _recording(figures)
     if figures.depth_coverage < params.depth[0]:  # all else follows from that
@@ -174,7 +205,7 @@ def _conventions(
 
 
 def _unregistered(found: Registration) -> Remark:
-    """Unusable only from where masks suffer: depth's own pixels are 2.5 px of 640 on a phone."""
+    """Remark on unregistered depth, unusable only where masks suffer: a phone's depth pixel is 2.5 px of 640."""
     verdict: Verdict = "unusable" if found.off_px > tuned(Params).masks_px else "usable with care"
     if found.focal_only:
         text = f"the colour camera's focal length is off by {abs(1 / found.focal_factor - 1):.0%}"
@@ -231,14 +262,14 @@ def _tracking(figures: CaptureFigures, *, explained: bool) -> list[Remark]:
 
 
 def _may_be_drift(scale: Finding, figures: CaptureFigures) -> bool:
-    """Whether a phone's drift of some centimetres looks like this scale: a small one, in disagreement below sensor noise."""
+    """Whether drift of some centimetres can explain this scale: a small deviation, with disagreement below sensor noise."""
     if scale.factor is None or scale.error_given_mm is None:
         return False
     return abs(scale.factor - 1.0) < tuned(Params).drift_scale and scale.error_given_mm < _noise_mm(figures)
 
 
 def _noise_mm(figures: CaptureFigures) -> float:
-    """By how much good frames disagree: sensor noise grows with the square of the distance."""
+    """Expected disagreement of good frames in mm: sensor noise grows with the square of the distance."""
     least, more = tuned(Params).noise_mm
     return least + more * figures.median_depth_m**2
 
@@ -273,7 +304,7 @@ def _room(figures: CaptureFigures) -> list[Remark]:
 
 
 def _scale_by_furniture(figures: CaptureFigures) -> list[Remark]:
-    """A hint where the level surfaces stand as no worktop and no table does; it changes nothing."""
+    """A hint if no level surface has the height of a worktop or a table; it does not lower the verdict."""
     params = tuned(Params)
     heights = [z for z in figures.level_heights_m if params.furniture_m[0] < z < params.furniture_m[1]]
     if not heights or any(params.usual_m[0] <= z <= params.usual_m[1] for z in heights):

@@ -2,8 +2,8 @@
 
 The layout is that of the authors' own loader (robot-learning-freiburg/artipoint, dataloader/arti4d.py): file names end in
 _<nanoseconds>, poses are of the tracked base in seconds, and a camera's is base * base_T_depth * depth_T_rgb. Depth is
-registered to colour. Some scenes were filmed with the camera upside down and their images turned back: a loader is told so;
-here it is seen from poses by which the room would hang from its floor. Pixel centres lie at integers.
+registered to colour. Some scenes were filmed with the camera upside down and their images turned back: that loader takes a
+flag for this; here it is detected from poses in which the images' up points down. Pixel centres lie at integers.
 """
 
 import csv
@@ -28,7 +28,7 @@ _ODOMETRY, _CALIBRATION = r"odom/[^/]+\.csv", r"[^/]*tf[^/]*\.json"
 _APART_S, _GAP_S = 0.05, 0.1  # a Kinect's frames are 33 ms apart, and its trackers' poses closer
 _COLUMNS = ("timestamp", "x", "y", "z", "qx", "qy", "qz", "qw")
 _TURNED_BACK = Rigid3(np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
-_HANGS = -0.5  # mean height of the images' up on world's: from here on they are upside down
+_HANGS = -0.5  # mean component of the images' up along the world's: below, they are upside down
 
 
 def open_arti4d(files: Files) -> Recording:
@@ -68,13 +68,13 @@ def open_arti4d(files: Files) -> Recording:
 
 
 def _stamped(files: Files, pattern: str) -> dict[float, str]:
-    """Files by their times, seconds."""
+    """Files by time, seconds."""
     matches = ((re.fullmatch(pattern, name), name) for name in files.names())
     return {_seconds(match.group(1)): name for match, name in matches if match}
 
 
 def _seconds(stamp: str) -> float:
-    """Ten digits are seconds, as of a Unix clock until the year 2286; the rest are their decimals."""
+    """Seconds of a time stamp: its first ten digits are whole Unix seconds (until the year 2286), the rest decimals."""
     return float(stamp) if "." in stamp else float(f"{stamp[:10]}.{stamp[10:]}")
 
 

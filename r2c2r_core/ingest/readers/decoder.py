@@ -1,11 +1,11 @@
 """FFmpeg in a process of its own: `python -m r2c2r_core.alone r2c2r_core.ingest.readers.decoder FD FILE [MEMBER]`.
 
-A damaged video can end the process that decodes it; here no other dies with it. The video is FILE, or member MEMBER of the zip
-FILE. What is asked and answered goes through the socket FD: once OPENED, then for each number of a frame (NUMBER) DECODED and,
-where there is one, the frame's pixels, RGB. Who asks need not trust what is answered: it is numbers only.
+A damaged video can crash the process that decodes it; the caller survives. The video is FILE, or member MEMBER of the zip
+FILE. The protocol on the socket FD: OPENED once, then for each requested frame number (NUMBER) DECODED and, if the frame
+exists, its RGB pixels. The caller need not trust the answers: they are numbers only.
 
-FFmpeg guesses a format from the content, and among its formats are lists of other files and descriptions of network streams,
-which it opens. So it is told to know no other format than MP4 (ISO 14496-12).
+FFmpeg guesses the format from the content, and some of its formats list other files or network streams, which it would open.
+It is therefore restricted to MP4 (ISO 14496-12).
 """
 
 import os
@@ -23,18 +23,18 @@ from typing import IO, Any, cast
 import cv2
 import numpy as np
 
-OPENED = struct.Struct("<?4sii")  # whether it is a video; its codec, width and height, of which 0 and below are unknown
+OPENED = struct.Struct("<?4sii")  # whether it is a video; its codec, width and height (0 and below: unknown)
 NUMBER = struct.Struct("<q")
-DECODED = struct.Struct("<qII")  # frames that could be counted so far, width and height of the one asked for: 0 without it
+DECODED = struct.Struct("<qII")  # frames counted so far; width and height of the requested frame, 0 if there is none
 
 _FORMATS = "mov,mp4,m4a,3gp,3g2,mj2"  # one demuxer of FFmpeg, under all its names
-# Read by OpenCV each time it opens a video, and only from here. Its tracks may not lie in other files either
+# Read by OpenCV each time it opens a video, and only from here. Tracks in other files are forbidden too
 os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = f"format_whitelist;{_FORMATS}|protocol_whitelist;none|enable_drefs;0"
 
 
 def main(arguments: list[str]) -> int:
-    """Answer until the socket is closed."""
-    for number in (signal.SIGINT, signal.SIGTERM):  # they reach the whole process group: who asks decides
+    """Answer requests until the socket is closed."""
+    for number in (signal.SIGINT, signal.SIGTERM):  # they reach the whole process group: the caller decides
         signal.signal(number, signal.SIG_IGN)
     os.rmdir(os.getcwd())  # the empty folder: nothing is left of it whatever ends this process
     descriptor, *place = arguments
@@ -50,7 +50,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _asked(channel: socket.socket) -> "SimpleQueue[int]":
-    """The numbers asked for. When nobody can ask any more this process ends, even in the middle of a frame."""
+    """Queue of requested frame numbers. The process exits when the socket closes, even in the middle of a frame."""
     numbers: SimpleQueue[int] = SimpleQueue()
 
     def listen() -> None:
@@ -72,19 +72,19 @@ def _opened(file: str, member: str | None = None) -> Iterator[IO[bytes]]:
 
 
 class _Film:
-    """A video, decoded from front to back; going back starts it anew."""
+    """A video decoded sequentially; seeking backwards restarts it."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
         self._restart()
 
     def opened(self) -> bytes:
-        """OPENED."""
+        """The packed OPENED message."""
         codec, width, height = (int(self._capture.get(p)) for p in _ABOUT)
         return OPENED.pack(self._capture.isOpened(), (codec & 0xFFFFFFFF).to_bytes(4, "little"), width, height)
 
     def frame(self, number: int) -> tuple[bytes, np.ndarray | None]:
-        """DECODED and the frame of that number, as the sensor saw it (a rotation mark is not obeyed)."""
+        """The packed DECODED message and the frame of that number, in sensor orientation (a rotation tag is ignored)."""
         if number < self._next - 1:
             self._restart()
         while self._next <= number:
@@ -99,7 +99,7 @@ class _Film:
 
     def _restart(self) -> None:
         self._stream.seek(0)
-        # Never by path: a file in a zip has none. Any io.BufferedIOBase serves, which OpenCV's stubs do not say
+        # Never by path: a file in a zip has none. Any io.BufferedIOBase works, which OpenCV's stubs do not declare
         self._capture = cv2.VideoCapture(cast(Any, self._stream), cv2.CAP_FFMPEG, [])
         self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
         self._next = 0

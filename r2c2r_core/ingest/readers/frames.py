@@ -1,4 +1,4 @@
-"""Frames put together from what a folder holds under each number: colour, depth, confidence, pose; nothing goes by position."""
+"""Frames joined by number from a folder's colour, depth, confidence and pose files; nothing is matched by position."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,7 +13,7 @@ from r2c2r_core.ingest.readers.texts import read_pose
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Found:
-    """What a recording holds, by frame number."""
+    """The files, poses and times of a recording, by frame number."""
 
     colour: Mapping[int, str]
     depth: Mapping[int, str]
@@ -25,9 +25,9 @@ class Found:
 def joined_frames(
     files: Files, found: Found, rgb_camera: Callable[[int], Intrinsics], depth_camera: Callable[[int], Intrinsics]
 ) -> tuple[tuple[RawFrame, ...], list[str]]:
-    """The frames that have colour, depth and a pose, and what to tell about the others; raises CaptureError.
+    """The frames that have colour, depth and a pose, and notices about the others; raises CaptureError.
 
-    In a recording without any pose that can be used, all frames are without one: ingest tracks them.
+    If the recording has no usable pose at all, its frames come without poses, and ingest estimates them.
     """
     notices = []
     if found.poses and not any(pose is not None for pose in found.poses.values()):

@@ -22,7 +22,7 @@ _FORMATS = ("JPEG", "PNG")  # what phones and data sets write
 def image_size(content: bytes, name: str) -> tuple[int, int]:
     """(width, height) from the header of a JPEG or PNG, without decoding it; raises UnreadableFrame.
 
-    Asked before any decoder sees the content: Pillow and OpenCV know some fifty formats, and Pillow runs Ghostscript for one.
+    Checked before any decoder sees the content: Pillow and OpenCV know some fifty formats, and Pillow runs Ghostscript for one.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -52,7 +52,7 @@ def depth_file(
 ) -> RawDepth:
     """Depth of a 16-bit PNG or .npy, and confidence 0..2 of an 8-bit PNG where the frame has it. Raises UnreadableFrame.
 
-    `confidence_levels` are the file's least values that mean medium and high.
+    `confidence_levels` are the file's minimum values for medium and high confidence.
     """
     size = (frame.depth_camera.width, frame.depth_camera.height)
     stored = _decode_depth(files.read(frame.depth_name), frame.depth_name, size)
@@ -89,7 +89,7 @@ def decode_png(content: bytes, name: str, dtype: np.dtype, size: tuple[int, int]
 
 
 def colour_pixels(colour: Colour, name: str) -> Image:
-    """RGB pixels (h, w, 3), as stored: an EXIF rotation is not obeyed. Raises UnreadableFrame."""
+    """RGB pixels (h, w, 3), as stored: EXIF rotation is ignored. Raises UnreadableFrame."""
     if not isinstance(colour, bytes):
         return colour
     image_size(colour, name)
@@ -100,7 +100,7 @@ def colour_pixels(colour: Colour, name: str) -> Image:
 
 
 def numbered(names: Iterable[str], pattern: str, *, below: int = MOST_FRAMES) -> dict[int, str]:
-    """File names by the number that `pattern`'s first group finds in them; one that is not `below` is no frame's."""
+    """File names by the number in `pattern`'s first group; numbers not `below` the limit are skipped."""
     longest = len(str(below))
     found: dict[int, str] = {}
     for name in sorted(names):

@@ -1,4 +1,4 @@
-"""Lens distortion taken out of images, so that everything after a reader may believe in pinholes."""
+"""Removal of lens distortion, so that all later stages can assume pinhole cameras."""
 
 from functools import lru_cache
 
@@ -12,7 +12,7 @@ Lens = tuple[float, float, float, float, float]
 
 
 def undistorted(image: np.ndarray, camera: Intrinsics, lens: Lens, *, nearest: bool) -> np.ndarray:
-    """What the same camera would see through a pinhole; depth must not be mixed (`nearest`). Unseen pixels become 0."""
+    """The undistorted image of the same camera; use `nearest` for depth, to avoid mixing. Unseen pixels become 0."""
     across, down = _maps(camera, lens)
     return np.asarray(cv2.remap(image, across, down, cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR))
 

@@ -1,4 +1,4 @@
-"""LZFSE data: how large it unpacks, known before unpacking, so that a small file cannot fill the memory.
+"""LZFSE decompression with the unpacked size checked beforehand, so that a small file cannot exhaust memory.
 
 A stream is a run of blocks, each with its magic and its unpacked size (little-endian uint32); `bvx$` ends it
 (lzfse_internal.h).
@@ -13,7 +13,7 @@ _BLOCKS = (b"bvx2", b"bvxn", b"bvx-")
 
 
 def unpacked_size(content: bytes, name: str) -> int:
-    """Bytes that `content` unpacks to; its own length where it is not LZFSE. Raises UnreadableFrame when it is cut off."""
+    """Unpacked size of `content` in bytes; its own length if it is not LZFSE. Raises UnreadableFrame when it is cut off."""
     if content[:4] not in (*_BLOCKS, _END):
         return len(content)  # some writers store it raw
     total, at = 0, 0
@@ -29,7 +29,7 @@ def unpacked_size(content: bytes, name: str) -> int:
 
 
 def unpacked(content: bytes, name: str) -> bytes:
-    """The unpacked data; the content itself where it is not LZFSE. Ask `unpacked_size` first."""
+    """The unpacked data; the content itself if it is not LZFSE. Check `unpacked_size` first."""
     import lzfse
 
     if content[:4] not in _BLOCKS:

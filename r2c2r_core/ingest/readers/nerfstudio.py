@@ -1,7 +1,7 @@
 """nerfstudio and NeRFCapture: transforms.json with depth_file_path or depth_path; OpenGL camera-to-world, world z up.
 
 fl_x, fl_y, cx, cy, w, h stand once or in every frame; depth is a 16-bit PNG or .npy in steps of depth_unit_scale_factor or
-integer_depth_scale (1 mm unless said), 0 unknown, of the colour image's view; black in mask_path means ignore. cx and cy count
+integer_depth_scale (default 1 mm), 0 unknown, of the colour image's view; black in mask_path means ignore. cx and cy count
 from the corner of the first pixel, as ours do. k1, k2, p1, p2, k3 are taken out here. (nerfstudio,
 docs/quickstart/data_conventions.md.)
 """
@@ -49,7 +49,7 @@ def open_nerfstudio(files: Files) -> Recording:
     lenses = {number: lens for number, setting in settings.items() if any(lens := _lens(setting))}
     found = Found(colour=colour, depth=depth, poses={number: _pose(entry) for number, entry in entries.items()})
     frames, notices = joined_frames(files, found, cameras.__getitem__, lambda n: cameras[n].resized(*depth_size))
-    # COLMAP's world has any direction; what its images were called tells that it came from there
+    # COLMAP's world has an arbitrary orientation; a frame's colmap_im_id shows that it came from there
     upright = not any("colmap_im_id" in entry for entry in entries.values())
     return Recording(
         format="nerfstudio transforms.json",
@@ -64,7 +64,7 @@ def open_nerfstudio(files: Files) -> Recording:
 
 
 def _entries(files: Files, document: dict[str, Any]) -> dict[int, dict[str, Any]]:
-    """The frames by number: the last number in their file's name where that tells them apart, else their rank."""
+    """The frames by number: the last number in their file's name if it is unique, else their rank."""
     listed = document.get("frames")
     if not isinstance(listed, list) or not all(isinstance(e, dict) and isinstance(e.get("file_path"), str) for e in listed):
         raise CaptureError(
@@ -82,7 +82,7 @@ def _entries(files: Files, document: dict[str, Any]) -> dict[int, dict[str, Any]
 
 
 def _named(files: Files, entries: Mapping[int, dict[str, Any]], key: str) -> dict[int, str]:
-    """The existing files that the frames name under `key`; older files leave the ending out."""
+    """The existing files that the frames name under `key`; older exports omit the extension."""
     names, found = files.names(), {}
     for number, entry in entries.items():
         if isinstance(path := entry.get(key), str):

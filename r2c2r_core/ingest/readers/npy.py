@@ -11,7 +11,7 @@ SUFFIX = ".npy"
 
 
 def read_array(content: bytes, name: str, max_pixels: int) -> np.ndarray:
-    """A (h, w) array of numbers from a .npy file, its header believed only when the bytes are there; raises UnreadableFrame."""
+    """A (h, w) numeric array from a .npy file, with its size checked before loading; raises UnreadableFrame."""
     stream = io.BytesIO(content)
     try:
         version = np.lib.format.read_magic(stream)
@@ -22,7 +22,7 @@ def read_array(content: bytes, name: str, max_pixels: int) -> np.ndarray:
         if len(shape) != 2 or min(shape) < 1 or shape[0] * shape[1] > max_pixels or dtype.kind not in "fiu":
             raise ValueError(f"{dtype} of shape {shape}")
         return np.load(io.BytesIO(content), allow_pickle=False).reshape(shape)
-    # the header is a Python literal, and numpy lets through whatever its parser raises
+    # the header is a Python literal, and numpy does not catch the errors of its parser
     except (
         ValueError,
         EOFError,

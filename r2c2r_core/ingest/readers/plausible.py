@@ -1,4 +1,4 @@
-"""What no phone records: cameras and places that only a damaged or foreign file can hold."""
+"""Plausibility checks of a recording's cameras and positions, against damaged or foreign files."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ _CENTRE_SHARE = (0.2, 0.8)  # of the image's width and height
 
 
 def plausible(recording: Recording) -> Recording:
-    """The recording without frames a kilometre away; raises CaptureError when its cameras cannot belong to its images."""
+    """The recording without frames a kilometre away; raises CaptureError when its cameras do not fit its images."""
     for frame in recording.frames:
         for camera in (frame.rgb_camera, frame.depth_camera):
             if not _is_plausible(camera):

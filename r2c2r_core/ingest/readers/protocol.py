@@ -1,4 +1,4 @@
-"""What every reader returns: an opened recording in our conventions, its pixels still in its own files."""
+"""The interface of all readers: an opened recording in our conventions, with its pixels still in its own files."""
 
 import re
 from collections.abc import Callable
@@ -47,7 +47,7 @@ class Recording:
     colour_of: Callable[[RawFrame], Colour]  # cheapest in the order of the frames; raises UnreadableFrame
     depth_of: Callable[[RawFrame], RawDepth]  # raises UnreadableFrame
     up_capture: Vector3 | None  # unit, in the recording's own world, when the file knows gravity
-    other_ups: tuple[Vector3, ...] = ()  # what the file's gravity may mean instead
+    other_ups: tuple[Vector3, ...] = ()  # alternative interpretations of the file's gravity
     notices: tuple[str, ...] = ()
     other_names: tuple[str, ...] = ()  # metadata files that are part of the recording's identity
 
@@ -63,7 +63,7 @@ class UnreadableFrame(Exception):
 
 
 class Part(NamedTuple):
-    """A file, or a kind of file, that makes a format what it is."""
+    """A file, or a kind of file, that identifies a format."""
 
     what: str  # as a person would write it: "rgbd/N.jpg"
     pattern: str  # of the whole name
@@ -83,9 +83,9 @@ class Reader:
 
     @property
     def expects(self) -> str:
-        """What a folder of this format holds."""
+        """Description of the files in a folder of this format."""
         return ", ".join(part.what for part in self.parts)
 
     def missing(self, names: frozenset[str]) -> tuple[str, ...]:
-        """The parts that no file stands for."""
+        """The parts without a matching file."""
         return tuple(part.what for part in self.parts if not part.is_in(names))

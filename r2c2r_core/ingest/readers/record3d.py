@@ -140,6 +140,8 @@ def _same_shape(found: tuple[int, int], expected: tuple[int, int], found_is: str
 
 READER = Reader(
     name="Record3D .r3d",
-    parts=(Part("metadata beside rgbd/N.jpg and N.depth", _METADATA),),  # without its frames it still is one, and says so
+    parts=(
+        Part("metadata beside rgbd/N.jpg and N.depth", _METADATA),
+    ),  # without its frames it is still recognised, to give a clear error
     open=open_record3d,
 )

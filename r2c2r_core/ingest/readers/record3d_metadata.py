@@ -22,7 +22,7 @@ _TOLERATED_WITHOUT_POSE = 0.02  # the last frames of a recording may lack theirs
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Record3DMetadata:
-    """What the metadata says, in our conventions."""
+    """Parsed Record3D metadata, in our conventions."""
 
     source: str
     width: int  # of the RGB images
@@ -33,7 +33,7 @@ class Record3DMetadata:
     timestamps_s: tuple[float, ...] | None
     fps: float | None
     up_capture: Vector3 | None
-    other_ups: tuple[Vector3, ...]  # what initPose may mean instead
+    other_ups: tuple[Vector3, ...]  # alternative interpretations of initPose
 
     def camera(self, number: int) -> Intrinsics:
         """The RGB camera of a frame."""
@@ -46,7 +46,7 @@ class Record3DMetadata:
         return number / self.fps if self.fps else None
 
     def posed(self, numbers: Iterable[int]) -> tuple[list[int], list[str]]:
-        """The frame numbers that have a pose, and what to tell about the others; raises CaptureError on a mismatch."""
+        """The frame numbers that have a pose, and notices about the others; raises CaptureError on a mismatch."""
         wanted = sorted(numbers)
         beyond = [n for n in wanted if n >= len(self.poses)]
         if len(beyond) > max(1, _TOLERATED_WITHOUT_POSE * len(wanted)):
@@ -113,10 +113,10 @@ def _pose(row: np.ndarray) -> Rigid3 | None:
 
 
 def _ups(metadata: dict[str, Any], poses: np.ndarray) -> tuple[Vector3, ...]:
-    """+y of ARKit's world in the recording's, by each reading of initPose in the wild; none for the older app.
+    """+y of ARKit's world in the recording's, for each known interpretation of initPose; empty for the older app.
 
-    Where initPose is no identity, it leads from the recording's world to ARKit's, or the poses have it in them already, or it
-    leads back.
+    If initPose is not the identity, it maps the recording's world to ARKit's, or is already included in the poses, or is the
+    inverse mapping.
     """
     from scipy.spatial.transform import Rotation
 

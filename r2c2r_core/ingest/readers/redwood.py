@@ -75,12 +75,12 @@ def _poses(files: Files, log: str) -> dict[int, Rigid3 | None]:
 
 
 def _starts_one_earlier(poses: Collection[int], images: Collection[int]) -> bool:
-    """Whether images count from 1 and poses from 0: every pose then has an image one number later, pose 0 none of its own."""
+    """Whether images are numbered from 1 and poses from 0, so that pose i belongs to image i + 1."""
     return bool(images and poses) and min(poses) == 0 and min(images) == 1 and max(poses) + 1 <= max(images)
 
 
 def _calibration(files: Files, size: tuple[int, int]) -> _Calibration:
-    """From a JSON in Open3D's form (intrinsic_matrix column-major, width, height), else a PrimeSense's."""
+    """Calibration from a JSON in Open3D's form (intrinsic_matrix column-major, width, height), else a PrimeSense's."""
     for name in sorted(n for n in files.names() if "/" not in n and n.endswith(".json")):
         document = read_json_object(files, name)
         matrix, width, height = (document.get(key) for key in ("intrinsic_matrix", "width", "height"))
@@ -96,7 +96,7 @@ def _calibration(files: Files, size: tuple[int, int]) -> _Calibration:
 
 
 def _units_per_metre(document: Mapping[str, Any]) -> float:
-    """What `depth_scale` says, in units a metre or metres a unit; millimetres where it says neither."""
+    """Depth units per metre from `depth_scale`, given in units per metre or metres per unit; millimetres by default."""
     said = document.get("depth_scale")
     if not isinstance(said, int | float) or not said > 0:
         return _MILLIMETRES

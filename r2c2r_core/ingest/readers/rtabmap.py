@@ -74,7 +74,7 @@ def open_rtabmap(files: Files) -> Recording:
 
 
 def _nodes(files: Files, name: str) -> dict[int, _Node]:
-    """The rows of a pose file by node; by rank where they have no number (format 10)."""
+    """The rows of a pose file by node number, or by rank where they have none (format 10)."""
     nodes = {}
     for rank, line in enumerate(lines_of(files, name)):
         row = read_numbers(line.encode())
@@ -90,7 +90,7 @@ def _nodes(files: Files, name: str) -> dict[int, _Node]:
 
 
 def _by_node(files: Files, pattern: str, nodes: dict[int, _Node]) -> dict[int, str]:
-    """Files by the node that they are named after: its number, else its time."""
+    """Files by the node in their name: its number, else its time."""
     found, times = {}, np.array([node.time_s for node in nodes.values()])
     for name in files.names():
         if not re.fullmatch(pattern, name):

@@ -40,7 +40,7 @@ def open_scannet(files: Files) -> Recording:
 
 
 def _colour_camera(files: Files, size: tuple[int, int]) -> tuple[Intrinsics, list[str]]:
-    """The colour camera, scaled where the images were made smaller and their calibration was left as it is."""
+    """The colour camera, scaled if the images were downscaled without updating their calibration."""
     camera = read_calibration(files, _INTRINSIC_COLOUR, size)
     if abs(camera.cx / camera.width - 0.5) < 0.15:
         return camera, []

@@ -55,7 +55,7 @@ def open_scannetpp(files: Files) -> Recording:
 
 
 def _entries(files: Files) -> dict[int, Mapping[str, Any]]:
-    """What the JSON says of each frame, by its number."""
+    """The JSON entries of the frames, by frame number."""
     named = ((re.fullmatch(r"frame_(\d{1,8})", key), value) for key, value in read_json_object(files, _CAMERAS).items())
     numbers = ((int(match.group(1)), value) for match, value in named if match and isinstance(value, dict))
     return {number: value for number, value in numbers if number < MOST_FRAMES}

@@ -52,7 +52,7 @@ _BRING = (
     "bring colour, depth and poses: an .r3d of Record3D, a Stray Scanner folder, Polycam's Raw data or 3D Scanner App's "
     "All data; docs/recordings.md names every format"
 )
-_DEEPEST, _WIDEST = 6, 50  # folders that are looked into
+_DEEPEST, _WIDEST = 6, 50  # folders searched
 
 
 def readers() -> tuple[Reader, ...]:
@@ -61,7 +61,7 @@ def readers() -> tuple[Reader, ...]:
 
 
 def open_recording(source: Path) -> Recording:
-    """The recording at `source`, its format recognised from what it holds; raises CaptureError."""
+    """The recording at `source`, with its format recognised from its files; raises CaptureError."""
     if source.is_file():
         refuse_foreign(source)
     files = open_files(source)
@@ -89,7 +89,7 @@ def _reader_of(root: Files) -> Reader | None:
 
 
 def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
-    """What was found, and the formats that it is nearest to with what each of them lacks."""
+    """The error for an unknown format: the files found, and the nearest formats with their missing parts."""
     nearest = _nearest(roots)
     archives = sorted(name for name in files.names() if name.endswith((".r3d", ".zip")))
     if not nearest and archives:
@@ -111,7 +111,7 @@ def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
 
 
 def _roots(files: Files) -> tuple[list[Files], dict[str, Files]]:
-    """The top and on down to the first fork (a zip of a folder has that on top), and the folders below the fork by name."""
+    """The top folder and its only subfolders down to the first with several, and the subfolders there by name."""
     outer: list[Files] = [files]
     while len(folders := top_folders(outer[-1])) == 1 and len(outer) < _DEEPEST:
         outer.append(WithAbove(SubFiles(outer[-1], folders[0]), outer[-1]))
@@ -119,7 +119,7 @@ def _roots(files: Files) -> tuple[list[Files], dict[str, Files]]:
 
 
 def _nearest(roots: list[Files]) -> list[tuple[Reader, tuple[str, ...]]]:
-    """The two formats that lack the smallest share of their parts, of those of which at least half are there."""
+    """The two formats with the smallest fraction of missing parts, among those with at least half present."""
     misses = [(reader, reader.missing(root.names())) for root in roots for reader in readers()]
     misses = [(reader, missing) for reader, missing in misses if len(missing) <= len(reader.parts) / 2]
     misses.sort(key=lambda miss: (len(miss[1]) / len(miss[0].parts), -len(miss[0].parts)))

@@ -1,4 +1,4 @@
-"""Clocks: a camera's path and files with times of their own, asked at the times of images."""
+"""Time association of poses and files with images: interpolation and nearest neighbour."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -29,7 +29,7 @@ class Trajectory(NamedTuple):
             return self.poses[nearest]
         a, b = self.poses[after - 1], self.poses[after]
         if not (np.isfinite(a.matrix).all() and np.isfinite(b.matrix).all()):
-            return self.poses[nearest]  # told as a pose that is none, where frames are joined
+            return self.poses[nearest]  # an unusable pose is reported where frames are joined
         start_s, end_s = self.times_s[after - 1 : after + 1]
         share = (time_s - start_s) / (end_s - start_s)
         turn = Slerp([0.0, 1.0], Rotation.from_matrix(np.stack([a.rotation, b.rotation])))(share)

@@ -80,7 +80,7 @@ class _Placed(NamedTuple):
 
 
 def _placed(files: Files, pose_name: str, times_s: dict[int, float], rgb_lines: int) -> _Placed:
-    """A pose for each image, by clock; by line where the clocks have nothing in common and the lines are as many."""
+    """A pose for each image, by time; by line if the clocks do not overlap and the line counts are equal."""
     posed, pose_lines = _timed_poses(files, pose_name)
     by_time = sorted(posed.values(), key=lambda timed: timed[0])
     trajectory = Trajectory(np.array([time_s for time_s, _ in by_time]), [pose for _, pose in by_time])
@@ -100,7 +100,7 @@ def _placed(files: Files, pose_name: str, times_s: dict[int, float], rgb_lines: 
 
 
 def _timed_poses(files: Files, name: str) -> tuple[dict[int, tuple[float, Rigid3]], int]:
-    """(time, pose) by line `t x y z qx qy qz qw`, unusable ones left out, and how many lines there are."""
+    """(time, pose) by line `t x y z qx qy qz qw`, without unusable ones, and the number of lines."""
     posed, lines = {}, lines_of(files, name)
     for number, line in enumerate(lines):
         row = read_numbers(line.encode())
@@ -116,12 +116,12 @@ _Listed = list[tuple[float, str]]  # time, file
 
 
 class _Lists(NamedTuple):
-    colour: tuple[str, _Listed]  # the list's own name, and what stands in it
+    colour: tuple[str, _Listed]  # the list's name and its entries
     depth: tuple[str, _Listed]
 
 
 def _lists(files: Files) -> _Lists:
-    """From rgb.txt and depth.txt, else from the columns of an associations file: a file below depth/ is depth."""
+    """Lists from rgb.txt and depth.txt, else from the columns of an associations file, where a file below depth/ is depth."""
     if {"rgb.txt", "depth.txt"} <= files.names():
         colour, depth = (_columns(files, name, 1) for name in ("rgb.txt", "depth.txt"))
         return _Lists(("rgb.txt", [row[0] for row in colour]), ("depth.txt", [row[0] for row in depth]))
@@ -144,7 +144,7 @@ def _columns(files: Files, name: str, count: int) -> list[_Listed]:
 
 
 def _present(files: Files, name: str, images: _Listed) -> tuple[dict[int, tuple[float, str]], int]:
-    """(time, file) by line, of the files that exist, and how many lines there are."""
+    """(time, file) by line, of the files that exist, and the number of lines."""
     present = {n: (time_s, image) for n, (time_s, image) in enumerate(images) if image in files.names()}
     if not present:
         found = f"none of the {len(images)} files it names exist" if images else "it names no file"
@@ -153,10 +153,10 @@ def _present(files: Files, name: str, images: _Listed) -> tuple[dict[int, tuple[
 
 
 def _calibration(files: Files) -> _Calibration:
-    """From a settings file beside the images, else from the sequence's name, else the generic Kinect's, with a notice.
+    """Calibration from a settings file beside the images, else from the sequence's name, else the generic Kinect's.
 
-    The sequence is named in the comments that head its lists (`# file: 'rgbd_dataset_freiburg1_rpy.bag'`), often in its
-    folder's name as well; folders are renamed, so the lists are asked first.
+    The last comes with a notice. The sequence is named in the comments at the head of its lists (`# file:
+    'rgbd_dataset_freiburg1_rpy.bag'`), often in its folder's name as well; folders are renamed, so the lists are tried first.
     """
     for name in sorted(n for n in files.names() if "/" not in n and n.endswith((".yaml", ".yml"))):
         text = files.read(name).decode("utf-8", errors="replace")

@@ -1,7 +1,6 @@
-"""Frames of a video, decoded once from front to back: a film cannot be entered anywhere without decoding what precedes it.
+"""Sequential decoding of video frames, since a frame cannot be decoded without those before it.
 
-FFmpeg never runs in this process, but in one of its own that a damaged video may end (decoder.py); it is given MP4 only (ISO
-14496-12).
+FFmpeg runs in a separate process, which a damaged video may crash (decoder.py); it is given MP4 only (ISO 14496-12).
 """
 
 import signal
@@ -28,7 +27,7 @@ _DECODER = (sys.executable, "-m", "r2c2r_core.alone", "r2c2r_core.ingest.readers
 
 
 class Video:
-    """A video among a recording's files, in the order of its frames; going back starts it anew."""
+    """A video among a recording's files, read in frame order; seeking backwards restarts it."""
 
     def __init__(self, files: Files, name: str) -> None:
         """Raises CaptureError when its first frame cannot be decoded."""
@@ -52,11 +51,11 @@ class Video:
             ) from problem
 
     def frame(self, number: int) -> Image:
-        """The frame of that number, RGB, as the sensor saw it (a rotation mark is not obeyed).
+        """The frame of that number, RGB, in sensor orientation (a rotation tag is ignored).
 
-        Raises UnreadableFrame, and CaptureError when the decoder died of the video.
+        Raises UnreadableFrame, and CaptureError when the video crashed the decoder.
         """
-        with suppress(OSError):  # of one that died: so will the answer say
+        with suppress(OSError):  # a crashed decoder: reading the answer reports it
             self._channel.sendall(NUMBER.pack(number))
         known, width, height = self._answer(DECODED)
         if width * height > MAX_PIXELS:
@@ -78,7 +77,7 @@ class Video:
         return shape.unpack(said)
 
     def _receive(self, into: memoryview) -> None:
-        """Fill it with what the decoder says next; raises CaptureError when that has died."""
+        """Fill the buffer with the decoder's next bytes; raises CaptureError when it has crashed."""
         try:
             if self._answers.readinto(into) == len(into):
                 return
