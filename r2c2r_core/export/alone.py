@@ -1,4 +1,4 @@
-"""Everything left alone: how far anything moves, and how fast the scene runs."""
+"""Drift test: simulation of the scene at rest, measuring motion and speed."""
 
 import time
 from typing import Any, NamedTuple
@@ -10,11 +10,11 @@ from r2c2r_core.export.rules.table import finding
 from r2c2r_core.model.report import Finding
 
 REST_SECONDS = 5.0
-ALLOWED_DRIFT_M = 0.001  # a thing neither sinks, slides nor rolls
+ALLOWED_DRIFT_M = 0.001  # objects at rest neither sink, slide nor roll
 
 
 class Left(NamedTuple):
-    """What leaving a scene alone showed."""
+    """Result of simulating a scene at rest."""
 
     drift_m: dict[str, float]  # by body
     realtime_factor: float  # simulated seconds per second of one core
@@ -22,14 +22,14 @@ class Left(NamedTuple):
 
 
 def leave_alone(model: Any) -> Left:
-    """Simulate REST_SECONDS with nobody touching anything."""
+    """Simulate REST_SECONDS without external forces."""
     import mujoco
 
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     start = data.geom_xpos.copy()
     moved = np.zeros(model.ngeom)
-    started = time.thread_time()  # of this core: another process's work is no fault of the scene
+    started = time.thread_time()  # CPU time of this thread: load by other processes must not count
     for step in range(int(REST_SECONDS / model.opt.timestep)):
         mujoco.mj_step(model, data)
         if step % 50 == 49:

@@ -1,4 +1,4 @@
-"""Bundles as zips: the same bytes for the same content, written whole or not at all, and read with suspicion."""
+"""Bundles as zips: reproducible bytes, atomic writes, and validated unpacking."""
 
 import contextlib
 import os
@@ -18,7 +18,7 @@ from r2c2r_core.export.rules.files import is_inside
 MOST_MEMBERS = 20_000
 MOST_BYTES = 4 * 1024**3
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can say
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a zip can store
 _PACKED = {".png", ".jpg"}
 _CHUNK = 1 << 20
 
@@ -36,7 +36,7 @@ def write_zip(folder: Path, path: Path) -> None:
 
 @contextlib.contextmanager
 def opened_bundle(path: Path) -> Iterator[Path]:
-    """The folder of a bundle: itself, or a zip unpacked to a temporary place; raises BundleError on anything else."""
+    """Folder of a bundle: itself, or a zip unpacked to a temporary folder; raises BundleError on anything else."""
     if path.is_dir():
         _refuse_pipes(path)
         yield _top(path, path)
@@ -50,14 +50,14 @@ def opened_bundle(path: Path) -> Iterator[Path]:
 
 
 def _refuse_pipes(folder: Path) -> None:
-    """Raise BundleError for what is neither a file, a folder nor a link to one: whoever reads a pipe waits for ever."""
+    """Raise BundleError for anything but files, folders and links to them: reading a pipe blocks for ever."""
     for path in folder.rglob("*"):
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise BundleError(f"{path}: {kind_of_file(path.stat().st_mode)}", hint="a bundle holds files and folders only")
 
 
 def unpack(path: Path, folder: Path) -> None:
-    """Unpack a zip whose members all lie inside it and are plain files within sane sizes; raises BundleError otherwise."""
+    """Unpack a zip of plain files of sane sizes with paths inside `folder`; raises BundleError otherwise."""
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
@@ -73,7 +73,7 @@ def unpack(path: Path, folder: Path) -> None:
 
 @contextlib.contextmanager
 def building_folder(destination: Path) -> Iterator[Path]:
-    """A folder to build in, beside the destination (a rename must not cross disks), gone afterwards whatever happens."""
+    """A temporary folder beside the destination (a rename must not cross disks), always removed afterwards."""
     with explained_io(destination):
         destination.parent.mkdir(parents=True, exist_ok=True)
         scratch = Path(tempfile.mkdtemp(prefix=f".{destination.name}.", suffix=".tmp", dir=destination.parent))
@@ -85,7 +85,7 @@ def building_folder(destination: Path) -> Iterator[Path]:
 
 
 def replace_folder(source: Path, destination: Path) -> None:
-    """Put a folder where another may be, by renames alone."""
+    """Replace a folder by another, using renames only."""
     old = destination.with_name(f".{destination.name}.{os.getpid()}.old")
     if destination.exists():
         destination.rename(old)
@@ -108,7 +108,7 @@ def _refuse_foreign_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
 
 
 def _extract(archive: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path, budget: int, path: Path) -> int:
-    """Unpack one member, counting real bytes (its header may lie); the checksum is verified at its end."""
+    """Unpack one member, counting actual bytes, as its header may be wrong; the checksum is verified at the end."""
     target = folder / member.filename
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
-"""Each object as an asset of its own: origin in the middle of its foot, front at -y, closed, with nothing of the room in it.
+"""Each object as a separate asset: origin at the centre of its base, front at -y, closed, without the rest of the scene.
 
-An asset's files lie in `assets/<object>/` and name the meshes of the bundle, so that no texture is stored twice.
+An asset's files lie in `assets/<object>/` and refer to the meshes of the bundle, so that no texture is stored twice.
 """
 
 from collections.abc import Iterator
@@ -25,13 +25,13 @@ def object_names(plan: Plan) -> tuple[str, ...]:
 
 
 def assets_of(plan: Plan) -> Iterator[Plan]:
-    """A plan for each object, named as it is; its world is the asset's frame, its files are named from the asset's folder."""
+    """A plan for each object, with its name; its world is the asset's frame, its paths are relative to the asset's folder."""
     for name in object_names(plan):
         yield _asset(plan, name)
 
 
 def world_from_asset(plan: Plan, object_name: str) -> Rigid3:
-    """Where an asset stands in the scene: the object's frame, lowered to its lowest collider."""
+    """Pose of an asset in the scene: the object's frame, lowered to its lowest collider."""
     bodies = plan.of(object_name)
     world_from_object = bodies[0].world_from_body @ bodies[0].link.object_from_link.inverse
     points = [world_from_object.inverse.apply(corners) for body in bodies for corners in collider_corners_world(body)]

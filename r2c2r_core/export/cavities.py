@@ -1,4 +1,4 @@
-"""How much of what a joint opens is really free: a door before a solid block opens onto nothing."""
+"""Free fraction of the cavity behind a door or drawer, to detect doors in front of solid colliders."""
 
 from typing import Any, NamedTuple
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 
-_WALL_M = 0.03  # walls, fronts and floors of furniture and of ovens end within this of the outside
-_THICKEST_WALL_M = 0.08  # of a refrigerator; what is thicker stands inside
+_WALL_M = 0.03  # maximum thickness of walls, fronts and floors of furniture and ovens
+_THICKEST_WALL_M = 0.08  # of a refrigerator; anything thicker is inside the cavity
 _STEP_M = 0.02
 _LEAST_INSIDE_M = 0.06
 _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
@@ -21,10 +21,10 @@ class _Solid(NamedTuple):
 
 
 def cavity_open(model: Any, joint: str) -> float | None:
-    """Share (0..1) of the space behind a leaf that no collider fills; None where nothing is big enough to hold anything.
+    """Fraction (0..1) of the space behind a leaf that no collider fills; None if the space is too small to hold anything.
 
-    A hinge opens the body it hangs on, a slide carries its own tray. The leaf is the mover's front board: what stands
-    beside it, such as a microwave's electronics, is no part of the space it opens.
+    A hinge opens its parent body, a slide carries its own tray. The leaf is the moving body's front board: parts beside
+    it, such as a microwave's electronics, do not belong to the space it opens.
     """
     import mujoco
 
@@ -53,7 +53,7 @@ def cavity_open(model: Any, joint: str) -> float | None:
 
 
 def _between_walls(solids: list[Points]) -> tuple[Vector3, Vector3]:
-    """Low and high corner of the space inside: the bounds of all solids, less the plates that stand along them."""
+    """Low and high corner of the inner space: the bounds of all solids without the plates along them."""
     lows, highs = np.array([s.min(axis=0) for s in solids]), np.array([s.max(axis=0) for s in solids])
     thick = highs - lows
     low, high = lows.min(axis=0), highs.max(axis=0)
@@ -75,7 +75,7 @@ def _free_share(low: Vector3, high: Vector3, solids: list[_Solid]) -> float | No
 
 
 def _leaf(model: Any, data: Any, moving: int, outward_world: Vector3 | None) -> int | None:
-    """The collider of a moving body with the largest face; of a drawer, the largest seen from where it slides to."""
+    """The collider of a moving body with the largest face; for a drawer, the largest seen along its sliding direction."""
 
     def face(geom: int) -> float:
         size = model.geom_aabb[geom][3:]

@@ -1,4 +1,4 @@
-"""The certificate: lint, every loader that is installed, every joint swept and pushed, everything left alone."""
+"""The certificate: linter, every installed loader, sweep and push of every joint, and drift at rest."""
 
 import math
 from pathlib import Path
@@ -17,16 +17,16 @@ from r2c2r_core.model.report import Blocker, Certificate, ColliderFit, Finding, 
 from r2c2r_core.progress import SILENT, Progress
 
 CERTIFICATE_VERSION = 1
-FAR_COLLIDER_M = 0.02  # own choice: a grasp planned on what is drawn misses by as much
+FAR_COLLIDER_M = 0.02  # own choice: a grasp planned on the visual misses by as much
 
 _NOT_SIMULATED = Simulation()
 
 
 def certify(folder: Path, *, sapien_python: str | None = None, progress: Progress = SILENT) -> Certificate:
-    """Judge a bundle's folder; raises BundleError when it holds no readable scene.urdf.
+    """Test a bundle's folder; raises BundleError when it has no readable scene.urdf.
 
-    `sapien_python` is the interpreter of an environment of SAPIEN's own (it overwrites the headless OpenCV); None reads
-    R2C2R_SAPIEN_PYTHON. A loader that is not installed is reported as not tried.
+    `sapien_python` is the interpreter of a separate environment for SAPIEN (it overwrites the headless OpenCV); None
+    reads R2C2R_SAPIEN_PYTHON. A loader that is not installed is reported as not tried.
     """
     progress.at(0.0, "reading the bundle")
     findings = lint(folder)
@@ -111,7 +111,7 @@ def certificate_to_json(certificate: Certificate) -> dict[str, Any]:
 
 
 def blocker_to_json(blocker: Blocker) -> dict[str, Any]:
-    """What keeps a joint from opening, as JSON."""
+    """An obstacle of a joint as JSON."""
     return {"name": blocker.name, "kind": blocker.kind, "position": _number(blocker.position)}
 
 

@@ -1,4 +1,4 @@
-"""How far what an engine touches lies from what is drawn, both ways."""
+"""Symmetric surface distance between the colliders and the visual of each link."""
 
 import numpy as np
 
@@ -9,12 +9,12 @@ from r2c2r_core.export.rules.files import BundleFiles
 from r2c2r_core.geometry.meshes import box_mesh, distances_to_mesh, sample_surface
 from r2c2r_core.model.report import ColliderFit, Gap
 
-_SAMPLES = 4000  # on either surface of a link
-_SUNK_M = 1e-4  # in another collider: no engine meets such a point
+_SAMPLES = 4000  # on each surface of a link
+_SUNK_M = 1e-4  # depth in another collider at which a point cannot be touched
 
 
 def collider_fits(urdf: Urdf, files: BundleFiles) -> tuple[ColliderFit, ...]:
-    """Every link that has both a visual and a collider, in the order of the file."""
+    """Fit of every link with both a visual and a collider, in file order."""
     return tuple(fit for link in urdf.links if (fit := _fit(link, files)) is not None)
 
 
@@ -35,7 +35,7 @@ def _fit(link: UrdfLink, files: BundleFiles) -> ColliderFit | None:
 
 
 def _outermost(points: Points, colliders: list[UrdfShape], files: BundleFiles) -> Points:
-    """Points of colliders' surfaces that lie in no other collider."""
+    """Points on collider surfaces that are not inside another collider."""
     sunk = np.zeros(len(points), dtype=bool)
     for shape in colliders:
         sunk |= inside_hull(points, shape.link_from_shape.apply(shape_corners(shape.box_m, shape.mesh, files)), _SUNK_M)
@@ -43,7 +43,7 @@ def _outermost(points: Points, colliders: list[UrdfShape], files: BundleFiles) -
 
 
 def _surface(shapes: list[UrdfShape], files: BundleFiles) -> tuple[Points, Faces] | None:
-    """All shapes of a link as one mesh, in its frame; None where none can be read."""
+    """All shapes of a link as one mesh in its frame; None where none can be read."""
     vertices, faces, count = list[Points](), list[Faces](), 0
     for shape in shapes:
         own = _mesh(shape, files)

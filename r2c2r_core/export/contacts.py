@@ -22,9 +22,9 @@ class Touch:
 
 
 def touches(model: Any, positions: Mapping[str, float], scratch: Any | None = None) -> list[Touch]:
-    """Overlapping body pairs, deepest first, with the named joints at the positions and all others at zero.
+    """Overlapping body pairs, deepest first, with the named joints at the given positions and all others at zero.
 
-    `scratch` is an MjData of the model to work in: making one takes 20 times as long as looking for contacts.
+    `scratch` is an MjData of the model to reuse: creating one takes 20 times as long as finding contacts.
     """
     import mujoco
 
@@ -45,7 +45,7 @@ def touches(model: Any, positions: Mapping[str, float], scratch: Any | None = No
 
 
 def joint_names(model: Any) -> list[str]:
-    """Hinges and slides with a range to travel."""
+    """Names of hinges and slides with a non-empty range."""
     names = [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in (2, 3)]
     return [name for name in names if float(model.joint(name).range[1]) > float(model.joint(name).range[0])]
 
@@ -60,11 +60,11 @@ def movers_of(model: Any, joint: str) -> set[int]:
 
 
 def free_bodies(model: Any) -> set[int]:
-    """Bodies of things that stand freely."""
+    """Bodies of free-standing objects."""
     roots = {int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == 0}
     return {body for body in range(model.nbody) if int(model.body_rootid[body]) in roots}
 
 
 def body_name(model: Any, body: int) -> str:
-    """The body's name; the world is the floor."""
+    """The body's name; the world is called floor."""
     return "floor" if body == 0 else str(model.body(body).name)

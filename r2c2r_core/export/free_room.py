@@ -1,4 +1,4 @@
-"""How far something of a given section can move before it meets a collider: exact, for boxes and convex pieces."""
+"""Exact free travel of a rectangular cross-section among convex colliders, by linear programming."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from r2c2r_core.export.plan import Plan
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.scene import Box
 
-_SKIN_M = 2e-4  # what only touches is not met
+_SKIN_M = 2e-4  # mere contact does not count as collision
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,7 +32,7 @@ class Prism:
 
 
 def solids_of(plan: Plan) -> list[Solid]:
-    """Every collider, closed, and the floor."""
+    """All colliders with joints closed, and the floor."""
     solids = [_of_box(body.world_from_body @ box.link_from_box, box) for body in plan.bodies for box in body.link.boxes]
     solids += [_of_points(body.world_from_body.apply(p.vertices_link)) for body in plan.bodies for p in body.link.pieces]
     far = np.full(3, 1e3)
@@ -41,7 +41,7 @@ def solids_of(plan: Plan) -> list[Solid]:
 
 
 def free_length(prism: Prism, solids: Sequence[Solid]) -> float:
-    """Way in m before the moving rectangle meets one of the solids; its `length_m` where it meets none."""
+    """Distance in m until the moving rectangle meets a solid; its `length_m` where it meets none."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)], dtype=np.float64)
     swept = prism.world_from_prism.apply(corners * [*prism.half_m, prism.length_m])
     low, high = swept.min(axis=0), swept.max(axis=0)
@@ -50,7 +50,7 @@ def free_length(prism: Prism, solids: Sequence[Solid]) -> float:
 
 
 def _met_at(prism: Prism, solid: Solid) -> float:
-    """Lowest z of what prism and solid share: a linear programme of three unknowns."""
+    """Lowest z of the intersection of prism and solid: a linear programme in three unknowns."""
     from scipy.optimize import linprog
 
     normals = solid.planes[:, :3] @ prism.world_from_prism.rotation

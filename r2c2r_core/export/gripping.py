@@ -1,4 +1,4 @@
-"""Robots at a bundle's joints: the gripper in processes of its own, while the bundle is judged otherwise, and the arm."""
+"""Robot trials on a bundle's joints: the gripper in parallel processes beside the other tests, and the arm."""
 
 from collections.abc import Callable
 from itertools import zip_longest
@@ -16,10 +16,10 @@ _PROCESSES = 4  # at most: each compiles the scene, 0.3 GB, and a kitchen has a 
 
 
 def begin_gripping(folder: Path, pool: Pool, progress: Progress = SILENT) -> Callable[[], dict[str, Any] | None]:
-    """Begin at every joint and free thing of a bundle's scene.xml; sheets of pictures go to its gripper/.
+    """Start gripper trials on every joint and free object of a bundle's scene.xml; contact sheets go to its gripper/.
 
-    What is returned waits, and gives what the gripper did as JSON, or None where MuJoCo cannot load the scene. A pool of one
-    process starts none: all is done when it is waited for. The same comes out whatever the number of processes.
+    The returned function waits and returns the results as JSON, or None where MuJoCo cannot load the scene. With a pool of
+    one process, all trials run during that wait. The result does not depend on the number of processes.
     """
     scene, films = folder / SCENE, folder / "gripper"
     count = min(pool.workers, _PROCESSES)
@@ -31,7 +31,7 @@ def begin_gripping(folder: Path, pool: Pool, progress: Progress = SILENT) -> Cal
 
 
 def arm_tried(folder: Path, progress: Progress = SILENT) -> dict[str, Any]:
-    """What the arm did at a bundle's scene.xml as JSON, or `why` it was not tried; pictures and its map go to arm/."""
+    """Arm results on a bundle's scene.xml as JSON, or `why` it was not tried; pictures and its map go to arm/."""
     lost: dict[str, str] = {}
     with apart("export", "the arm", lost):
         return arm_to_json(certify_with_arm(folder / SCENE, folder / "arm", moving=False, progress=progress))
@@ -45,7 +45,7 @@ def _told(certified: Callable[[], GripperCertificate]) -> dict[str, Any] | None:
 
 
 def _joined(answers: dict[str, list[Grip] | Failed]) -> GripperCertificate:
-    """The shares in the order that one process would have tried them in."""
+    """The results merged in the order of a single process."""
     shares: list[list[Grip]] = []
     for first in range(len(answers)):
         answer = answers[str(first)]

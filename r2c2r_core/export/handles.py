@@ -1,7 +1,7 @@
-"""The handles of a scene as things: where each is, how a gripper takes it, and how much room there is for one.
+"""Handles of a scene: pose, grasp, and free space for a gripper.
 
-A piece of a handle is a box of the role `handle`; pieces that touch are one handle, and its grip is the piece farthest out. A
-front without any is pushed: a door at its free edge, a drawer in the middle of its front.
+A piece of a handle is a box of the role `handle`; touching pieces form one handle, and its grip is the piece farthest out. A
+front without a handle is pushed: a door at its free edge, a drawer in the middle of its front.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,13 +27,13 @@ _INSET_M = 0.03  # of a push from the free edge: a fingertip's width
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gripper:
-    """A parallel gripper, lengths in m: small for its kind, so that what it cannot reach few can."""
+    """A parallel gripper, lengths in m; small for its kind, so that few others reach more."""
 
     opening_m: float = 0.08  # Franka Hand and WSG-like strokes
     hand_m: tuple[float, float] = (0.04, 0.09)  # of the palm: along the grip, the way the fingers close
     finger_m: tuple[float, float, float] = (0.02, 0.005, 0.045)  # width, thickness, length before the palm
     hold_m: float = 0.02  # how deep the fingers reach over a grip
-    back_off_m: float = 0.1  # free way before a grip, to come from and to open along
+    back_off_m: float = 0.1  # free distance in front of a grip, for approach and opening
 
 
 GRIPPER = Gripper()
@@ -44,13 +44,13 @@ def with_handles(plan: Plan) -> Plan:
     solids = solids_of(plan)
     found: list[Handle] = []
     for body in plan.bodies:
-        with apart("export", f"{body.name}: its handles", {}):  # a front without a described handle still opens
+        with apart("export", f"{body.name}: its handles", {}):  # a front without a handle description still opens
             found += _handles(body, solids)
     return replace(plan, handles=tuple(found))
 
 
 def out_of_reach(kind: HandleKind, grasp_width_m: float, room: Room) -> str | None:
-    """Why the 9 cm gripper cannot take a handle, or None where it can."""
+    """Reason why the 9 cm gripper cannot grasp a handle, or None where it can."""
     hand = GRIPPER
     if room.before_m < hand.back_off_m:
         return f"{_mm(room.before_m)} mm are free before it, a hand needs {_mm(hand.back_off_m)} mm"
@@ -80,7 +80,7 @@ def _handles(body: Body, solids: Sequence[Solid]) -> Iterator[Handle]:
 
 
 def _grip(body: Body, joint: Joint, name: str, pieces: Sequence[Box], face: float, solids: Sequence[Solid]) -> Handle:
-    """The piece farthest out, its longest side across the approach as the handle's x; a square knob is closed on sideways."""
+    """Grasp at the piece farthest out, with its longest side across the approach as x; a square knob is grasped sideways."""
     corners = _corners(min(pieces, key=lambda box: float(_corners(box)[:, 1].min())))
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = high - low
@@ -105,7 +105,7 @@ def _grip(body: Body, joint: Joint, name: str, pieces: Sequence[Box], face: floa
 
 
 def _push(body: Body, joint: Joint, front: Box, solids: Sequence[Solid]) -> Handle:
-    """A fingertip's width inside the front's free edge, half way along it; the middle of what slides."""
+    """Push point a fingertip's width inside the front's free edge, half way along it; the middle of a sliding front."""
     corners = _corners(front)
     low, high = corners.min(axis=0), corners.max(axis=0)
     spot = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
@@ -132,13 +132,13 @@ def _push(body: Body, joint: Joint, front: Box, solids: Sequence[Solid]) -> Hand
 
 
 def _room_of(pose: Rigid3, size_m: Vector3, solids: Sequence[Solid]) -> Room:
-    """What a gripper that comes along z has round the grip."""
+    """Free space around the grip for a gripper approaching along z."""
     (wide, thick, long), outer, side = GRIPPER.finger_m, -size_m[2] / 2, size_m[1] / 2
     hold = GRIPPER.hold_m
     deep = [
         _free(pose, (0, sign * (side + 1e-3 + thick / 2), outer), _unit(2), (wide / 2, thick / 2), solids) for sign in (-1, 1)
     ]
-    over = max(min(*deep, hold) - 1e-3, 1e-3)  # the fingers stop where one meets something
+    over = max(min(*deep, hold) - 1e-3, 1e-3)  # the fingers stop at the first contact
     beside = [
         _free(pose, (0, sign * side, outer + over / 2), sign * _unit(1), (wide / 2, over / 2), solids) for sign in (-1, 1)
     ]
@@ -148,7 +148,7 @@ def _room_of(pose: Rigid3, size_m: Vector3, solids: Sequence[Solid]) -> Room:
 
 
 def _free(pose: Rigid3, start: object, way: Vector3, half_m: tuple[float, float], solids: Sequence[Solid]) -> float:
-    """Free way in m of a rectangle from `start` along `way`, both in the handle's frame; its first side lies along x."""
+    """Free travel in m of a rectangle from `start` along `way`, in the handle's frame; its first side is along x."""
     x = _unit(0)
     handle_from_prism = Rigid3(np.column_stack([x, np.cross(way, x), way]), np.asarray(start, dtype=np.float64))
     return free_length(Prism(world_from_prism=pose @ handle_from_prism, half_m=half_m, length_m=FAR_M), solids)
@@ -161,7 +161,7 @@ def _opening(body: Body, joint: Joint, spot: Vector3) -> Vector3:
 
 
 def _joined(boxes: Sequence[Box]) -> list[list[Box]]:
-    """Boxes that touch, together."""
+    """Groups of touching boxes."""
     groups: list[list[Box]] = []
     for box in boxes:
         met = [group for group in groups if any(_touch(box, other) for other in group)]

@@ -1,4 +1,4 @@
-"""What each part of a scene means, in the three taxonomies that every format of the bundle is labelled by."""
+"""Semantic labels of a scene's parts in three taxonomies, used by every format of the bundle."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -14,22 +14,22 @@ Disposition = Literal["openable", "graspable", "pushable"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Labels:
-    """Of one link or handle."""
+    """Semantic labels of one link or handle."""
 
-    category: str  # of its object, as the person wrote it
+    category: str  # of its object, as typed by the user
     part: Part
     disposition: tuple[Disposition, ...]  # what can be done to it
 
 
 def labels_of(body: Body) -> Labels:
-    """A link: a door turns, a drawer comes out of its front, a sliding door passes along it; all else is a body."""
+    """Labels of a link: door (hinged), drawer (slides out of its front), sliding door (along it), else body."""
     opens: tuple[Disposition, ...] = ("openable",) if body.joint is not None else ()
     held: tuple[Disposition, ...] = ("graspable",) if body.free else ()
     return Labels(category=body.category, part=_part(body), disposition=(*opens, *held))
 
 
 def labels_of_handle(handle: Handle, body: Body) -> Labels:
-    """A handle of the link `body`."""
+    """Labels of a handle of the link `body`."""
     return Labels(category=body.category, part="handle", disposition=("pushable" if handle.kind == "push" else "graspable",))
 
 

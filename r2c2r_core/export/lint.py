@@ -1,6 +1,6 @@
-"""The bundle's own linter: yourdfpy's `validate` finds 2 of the 27 defects of sim-ready.md, so every rule stands here.
+"""The bundle's linter, with all rules here, as yourdfpy's `validate` finds 2 of the 27 defects of sim-ready.md.
 
-It reads files and computes nothing in a simulator; `certify.py` does that.
+It only reads files; tests in a simulator are in `certify.py`.
 """
 
 from pathlib import Path

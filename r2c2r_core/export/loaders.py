@@ -1,6 +1,6 @@
-"""Every loader a reader of the bundle may use: does it load, and does it hold what scene.urdf says?
+"""Round-trip test of the bundle in every supported loader: does it load, with the values of scene.urdf?
 
-Each loader's probe answers with the same document, compared value by value (`readback.py`). One that is not installed is
+Each loader's probe returns the same document, compared value by value (`readback.py`). A loader that is not installed is
 `not tried`.
 """
 
@@ -30,13 +30,13 @@ _SECONDS = 180
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Apart:
-    """A loader that lives in a Python environment of its own."""
+    """A loader installed in a separate Python environment."""
 
-    variable: str  # of the environment, names that Python
-    module: str  # it must be able to import
+    variable: str  # environment variable with the path of that Python
+    module: str  # that it must be able to import
     reads: str
     probe: str
-    seconds: int = _SECONDS  # it may take
+    seconds: int = _SECONDS  # time limit
 
 
 APART = {
@@ -57,13 +57,13 @@ EVERY_LOADER = ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet", "USD",
 
 
 class _NotThereError(Exception):
-    """The loader is not installed; the message says how to get it."""
+    """The loader is not installed; the message explains how to get it."""
 
 
 def try_loaders(
     folder: Path, urdf: Urdf, sapien_python: str | None = None, *, progress: Progress = SILENT
 ) -> tuple[LoaderResult, ...]:
-    """One verdict a loader."""
+    """One result per loader."""
     expected = expected_readback(urdf)
     scene = folder / "scene.urdf"
     pythons = {name: os.environ.get(own.variable) for name, own in APART.items()}
@@ -92,7 +92,7 @@ def _verdict(name: str, attempt: Callable[[], dict[str, Any]], expected: Readbac
         found = readback_of(document)
     except _NotThereError as error:
         return LoaderResult(loader=name, state="not tried", detail=str(error))
-    except Exception as error:  # a loader may raise anything on a bundle it dislikes: that is its verdict
+    except Exception as error:  # a loader may raise anything on a bundle it rejects: that is its result
         return LoaderResult(loader=name, state="failed", detail=_one_line(_said(error)))
     lines = differences(expected, found)
     if lines:
@@ -102,7 +102,7 @@ def _verdict(name: str, attempt: Callable[[], dict[str, Any]], expected: Readbac
 
 
 def _agreed(found: Readback) -> str:
-    """What was compared, and what this loader has no place for."""
+    """Summary of the compared values, and of the joint values that this loader does not store."""
     total = sum(body.mass_kg for body in found.bodies.values())
     held = f"{found.version}: {len(found.joints)} joints, {len(found.bodies)} links, {total:.2f} kg read back and equal"
     lost = found.not_kept
@@ -133,7 +133,7 @@ def _pybullet(scene: Path) -> dict[str, Any]:
 
 
 def _apart(folder: Path, own: Apart, python: str | None) -> dict[str, Any]:
-    """What the loader's probe says in its own environment."""
+    """Output of the loader's probe, run in its own environment."""
     if not python:
         raise _NotThereError(f"no environment of its own given: set {own.variable} to its python")
     if not Path(python).is_file():
@@ -152,12 +152,12 @@ def _usd(scene: Path) -> dict[str, Any]:
         raise _NotThereError("not installed: pip install usd-core")
     if not scene.is_file():
         raise FileNotFoundError(f"{scene.name} is not in the bundle")
-    # Not in this process: its libraries ask for the GIL while they are loaded, and another thread that loads one holds it.
+    # Not in this process: its libraries take the GIL while loading, which another loading thread holds.
     return _probe([sys.executable, str(_PROBES / "usd.py")], scene)
 
 
 def _probe(command: list[str], scene: Path, seconds: int = _SECONDS) -> dict[str, Any]:
-    """Run a loader in a process and a folder of its own: it may crash, print, and write logs where it stands."""
+    """Run a loader in a separate process and folder, as it may crash, print, and write logs."""
     with tempfile.TemporaryDirectory() as scratch:
         answer = Path(scratch) / "answer.json"
         words = [*command, str(scene.resolve()), str(answer)]
@@ -173,7 +173,7 @@ def _probe(command: list[str], scene: Path, seconds: int = _SECONDS) -> dict[str
 def _said(error: Exception) -> str:
     try:
         return f"{type(error).__name__}: {error}"
-    except UnicodeDecodeError:  # USD quotes the file it dislikes, whatever its bytes
+    except UnicodeDecodeError:  # USD quotes the rejected file, including undecodable bytes
         return type(error).__name__
 
 

@@ -1,4 +1,4 @@
-"""What the frames show of the finished scene, each drawn once for all that ask."""
+"""Cached renderings of the finished scene from the recording's frames, beside the measured depth."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,39 +14,39 @@ from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.track import MaskTrack
 
-HIDDEN_M = 0.02  # a surface further behind the measured one is hidden by something that is not in the model
+HIDDEN_M = 0.02  # a surface further behind the measured one is occluded by something that is not in the model
 _SHARED_FRAMES = 40
-_SHOWS_SHARE = 0.25  # frames with less than this of the object's largest mask are not asked
+_SHOWS_SHARE = 0.25  # frames with less than this fraction of the object's largest mask are skipped
 
 
 class Look(NamedTuple):
-    """One frame: what the sensor measured, and what of the model shows, by depth pixel."""
+    """One frame's measured depth and rendered model, per depth pixel."""
 
     measured_m: np.ndarray
     known: Mask
     drawn_m: np.ndarray
-    bodies: np.ndarray  # number of the body that shows, 0: none
+    bodies: np.ndarray  # number of the visible body, 0: none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Looks:
-    """A recording's frames with the closed scene drawn into them."""
+    """A recording's frames with the closed scene rendered into them."""
 
     frames: Sequence[Frame]
-    shared: Sequence[Frame]  # spread over all of them: asked first
+    shared: Sequence[Frame]  # an evenly spread subset, used first
     soup: Soup
-    at: Callable[[Frame], Look]  # drawn when first asked for
+    at: Callable[[Frame], Look]  # rendered on first use
 
 
 def looks_of(capture: Capture, plan: Plan) -> Looks:
-    """The recording's frames beside the bundle's scene."""
+    """The recording's frames with renderings of the bundle's scene."""
     soup = scene_soup(plan, 0.0)
     at = lru_cache(maxsize=_SHARED_FRAMES)(lambda frame: _look(capture, frame, soup))
     return Looks(frames=capture.frames, shared=spread(capture.frames, _SHARED_FRAMES), soup=soup, at=at)
 
 
 def showing(frames: Sequence[Frame], track: MaskTrack) -> list[Frame]:
-    """Those of the frames that show an object large and closed."""
+    """The frames that show an object large and closed."""
     largest = max((mask.area_px for mask in track.masks.values()), default=0)
 
     def shows(frame: Frame) -> bool:

@@ -1,4 +1,4 @@
-"""manifest.json: where every number of the bundle comes from (schema 1)."""
+"""manifest.json: the provenance of every number of the bundle (schema 1)."""
 
 import math
 from collections.abc import Mapping
@@ -34,7 +34,7 @@ def manifest_of(
     fits: Mapping[str, ScanFit] | None = None,
     seen: Mapping[str, Seen] | None = None,
 ) -> dict[str, Any]:
-    """The manifest as a JSON document; `created` is an ISO 8601 time or None where nobody gave one."""
+    """The manifest as a JSON document; `created` is an ISO 8601 time, or None if not given."""
     capture = reconstruction.capture
     return {
         "schema": SCHEMA,
@@ -64,7 +64,7 @@ def manifest_of(
 
 
 def with_blockers(manifest: dict[str, Any], plan: Plan, joints: tuple[JointResult, ...]) -> dict[str, Any]:
-    """The manifest with what the sweeps found in each joint's way; loose things by their object's name."""
+    """The manifest with the obstacles that the sweeps found for each joint; free objects by name."""
     owners = {body.name: body.object_name for body in plan.bodies}
     found = {
         result.joint: [
@@ -241,7 +241,7 @@ def _spread_entry(spread: Spread | None) -> dict[str, Any] | None:
 def _warnings(
     item: SceneObject, track: MaskTrack | None, placement: Placement | None, candidates: CandidateSet | None
 ) -> tuple[str, ...]:
-    """What every stage said about the object, each line once, in the order of the stages."""
+    """Warnings of all stages about the object, without duplicates, in stage order."""
     chosen = candidates.chosen.warnings if candidates is not None else ()
     lines = [
         *(track.warnings if track else ()),
@@ -253,7 +253,7 @@ def _warnings(
 
 
 def _plain(value: Any) -> Any:
-    """JSON values; numbers with nine digits after the point, what is not finite as null."""
+    """JSON values; numbers rounded to nine decimals, non-finite ones as null."""
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if isinstance(value, np.generic):

@@ -1,4 +1,4 @@
-"""What NVIDIA's asset validator says of scene.usda, and which of its complaints are none here."""
+"""Evaluation of NVIDIA's asset validator on scene.usda, with known false alarms."""
 
 from collections import Counter
 from typing import Any
@@ -17,7 +17,7 @@ _SERIOUS = ("error", "failure")
 
 
 def validated(loader: str, document: dict[str, Any]) -> LoaderResult:
-    """The verdict on the probe's issues: it fails on a serious one that is no known false alarm, and names every rule."""
+    """The verdict on the probe's issues: failed on a serious one that is not a known false alarm; it names every rule."""
     issues = document["issues"]
     serious = [issue for issue in issues if issue["severity"] in _SERIOUS and issue["rule"] not in FALSE_ALARMS]
     if serious:

@@ -1,4 +1,4 @@
-"""Whether a hollow thing is hollow to an engine: a mug whose collider is one hull holds nothing."""
+"""Collider-free fraction of an object's hollow: a mug whose collider is one convex hull holds nothing."""
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -12,7 +12,7 @@ NEEDED_OPENING = 0.9
 
 
 def opening_free(link: UrdfLink, files: BundleFiles) -> float | None:
-    """Share (0..1) of the hollow of a link's visual that none of its colliders fills; None where it has no hollow."""
+    """Fraction (0..1) of the hollow of a link's visual that no collider fills; None where it has no hollow."""
     visual = next((files.mesh(s.mesh) for s in link.shapes if s.kind == "visual" and s.mesh is not None), None)
     if visual is None:
         return None
@@ -28,7 +28,7 @@ def opening_free(link: UrdfLink, files: BundleFiles) -> float | None:
 
 
 def shape_corners(box_m: np.ndarray | None, mesh: str | None, files: BundleFiles) -> Points:
-    """Corners of a box or vertices of a mesh, in the shape's frame; none of what cannot be read."""
+    """Corners of a box or vertices of a mesh, in the shape's frame; empty if unreadable."""
     if box_m is not None:
         return np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * box_m
     found = files.mesh(mesh) if mesh is not None else None
@@ -36,7 +36,7 @@ def shape_corners(box_m: np.ndarray | None, mesh: str | None, files: BundleFiles
 
 
 def inside_hull(points: Points, corners: Points, deeper_m: float = 0.0) -> np.ndarray:
-    """Which points (n,) lie in the convex hull of the corners, deeper than so much."""
+    """Mask (n,) of points inside the convex hull of the corners by more than `deeper_m`."""
     if len(corners) < 4:
         return np.zeros(len(points), dtype=bool)
     planes = ConvexHull(corners, qhull_options="QJ").equations

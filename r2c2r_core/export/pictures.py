@@ -23,7 +23,7 @@ _MARGIN = 0.25  # of the object's own box in the photo
 
 
 def write_pictures(reconstruction: Reconstruction, plan: Plan, folder: Path, *, progress: Progress = SILENT) -> dict[str, str]:
-    """One JPEG an object under pictures/; its file by the object's name. Objects no frame shows are left out."""
+    """One JPEG per object under pictures/; returns files by object name, without objects that no frame shows."""
     soup = scene_soup(plan, 0.0)
     tracks = {track.name: track for track in reconstruction.tracks if track.masks}
     written = {}
@@ -44,7 +44,7 @@ def write_pictures(reconstruction: Reconstruction, plan: Plan, folder: Path, *, 
 
 
 def side_by_side(photo: Image, mask: PackedMask, frame: Frame, soup: Soup, bodies: set[int]) -> Image:
-    """The photo around the object's mask, and the same window of the model: the object in colour, the rest pale."""
+    """The photo cropped to the object's mask, and the same crop of the model: the object in colour, the rest pale."""
     left, top, right, bottom = _window(mask)
     scale = _HEIGHT_PX / (bottom - top)
     size = (max(1, round((right - left) * scale)), _HEIGHT_PX)
@@ -75,7 +75,7 @@ def _model_in(camera: Intrinsics, camera_from_world: Rigid3, soup: Soup, bodies:
 
 
 def _best_frame(frames: tuple[Frame, ...], track: MaskTrack) -> Frame | None:
-    """The frame that shows most of the object, sharper ones first among nearly equal ones."""
+    """The frame that shows most of the object, preferring sharp ones among nearly equal ones."""
     seen = [frame for frame in frames if frame.index in track.masks and track.masks[frame.index].area_px > 0]
     if not seen:
         return None

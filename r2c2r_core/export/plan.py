@@ -1,7 +1,7 @@
-"""What goes into a bundle: every link with its unique name, its place in the tree and its files.
+"""Content of a bundle: every link with its unique name, its place in the tree and its files.
 
-All writers read a `Plan`, so a name or a frame is decided once. Link frames of hinged parts are moved onto the hinge here
-when a scene brings them elsewhere, because URDF and MJCF turn a body about its own origin.
+All writers read a `Plan`, so names and frames are decided once. Link frames of hinged parts are moved onto the hinge here
+if they lie elsewhere in the scene, because URDF and MJCF turn a body about its own origin.
 """
 
 import hashlib
@@ -22,10 +22,10 @@ WORLD = "world"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Body:
-    """One link as it is written; geometry in its own frame."""
+    """One link to be written; geometry in its own frame."""
 
     object_name: str
-    category: str  # of its object, as the person wrote it
+    category: str  # of its object, as typed by the user
     name: str  # link name, starts with the object's name, unique in the bundle
     parent: str  # WORLD or the name of another body
     parent_from_body: Rigid3  # closed
@@ -33,15 +33,15 @@ class Body:
     joint_name: str
     joint: Joint | None  # None: fixed to its parent
     axis_body: Vector3 | None
-    free: bool  # falls and can be picked up where the format can say so
+    free: bool  # a free rigid body, where the format supports it
     link: Link
     texture_file: str | None  # relative to the bundle; bodies of one object share equal textures
-    is_support: bool = False  # a plate of support.py, no part of the object
-    bundle: str = ""  # the bundle's folder, seen from the file that is written
+    is_support: bool = False  # a plate of support.py, not part of the object
+    bundle: str = ""  # the bundle's folder, relative to the written file
 
     @property
     def folder(self) -> str:
-        """Folder of its meshes, relative to the file that is written."""
+        """Folder of its meshes, relative to the written file."""
         return f"{self.bundle}meshes/{self.object_name}"
 
     @property
@@ -62,7 +62,7 @@ class Plan:
     name: str
     bodies: tuple[Body, ...]
     floor_z_m: float
-    handles: tuple[Handle, ...] = ()  # of its joints, once `with_handles` has looked
+    handles: tuple[Handle, ...] = ()  # of its joints, set by `with_handles`
 
     def of(self, object_name: str) -> tuple[Body, ...]:
         """The bodies of one object, its base first."""
@@ -77,12 +77,12 @@ class Plan:
         return tuple(handle for handle in self.handles if handle.link == link_name)
 
     def numbers(self, object_name: str) -> list[int]:
-        """Places, from 1, of the object's own bodies."""
+        """Numbers, from 1, of the object's own bodies."""
         own = self.of(object_name)
         return [number for number, body in enumerate(self.bodies, start=1) if body in own]
 
     def notes(self, object_name: str) -> tuple[str, ...]:
-        """What a person should know about how the object is exported."""
+        """Notes for the user about the export of an object."""
         plate = any(body.is_support and body.object_name == object_name for body in self.bodies)
         return ("nothing that was named carries it: a thin plate under it does",) if plate else ()
 
@@ -134,7 +134,7 @@ def _bodies_of(item: SceneObject, taken: set[str]) -> list[Body]:
 
 
 def _parents_first(item: SceneObject, joints: dict[str, Joint]) -> list[str]:
-    """Link names in tree order; links without a joint hang on the base."""
+    """Link names in tree order; links without a joint are attached to the base."""
     names = [link.name for link in item.links]
     base = names[0]
     ordered = [base]
@@ -208,7 +208,7 @@ def _starting_with(object_name: str, name: str, bare: str) -> str:
 
 
 def _unique(name: str, taken: set[str]) -> str:
-    """The name, or the name with a number where another object's link already has it (`a`+`b_c` and `a_b`+`c`)."""
+    """The name, with a number if another object's link already has it (`a`+`b_c` and `a_b`+`c`)."""
     candidate, number = name, 2
     while candidate in taken:
         candidate, number = f"{name}_{number}", number + 1

@@ -18,8 +18,8 @@ OPEN_FRACTION = 0.75
 """How far joints stand open in the picture: doors at full travel hide behind their own edge."""
 
 _SUPERSAMPLE = 1.5
-_LONG = 1.9  # width over height, as seen, from which the two pictures go one above the other
-_SUN_FROM = np.array([-0.45, -0.35, 1.0])  # in the view's own right, back, up
+_LONG = 1.9  # aspect ratio above which the two pictures are stacked vertically
+_SUN_FROM = np.array([-0.45, -0.35, 1.0])  # in the view's axes right, back, up
 _BACKGROUND = np.array([244.0, 245.0, 247.0], np.float32)
 _FLOOR = np.array([222.0, 221.0, 218.0], np.float32)
 _UP = np.array([0.0, 0.0, 1.0], np.float32)
@@ -27,7 +27,7 @@ _UP = np.array([0.0, 0.0, 1.0], np.float32)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Soup:
-    """Every triangle of the scene with corners of its own, in the world."""
+    """Triangle soup of the scene (unshared corners), in the world."""
 
     corners: Points  # (3 m, 3)
     uv: np.ndarray  # (3 m, 2)
@@ -40,7 +40,7 @@ class Soup:
 def preview_png(plan: Plan, seen_from: Vector3 | None, width_px: int = 1600) -> bytes:
     """PNG of the scene closed and open, side by side or, for a long kitchen, one above the other.
 
-    `seen_from` is a world position the scan was filmed from.
+    `seen_from` is a world position from which the scan was filmed.
     """
     closed, opened = scene_soup(plan, 0.0), scene_soup(plan, OPEN_FRACTION)
     points, direction = np.concatenate([closed.corners, opened.corners]), _view_from(plan, seen_from)
@@ -90,7 +90,7 @@ def poses_at(plan: Plan, fraction: float) -> dict[str, Rigid3]:
 
 
 def framing(points_world: Points, direction: Vector3, size: tuple[int, int]) -> tuple[Intrinsics, Rigid3]:
-    """A camera that looks along -`direction` and holds all points with a margin, and camera_from_world."""
+    """A camera looking along -`direction` that frames all points with a margin, and camera_from_world."""
     width, height = size
     focal = 1.35 * height
     camera = Intrinsics(fx=focal, fy=focal, cx=width / 2, cy=height / 2, width=width, height=height)
@@ -98,7 +98,7 @@ def framing(points_world: Points, direction: Vector3, size: tuple[int, int]) -> 
     seen = points_world @ rotation.T
     centre = (seen.min(axis=0) + seen.max(axis=0)) / 2
     distance = 0.0
-    for _ in range(4):  # perspective shifts the middle of the picture: re-centre and fit again
+    for _ in range(4):  # perspective shifts the image centre: re-centre and fit again
         x, y, z = (seen - centre).T
         reach = np.maximum(np.abs(x) / (width / 2 * 0.94), np.abs(y) / (height / 2 * 0.9)) * focal
         distance = float(max((reach - z).max(), 0.4 - z.min()))
@@ -152,7 +152,7 @@ def _motion(body: Body, fraction: float) -> Rigid3:
 
 
 def _view_from(plan: Plan, seen_from: Vector3 | None) -> Vector3:
-    """Direction from the scene to the eye: from where the fronts face, turned towards where the scan was filmed."""
+    """Direction from the scene to the camera: the fronts' facing direction, turned towards the filming position."""
     fronts = facing(plan)
     towards = np.zeros(3)
     if seen_from is not None:
@@ -181,16 +181,16 @@ def albedo(soup: Soup, marks: np.ndarray) -> np.ndarray:
 
 
 def shaded(colour: np.ndarray, normals: np.ndarray, camera_from_world: Rigid3) -> np.ndarray:
-    """Colours lit from the eye, without shadows: for small pictures."""
+    """Colours with headlight shading and without shadows, for small pictures."""
     length = np.maximum(np.linalg.norm(normals, axis=-1), 1e-6)
     towards_eye = np.abs(normals @ camera_from_world.rotation[2]) / length
-    return np.asarray(colour * (0.8 + 0.2 * towards_eye)[..., None])  # textures of a scan hold its light already
+    return np.asarray(colour * (0.8 + 0.2 * towards_eye)[..., None])  # textures of a scan already contain its light
 
 
 def _floor_behind(
     depth: np.ndarray, floor_z_m: float, camera: Intrinsics, camera_from_world: Rigid3
 ) -> tuple[np.ndarray, np.ndarray]:
-    """World points (h, w, 3) and depth with the floor plane put where nothing else is seen; 0 is the sky."""
+    """World points (h, w, 3) and depth with the floor plane filled in where nothing else is visible; 0 is the sky."""
     world_from_camera = camera_from_world.inverse
     rays = pixel_rays(pixel_centres(camera), camera).astype(np.float32) @ camera_from_world.rotation.astype(np.float32)
     slopes = rays[..., 2]
@@ -202,7 +202,7 @@ def _floor_behind(
 
 
 def _facing(normals: np.ndarray, points: np.ndarray, camera_from_world: Rigid3) -> np.ndarray:
-    """Normals turned towards the eye (fitted meshes may be open) and of unit length."""
+    """Unit normals turned towards the camera, as fitted meshes may be open."""
     towards = camera_from_world.inverse.translation.astype(np.float32) - points
     away = np.einsum("hwi,hwi->hw", normals, towards) < 0
     length = np.maximum(np.sqrt(np.einsum("hwi,hwi->hw", normals, normals)), np.float32(1e-6))
@@ -210,7 +210,7 @@ def _facing(normals: np.ndarray, points: np.ndarray, camera_from_world: Rigid3) 
 
 
 def _sun_direction(camera_from_world: Rigid3) -> Vector3:
-    """Towards the sun, in the world: over the viewer's left shoulder."""
+    """Direction to the sun, in the world: over the viewer's left shoulder."""
     right, backward = camera_from_world.rotation[0], -camera_from_world.rotation[2]
     backward = np.array([backward[0], backward[1], 0.0]) / np.linalg.norm(backward[:2])
     sun = _SUN_FROM[0] * right - _SUN_FROM[1] * 2.2 * backward + _SUN_FROM[2] * np.array([0.0, 0.0, 1.0])
@@ -218,7 +218,7 @@ def _sun_direction(camera_from_world: Rigid3) -> Vector3:
 
 
 def _sunlit(soup: Soup, points: np.ndarray, valid: np.ndarray, sun: Vector3) -> np.ndarray:
-    """How much of the sun each point sees, 0..1, from a depth picture taken at the sun with soft edges."""
+    """Sun visibility of each point, 0..1, by a shadow map with soft edges."""
     low, high = soup.corners.min(axis=0), soup.corners.max(axis=0)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 + 0.05
     distance = min(6.0 * radius, 19.5 - radius) if radius < 9.0 else 2.0 * radius
@@ -249,7 +249,7 @@ def _light(normals: np.ndarray, sun: Vector3, sunlit: np.ndarray) -> np.ndarray:
 
 
 def _contact_shade(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
-    """Darkening 0.78..1 where the surroundings, a few centimetres around, stand nearer: gaps and corners read."""
+    """Ambient-occlusion factor 0.78..1 where pixels a few centimetres around are nearer, to show gaps and corners."""
     shade = np.ones_like(depth)
     near = np.where(depth > 0, depth, depth.max())
     middle = float(np.median(depth[depth > 0])) if (depth > 0).any() else 1.0
@@ -261,7 +261,7 @@ def _contact_shade(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
 
 
 def _floor_fade(points: np.ndarray, soup: Soup, on_floor: np.ndarray) -> np.ndarray:
-    """How far the floor has faded into the background, 0..1, with the distance from the scene."""
+    """Fading of the floor into the background, 0..1, by distance from the scene."""
     low, high = soup.corners.min(axis=0)[:2], soup.corners.max(axis=0)[:2]
     floor = points[on_floor][:, :2]
     outside = np.linalg.norm(np.maximum(np.maximum(low - floor, floor - high), 0.0), axis=1)

@@ -1,7 +1,7 @@
-"""How far each number of a scene may be varied for training: a distribution each, and where it comes from.
+"""Domain randomisation: a distribution for each number of a scene, with its source.
 
-`measured`: the spread that was measured with the number. `sourced`: a published range (model/materials.py names it).
-`default`: an own choice, stated as one.
+`measured`: the spread that was measured with the number. `sourced`: a published range (cited in model/materials.py).
+`default`: an own choice.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _WIDER: dict[Source, float] = {"measured": 0.01, "person": 0.0, "inferred": 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Range:
-    """A distribution: uniform or loguniform between the ends, or normal about the written value, cut off at them."""
+    """A distribution: uniform or loguniform between the ends, or normal about the written value, truncated at them."""
 
     distribution: Literal["uniform", "loguniform", "normal"]
     low: float
@@ -33,7 +33,7 @@ class Range:
 
 
 def of_object(item: SceneObject, mass_kg: float, placement: Placement | None) -> dict[str, Range | list[Range]]:
-    """Mass in kg, surface friction, width, depth and height in m, and what is added to each colour channel (0..1)."""
+    """Ranges of mass in kg, surface friction, width, depth and height in m, and offsets of each colour channel (0..1)."""
     return {
         "mass_kg": _mass(item, mass_kg),
         "friction": Range(
@@ -52,7 +52,7 @@ def of_object(item: SceneObject, mass_kg: float, placement: Placement | None) ->
 
 
 def of_joint(joint: Joint) -> dict[str, Range]:
-    """Damping, friction and armature in the joint's units, and its upper limit in rad or m."""
+    """Ranges of damping, friction and armature in the joint's units, and of its upper limit in rad or m."""
     ranges = {name: _around(value) for name, value in _resistances(joint).items()}
     return ranges | {"upper": _limit(joint, joint.motion)}
 
@@ -68,7 +68,7 @@ def _around(value: float) -> Range:
 
 
 def _mass(item: SceneObject, mass_kg: float) -> Range:
-    """What whole ones of its kind weigh, or its boards at the densities of boards; never without the written value."""
+    """Mass range by the category's published weights, or by board densities; it always includes the written value."""
     material = category_of(item.category).material
     if material.weight_kg is not None:
         low, high = material.weight_kg
@@ -93,7 +93,7 @@ def _size(size_m: float, source: Source, placement: Placement | None) -> Range:
 
 
 def _limit(joint: Joint, motion: JointMotion | None) -> Range:
-    """No further than an obstacle lets it; by the states' deviation where its stop was filmed."""
+    """Range of the upper limit, not beyond an obstacle; by the measured state's deviation where its stop was filmed."""
     source: Source = joint.sources.get("limits", "default")
     widest = None if motion is None else max(motion.states.values(), key=lambda state: state.value or 0.0, default=None)
     if source == "measured" and widest is not None and widest.sigma:

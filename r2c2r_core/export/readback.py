@@ -1,4 +1,4 @@
-"""What a loader holds after loading, beside what scene.urdf says it must hold: every value compared, in the world frame."""
+"""Comparison of the values stored by a loader with those of scene.urdf, in the world frame."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,23 +11,23 @@ from r2c2r_core.export.plan import WORLD
 from r2c2r_core.export.reading import Urdf, UrdfJoint, UrdfLink
 from r2c2r_core.geometry.transforms import Rigid3
 
-_LENGTH_M = 1e-4  # engines hold single precision; a scene spans metres
+_LENGTH_M = 1e-4  # engines use single precision; a scene spans metres
 _DIRECTION = 1e-3
-_SHARE = 1e-3  # of inertias and of what a joint resists with
+_SHARE = 1e-3  # relative tolerance of inertias and joint resistances
 _MASS_SHARE, _LEAST_MASS_KG = 1e-4, 0.01
 _LIMIT = 1e-4  # rad or m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HeldJoint:
-    """One joint that moves, everything closed. NaN: the loader keeps such a value and has none."""
+    """One moving joint, with all joints closed. NaN: the loader supports the value but has none."""
 
     type: str
     axis_world: Vector3
     origin_world: Vector3
     lower: float
     upper: float
-    damping: float | None = None  # None: the loader keeps no such value at all
+    damping: float | None = None  # None: the loader does not support this value
     friction: float | None = None
     effort: float | None = None
     velocity: float | None = None
@@ -35,7 +35,7 @@ class HeldJoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HeldBody:
-    """One rigid body, everything closed."""
+    """One rigid body, with all joints closed."""
 
     mass_kg: float
     com_world: Vector3
@@ -47,18 +47,18 @@ class HeldBody:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Readback:
-    """What a loader holds."""
+    """Joints and bodies as stored by a loader."""
 
     version: str
     joints: dict[str, HeldJoint]
     bodies: dict[str, HeldBody]
     problem: str = ""
-    in_world: frozenset[str] = frozenset()  # links that the loader holds as a part of the world, without a body
-    steps_per_s: tuple[tuple[int, float], ...] = ()  # worlds at once, and steps of all of them in a second
+    in_world: frozenset[str] = frozenset()  # links that the loader merges into the world, without a body
+    steps_per_s: tuple[tuple[int, float], ...] = ()  # number of parallel worlds, and total steps per second
 
     @property
     def not_kept(self) -> tuple[str, ...]:
-        """The joint values this loader has no place for."""
+        """Names of joint values that this loader does not support."""
         return tuple(name for name in RESISTANCE if any(getattr(joint, name) is None for joint in self.joints.values()))
 
 
@@ -66,7 +66,7 @@ RESISTANCE = ("damping", "friction", "effort", "velocity")
 
 
 def readback_of(document: dict[str, Any]) -> Readback:
-    """The answer of a probe: plain lists and numbers by the names of the fields above."""
+    """Readback from a probe's document: plain lists and numbers by the names of the fields above."""
     joints = {name: HeldJoint(**_arrays(entry)) for name, entry in document["joints"].items()}
     bodies = {name: HeldBody(**_arrays(entry)) for name, entry in document["bodies"].items()}
     return Readback(
@@ -80,7 +80,7 @@ def readback_of(document: dict[str, Any]) -> Readback:
 
 
 def expected_readback(urdf: Urdf) -> Readback:
-    """What scene.urdf says a loader must hold."""
+    """The values of scene.urdf that a loader must reproduce."""
     poses = urdf.world_poses()
     return Readback(
         version="",
@@ -94,7 +94,7 @@ def expected_readback(urdf: Urdf) -> Readback:
 
 
 def differences(expected: Readback, found: Readback) -> list[str]:
-    """What a loader holds otherwise than scene.urdf, a phrase each."""
+    """Differences of a loader's values from scene.urdf, one phrase each."""
     lines = [found.problem] if found.problem else []
     lines += _set_differences("joint", set(expected.joints), set(found.joints))
     for name in sorted(set(expected.joints) & set(found.joints)):
@@ -146,7 +146,7 @@ def _expected_joint(joint: UrdfJoint, world_from_child: Rigid3) -> HeldJoint:
 
 
 def _expected_body(link: UrdfLink, world_from_link: Rigid3) -> HeldBody:
-    assert link.inertial is not None  # _has_mass has looked
+    assert link.inertial is not None  # ensured by _has_mass
     turn = world_from_link.rotation
     return HeldBody(
         mass_kg=link.inertial.mass_kg,

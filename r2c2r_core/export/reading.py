@@ -1,4 +1,4 @@
-"""A URDF as the linter and the certificate read it: lenient, so that every defect can be named."""
+"""Lenient URDF parser of the linter and the certificate, so that every defect can be reported."""
 
 import math
 import xml.etree.ElementTree as ET
@@ -29,7 +29,7 @@ class UrdfShape:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfInertial:
-    """Numbers that could not be read are NaN."""
+    """One <inertial>; numbers that could not be read are NaN."""
 
     mass_kg: float
     com_link: Vector3
@@ -47,7 +47,7 @@ class UrdfLink:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfJoint:
-    """One <joint>; `limit` has only the attributes that were there."""
+    """One <joint>; `limit` has only the attributes that are present."""
 
     name: str
     type: str
@@ -71,7 +71,7 @@ class Urdf:
 
     @property
     def roots(self) -> tuple[str, ...]:
-        """Names of links no joint has as its child."""
+        """Names of links that are not the child of any joint."""
         children = {joint.child for joint in self.joints}
         return tuple(link.name for link in self.links if link.name not in children)
 
@@ -113,7 +113,7 @@ def read_urdf(path: Path) -> Urdf:
 
 
 class _Reader:
-    """Elements to nouns; collects numbers that cannot be read instead of stopping at the first."""
+    """Converts elements to dataclasses; collects unreadable numbers instead of stopping at the first."""
 
     def __init__(self) -> None:
         self.malformed: list[tuple[str, str]] = []

@@ -1,4 +1,4 @@
-"""README.txt of a bundle: how to load it where, what each file leaves out, and what may be done with it."""
+"""README.txt of a bundle: how to load it in each simulator, what each file omits, and terms of use."""
 
 from textwrap import indent, wrap
 

@@ -28,9 +28,9 @@ def report_of(
     gripper: dict[str, Any] | None = None,
     arm: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """The report as a JSON document. The speed of the simulation is left out: it says something about this machine.
+    """The report as a JSON document, without the simulation speed, which depends on this machine.
 
-    `gripper` and `arm` are their certificates as JSON; None where they did not try.
+    `gripper` and `arm` are their certificates as JSON; None where they were not tried.
     """
     judged = certificate_to_json(certificate)
     judged.pop("realtime_factor")
@@ -51,7 +51,7 @@ def report_of(
 def report_html(manifest: dict[str, Any], report: dict[str, Any], pictures: dict[str, str]) -> str:
     """One self-contained page (pictures are files beside it); `pictures` maps object names to files in the bundle.
 
-    Everything that comes from data is escaped, and the page holds no script.
+    All text from data is escaped, and the page has no script.
     """
     certificate = report["certificate"]
     name = _text(manifest["capture"]["name"])
@@ -86,7 +86,7 @@ def report_html(manifest: dict[str, Any], report: dict[str, Any], pictures: dict
 
 
 def _likeness(likeness: dict[str, Any]) -> str:
-    """The second verdict, with the objects to look at."""
+    """The likeness verdict, with the objects to check."""
     badge = {"passed": "good", "doubtful": "warn", "failed": "bad"}[likeness["state"]]
     names = ", ".join(_text(doubt["object"]) for doubt in likeness["doubts"])
     look_at = f": look at {names}" if names else ""
@@ -256,7 +256,7 @@ def _joints(objects: list[dict[str, Any]], results: list[dict[str, Any]]) -> str
 
 
 def _in_the_way(blockers: list[dict[str, Any]], turning: bool) -> str:
-    """What a joint meets, and from which position on; another joint's part only when that is open too."""
+    """Obstacles of a joint and the position of first contact; another joint's part collides only when open too."""
     lines = []
     for blocker in blockers:
         at = f"{blocker['position'] * 57.29578:.0f}°" if turning else f"{1000 * blocker['position']:.0f} mm"
@@ -281,7 +281,7 @@ def _things(things: list[dict[str, Any]]) -> str:
 
 
 def _colliders(colliders: list[dict[str, Any]]) -> str:
-    """How far what an engine touches lies from what is drawn."""
+    """Table of the distances between colliders and visuals."""
     if not colliders:
         return ""
     ways = ("drawn_to_collider", "collider_to_drawn")
@@ -298,7 +298,7 @@ def _colliders(colliders: list[dict[str, Any]]) -> str:
 
 
 def _gripper(gripper: dict[str, Any] | None) -> str:
-    """What the gripper did, with a sheet of pictures of each."""
+    """Gripper results, with a contact sheet of each trial."""
     if gripper is None or not gripper["grips"]:
         return ""
     about = gripper["gripper"]
@@ -313,7 +313,7 @@ def _gripper(gripper: dict[str, Any] | None) -> str:
 
 
 def _arm(arm: dict[str, Any] | None) -> str:
-    """Where the arm stands on the floor plan, and what it did from there."""
+    """Arm base positions on the floor plan, and results from there."""
     if arm is None or arm.get("grips") == []:
         return ""
     if "why" in arm:
@@ -376,7 +376,7 @@ def _losses(losses: dict[str, list[str]]) -> str:
 
 
 def _table(head: list[str], rows: list[list[str]], numeric: tuple[int, ...] = (), below: Sequence[str] = ()) -> str:
-    """A table; `below` holds for each row what stands under all but its first cell, or nothing."""
+    """An HTML table; `below` gives for each row the content under all but its first cell, or nothing."""
 
     def cells(tag: str, values: list[str]) -> str:
         marks = [' class="number"' if k in numeric else "" for k in range(len(values))]

@@ -21,11 +21,11 @@ _MODULES = ("algebra.js", "device.js", "kitchen.js", "eye.js", "painter.js", "ha
 _IMPORT, _EXPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE), re.compile(r"^export ", re.MULTILINE)
 _TEXTURE_PX = 1024  # longest side: a page of a few megabytes
 _JPEG_QUALITY = 85
-_STEPS = 65535  # positions are whole steps of their box: 0.03 mm on a fixture of 2 m
+_STEPS = 65535  # positions are quantised in their bounding box: 0.03 mm on a fixture of 2 m
 
 
 def review_html(plan: Plan, certificate: Certificate, seen_from: Vector3 | None, seen: Mapping[str, Seen] | None = None) -> str:
-    """The page; `seen_from` is where the camera's path was, in the world, so that fronts face the reader."""
+    """The page; `seen_from` is the camera path's position in the world, so that fronts face the viewer."""
     page = (_ASSETS / "page.html").read_text(encoding="utf-8")
     for mark, content in (("STYLE", (_ASSETS / "page.css").read_text(encoding="utf-8")), ("VIEWER", _script())):
         page = page.replace(f"/*{mark}*/", content)
@@ -34,7 +34,7 @@ def review_html(plan: Plan, certificate: Certificate, seen_from: Vector3 | None,
 
 
 def _script() -> str:
-    """The viewer's modules as one script: each after what it imports, in one scope of their own."""
+    """The viewer's modules as one script in a private scope, each after its imports."""
     texts = [_IMPORT.sub("", (_ASSETS / name).read_text(encoding="utf-8")) for name in _MODULES]
     return "(() => {\n" + "\n".join(_EXPORT.sub("", text) for text in texts) + "})();"
 
@@ -111,7 +111,7 @@ def _collider_mesh(body: Body) -> tuple[Points, Faces]:
 
 
 def _finding(finding: Finding, plan: Plan) -> dict[str, Any]:
-    """A finding with the object it is about: the one whose link, joint or own name it gives."""
+    """A finding with the object that it concerns, identified by link, joint or object name."""
     names = {body.object_name for body in plan.bodies}
     owners = {key: body.object_name for body in plan.bodies for key in (body.name, body.joint_name)}
     owner = finding.where if finding.where in names else owners.get(finding.where)
@@ -127,7 +127,7 @@ def _caption(plan: Plan, object_name: str, seen: Seen | None) -> str:
 
 
 def _yaw(plan: Plan, seen_from: Vector3 | None) -> float:
-    """Direction in radians, in plan, from the scene's middle to where it was filmed from; a corner view without a camera."""
+    """Direction in plan, in radians, from the scene's middle to the filming position; a corner view without a camera."""
     if seen_from is None:
         return -1.1
     middle = np.mean([body.world_from_body.translation for body in plan.bodies], axis=0)
@@ -136,7 +136,7 @@ def _yaw(plan: Plan, seen_from: Vector3 | None) -> float:
 
 
 def _tint(number: int) -> tuple[float, float, float]:
-    """Colours far apart for colliders of neighbouring bodies: turns of the hue by the golden angle."""
+    """Distinct collider colours for neighbouring bodies, by golden-angle steps of the hue."""
     hue = np.array([[[int(number * 137.508 % 360 / 2), 110, 215]]], dtype=np.uint8)
     red, green, blue = cv2.cvtColor(hue, cv2.COLOR_HSV2RGB)[0, 0] / 255.0
     return float(red), float(green), float(blue)

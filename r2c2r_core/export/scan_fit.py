@@ -1,8 +1,8 @@
-"""How far the finished, closed model lies from what the scan measured of it (the metric set's "Shape").
+"""Symmetric distance between the finished, closed model and the scan's depth (the metric set's "Shape").
 
-Both ways between the same frames: from the depth points inside an object's mask to its mesh, and from the pixels in which
-the mesh shows to the nearest of those points. What no camera saw, and where the sensor measured nothing, is not judged, so
-the figures need no truth and mean the same for a real kitchen as for a synthetic one. They hold the sensor's noise too.
+Both directions use the same frames: from the depth points inside an object's mask to its mesh, and from the pixels where
+the mesh is visible to the nearest of those points. Unobserved surface and pixels without depth are excluded, so the figures
+need no ground truth and are comparable between real and synthetic kitchens. They include the sensor's noise.
 """
 
 from collections.abc import Sequence
@@ -26,16 +26,16 @@ from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 
 FRAMES = 8
-_POINTS = 6000  # of each side, an object
+_POINTS = 6000  # per direction and object
 _DENSE_POINTS = (
-    60_000  # of the scan, to be near to: 6000 on a refrigerator lie 2 cm apart, and half a perfect mesh 1 cm off them
+    60_000  # of the scan, as distance targets: 6000 on a refrigerator are 2 cm apart, and half a perfect mesh 1 cm off them
 )
 _FEWEST_POINTS = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScanFit:
-    """One object's mesh beside the scan."""
+    """Distances between one object's mesh and the scan."""
 
     median_m: float  # from scan to mesh
     p95_m: float
@@ -74,7 +74,7 @@ def _fit(scan: Points, surface: Points, soup: Soup, faces: Faces) -> ScanFit:
 
 
 def _turned_to(frames: Sequence[Frame], soup: Soup, bodies: list[int]) -> Faces:
-    """The bodies' faces turned to a camera: a point behind a door must not be near because the door has a back."""
+    """The bodies' faces turned to a camera: a point behind a door must not match the door's back."""
     corner, normal = soup.corners[::3], soup.normals[::3]
     own = np.isin(np.rint(soup.ids[::3]), bodies)
     towards = [np.einsum("ij,ij->i", normal, frame.world_from_camera.translation - corner) > 0 for frame in frames]
@@ -88,13 +88,13 @@ def f_score(to_mesh_m: np.ndarray, to_scan_m: np.ndarray, within_m: float) -> fl
 
 
 def _frames(looks: Looks, track: MaskTrack) -> Sequence[Frame]:
-    """Frames that show the object large and closed: of the shared ones, drawn only once, if enough of them do."""
+    """Frames that show the object large and closed: from the shared ones, rendered only once, if they suffice."""
     some = showing(looks.shared, track)
     return spread(some if len(some) >= FRAMES // 2 else showing(looks.frames, track), FRAMES)
 
 
 def _sides(seen: Look, frame: Frame, track: MaskTrack, bodies: list[int]) -> tuple[Points, Points]:
-    """World points of one frame: the scan's inside the mask; the mesh's where it shows and something was measured."""
+    """World points of one frame: the scan's inside the mask, and the mesh's where it is visible and depth is known."""
     inside = _inside(unpack_mask(track.masks[frame.index]), frame) & seen.known
     shows = np.isin(seen.bodies, bodies)
     judged = shows & ~_rim(shows) & seen.known & (seen.drawn_m < seen.measured_m + HIDDEN_M)
@@ -102,7 +102,7 @@ def _sides(seen: Look, frame: Frame, track: MaskTrack, bodies: list[int]) -> tup
 
 
 def _inside(mask: Mask, frame: Frame) -> Mask:
-    """The mask in the depth image, without its rim: there the sensor mixes two surfaces."""
+    """The mask in the depth image without its border, where the sensor mixes two surfaces."""
     values, within = sample_through(mask, frame.rgb_camera, frame.depth_camera)
     inside = values & within
     return inside & ~_rim(inside)

@@ -1,6 +1,6 @@
-"""The checksums of a bundle's files, in its manifest: a bundle that was damaged or changed is known by them.
+"""Checksums of a bundle's files in its manifest, to detect damaged or changed bundles.
 
-They are no signature: who changes a file on purpose can write its checksum anew.
+They are not a signature: anyone who changes a file on purpose can recompute its checksum.
 """
 
 import hashlib
@@ -15,13 +15,13 @@ MANIFEST = "manifest.json"
 
 
 def checksums(folder: Path) -> dict[str, str]:
-    """SHA-256 of every file of a bundle's folder but the manifest, by its path in it, sorted."""
+    """SHA-256 of every file of a bundle's folder except the manifest, by relative path, sorted."""
     paths = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
     return {name: _sha256(folder / name) for name in paths if name != MANIFEST}
 
 
 def check_seal(folder: Path) -> tuple[Finding, ...]:
-    """What differs between a bundle's files and its manifest's checksums; a manifest that cannot be read is the linter's."""
+    """Findings on files that differ from the manifest's checksums; an unreadable manifest is reported by the linter."""
     try:
         manifest = json.loads((folder / MANIFEST).read_bytes())
         listed = manifest.get("files")

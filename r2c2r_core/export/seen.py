@@ -1,8 +1,8 @@
-"""How much of each side of an object the frames saw: what was not seen is a guess, and says so.
+"""Observed fraction of each side of an object; unobserved sides are marked as a guess.
 
-A side is what an eye far away on that side of the object's box sees of it, so that the inside of a cabinet is on none. The
-underside is left out: nobody looks there. A spot is seen in a frame where the model shows it, not too slantwise, and nothing
-that the sensor measured stands before it.
+A side is the surface visible orthographically from that side of the object's box, which excludes the inside of a cabinet.
+The underside is left out. A surface point is observed in a frame if the model shows it there, not at too grazing an angle,
+and no measured surface occludes it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,28 +30,28 @@ _OUTWARD: Mapping[Side, Vector3] = {  # object frame: the front is at -Y
     "right": np.array([1.0, 0.0, 0.0]),
     "top": np.array([0.0, 0.0, 1.0]),
 }
-_SPOTS = 64  # along the object's longest side
-_AWAY = 8.0  # of its size: from there rays are parallel to 4 degrees
-_SLANT = 0.2  # cosine of the angle to the surface's normal, below which a look says nothing
-_OWN_M = 0.015  # to the model as drawn into a frame, in which a spot counts as shown
-_LEAST = 0.25  # of a side that must be seen before it is called seen
+_SPOTS = 64  # sample points along the object's longest side
+_AWAY = 8.0  # viewing distance in object sizes: rays are then parallel to 4 degrees
+_SLANT = 0.2  # minimum cosine between viewing direction and surface normal
+_OWN_M = 0.015  # maximum distance to the model rendered into a frame for a point to be visible
+_LEAST = 0.25  # minimum observed fraction of a side to be called seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """The seen shares of one object's surface, 0 to 1."""
+    """Observed fractions of one object's surface, 0 to 1."""
 
     share: float  # of all sides together, by their area
-    sides: dict[Side, float]  # a side that shows nothing of the object is left out
+    sides: dict[Side, float]  # a side without visible surface is left out
 
     @property
     def unseen(self) -> tuple[Side, ...]:
-        """The sides that are a guess."""
+        """The sides that were not observed."""
         return tuple(side for side, share in self.sides.items() if share < _LEAST)
 
 
 def seen_sides(reconstruction: Reconstruction, plan: Plan, looks: Looks) -> dict[str, Seen]:
-    """What the frames saw of every clicked object, by its name; one for which that fails is left out."""
+    """Observed fractions of every prompted object, by name; objects for which this fails are left out."""
     poses = {item.name: item.world_from_object for item in reconstruction.scene.objects}
     found = {}
     for track in reconstruction.tracks:
@@ -65,14 +65,14 @@ def seen_sides(reconstruction: Reconstruction, plan: Plan, looks: Looks) -> dict
 
 
 def unseen_words(unseen: Sequence[str]) -> str:
-    """What was not seen, as people say it; empty where everything was."""
+    """Description of the unobserved sides in words; empty where all were observed."""
     if set(unseen) >= {"back", "left", "right"} and "front" not in unseen:
         return "seen from the front only"
     return f"not seen: {', '.join(unseen)}" if unseen else ""
 
 
 class _Spots(NamedTuple):
-    """Points of the surface, world, with their outward normals."""
+    """Surface points in the world with outward normals."""
 
     points: Points
     normals: Points
@@ -86,7 +86,7 @@ def _seen(looks: Looks, frames: Sequence[Frame], bodies: Sequence[int], world_fr
 
 
 def _spots(looks: Looks, bodies: Sequence[int], outward: Vector3) -> _Spots:
-    """What shows of the bodies from far away in a direction, a spot for each equal area of the picture."""
+    """Surface points of the bodies visible from far away in a direction, sampled on a uniform image grid."""
     own = np.isin(np.rint(looks.soup.ids[::3]), bodies)
     corners, normals = (values.reshape(-1, 3, 3)[own].reshape(-1, 3) for values in (looks.soup.corners, looks.soup.normals))
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -105,7 +105,7 @@ def _spots(looks: Looks, bodies: Sequence[int], outward: Vector3) -> _Spots:
 
 
 def _are_seen(looks: Looks, frames: Sequence[Frame], bodies: Sequence[int], spots: _Spots) -> np.ndarray:
-    """Which of the spots at least one frame sees."""
+    """Mask (n,) of the points that at least one frame observes."""
     seen = np.zeros(len(spots.points), dtype=bool)
     for frame in frames:
         left = np.flatnonzero(~seen)

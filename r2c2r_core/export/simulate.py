@@ -1,8 +1,8 @@
-"""MuJoCo as the oracle: penetration at rest and over every joint's sweep, travel under a hand's force, drift.
+"""Simulation tests in MuJoCo: penetration at rest and over every joint's sweep, travel under a hand's force, drift.
 
-Sweep and drive use a stricter model than the bundle ships: no contact exclusions and no parent filter, so that a bundle
-which passes also opens in engines that know neither. Free-standing things are taken out of it: one that stands in a door's
-way is named, it is not the door's defect.
+Sweep and drive use a stricter model than the bundle's: no contact exclusions and no parent filter, so that a bundle which
+passes also opens in engines that support neither. Free-standing objects are removed from it: one in a door's way is
+reported by name, but is not a defect of the door.
 """
 
 import logging
@@ -24,14 +24,14 @@ from r2c2r_core.progress import SILENT, Progress
 
 _LOG = logging.getLogger(__name__)
 
-ALLOWED_OVERLAP_M = 0.005  # of fixed parts, which no engine moves apart; LRA's gate
+ALLOWED_OVERLAP_M = 0.005  # of fixed parts, which no engine separates; LRA's threshold
 
 _NAN = float("nan")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Simulation:
-    """What MuJoCo said."""
+    """Results of the simulation tests."""
 
     findings: tuple[Finding, ...] = ()
     joints: tuple[JointResult, ...] = ()
@@ -39,11 +39,11 @@ class Simulation:
     together_penetration_m: float = _NAN
     drift_m: dict[str, float] = field(default_factory=dict)  # by body; empty when nothing was simulated
     realtime_factor: float = _NAN
-    free: tuple[str, ...] = ()  # bodies that stand freely
+    free: tuple[str, ...] = ()  # free-standing bodies
 
     @property
     def most_drift_m(self) -> float:
-        """Of any body."""
+        """Maximum drift over all bodies, in metres."""
         return max(self.drift_m.values(), default=_NAN)
 
 
@@ -86,7 +86,7 @@ def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:
 
 @contextmanager
 def _apart(where: str, findings: list[Finding]) -> Iterator[None]:
-    """One test: what it may end in is a finding, and ends no other test."""
+    """Context of one test: an exception becomes a finding and does not stop the other tests."""
     failed: dict[str, str] = {}
     with apart("certificate", where, failed):
         yield
@@ -101,13 +101,13 @@ def _rest_findings(rest: list[Touch]) -> Iterator[Finding]:
 
 
 def _with_meetings(result: JointResult, met: list[Meeting]) -> JointResult:
-    """The joint's result with the joints that are in its way when they stand open."""
+    """The joint's result with the joints that block it when open."""
     more = [blocker for one in met if (blocker := one.blocker_of(result.joint)) is not None]
     return replace(result, blocked_by=(*result.blocked_by, *more))
 
 
 def _fixed_overlaps(loose: Any, rest: list[Touch]) -> Iterator[Finding]:
-    """Overlaps between fixed parts of different objects, which the engine itself never reports."""
+    """Findings on overlaps between fixed parts of different objects, which the engine never reports."""
     known = {touch.names for touch in rest}
     for touch in touches(loose, {}):
         if touch.depth_m > ALLOWED_OVERLAP_M and touch.names not in known and 0 not in touch.bodies:
@@ -115,7 +115,7 @@ def _fixed_overlaps(loose: Any, rest: list[Touch]) -> Iterator[Finding]:
 
 
 def without_visuals(spec: Any) -> None:
-    """Take from an MjSpec what is only seen: it takes seconds to load."""
+    """Remove the visuals from an MjSpec, as they take seconds to load."""
     for geom in [g for g in spec.geoms if g.contype == 0 and g.conaffinity == 0]:
         spec.delete(geom)
     used = {geom.meshname for geom in spec.geoms}
@@ -128,14 +128,14 @@ def without_visuals(spec: Any) -> None:
 
 
 def compiled(mjcf: Path, *, strict: bool = False, keep_free: bool = False, loosen: bool = False) -> Any:
-    """The scene without what cannot touch; `strict` without exclusions, `loosen` with every fixed body let go.
+    """The compiled scene without visuals; `strict` without exclusions, `loosen` with every fixed body made free.
 
-    Raises ValueError or ET.ParseError where scene.xml is none.
+    Raises ValueError or ET.ParseError where scene.xml is invalid.
     """
     import mujoco
 
-    mujoco.set_mju_user_warning(_LOG.debug)  # else a scene that diverges leaves MUJOCO_LOG.TXT where the person works
-    ET.fromstring(mjcf.read_text(encoding="utf-8"))  # MuJoCo takes names that are no text, and cannot say them
+    mujoco.set_mju_user_warning(_LOG.debug)  # else a diverging scene leaves MUJOCO_LOG.TXT in the working directory
+    ET.fromstring(mjcf.read_text(encoding="utf-8"))  # MuJoCo accepts names that are not valid text, and cannot print them
     spec = mujoco.MjSpec.from_file(str(mjcf))
     without_visuals(spec)
     if strict:

@@ -1,4 +1,4 @@
-"""How a bundle is taken into each simulator: lines to copy, run in the bundle's folder."""
+"""Loading recipes for each simulator: code to run in the bundle's folder."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -8,18 +8,18 @@ from r2c2r_core.export.writers.ros import package_name
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
-    """One simulator's lines."""
+    """One simulator's loading recipe."""
 
     simulator: str
-    install: str  # a line of a shell, or where it comes from
+    install: str  # a shell command, or its source
     language: Literal["python", "shell"]
     code: str
     note: str = ""
-    loader: str | None = None  # of the certificate: it loads the same file
+    loader: str | None = None  # loader of the certificate that reads the same file
 
 
 def recipes(scene: str, object_name: str) -> tuple[Recipe, ...]:
-    """Every simulator's, for a scene of this name that holds this object."""
+    """Recipes of all simulators, for a scene of this name with this object."""
     names = {"PACKAGE": package_name(scene), "OBJECT": object_name}
 
     def filled(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Reconstruction → bundle: write it, judge it, pack it; and judge a bundle that somebody brings."""
+"""Export stage: writes, certifies and packs a bundle; also certifies an existing bundle."""
 
 import json
 import os
@@ -85,11 +85,10 @@ def write_bundle(
 ) -> Certificate:
     """Write the certified bundle to `destination` (a .zip) and return its certificate, passed or not.
 
-    The gripper tries its joints in the processes of `pool` (None: here) beside what else judges the bundle.
+    The gripper trials run in the processes of `pool` (None: this one) in parallel with the other tests.
 
-    The zip appears whole or not at all, and equal inputs give equal bytes: `created` (ISO 8601) is the only time in it, and
-    None leaves it to SOURCE_DATE_EPOCH, or out. Raises ExportFailed on a scene without objects and EnvironmentProblem on a
-    full disk.
+    The zip is written atomically, and equal inputs give equal bytes: `created` (ISO 8601) is the only time in it; None uses
+    SOURCE_DATE_EPOCH, or omits it. Raises ExportFailed on a scene without objects and EnvironmentProblem on a full disk.
     """
     with building_folder(destination) as scratch:
         folder = scratch / "bundle"
@@ -100,7 +99,7 @@ def write_bundle(
             reconstruction, scene=_without(reconstruction.scene, lost), failures=reconstruction.failures | lost
         )
         tried = [entry for entry in formats() if entry.file == SCENE]
-        write_formats(plan, folder, tried)  # first, so that the gripper begins
+        write_formats(plan, folder, tried)  # first, so that the gripper trials can start
         gripped = begin_gripping(folder, pool or Pool(1), progress.part(0.7, 0.9)) if config.gripper else None
         write_formats(plan, folder, [entry for entry in formats() if entry not in tried], progress=progress.part(0.05, 0.1))
         fits, seen, pictures = dict[str, ScanFit](), dict[str, Seen](), dict[str, str]()
@@ -112,7 +111,7 @@ def write_bundle(
         _write_json(folder / "manifest.json", manifest)
         (folder / "README.txt").write_text(readme_text(plan))
         progress.at(0.2, "drawing the preview")
-        with apart("export", "preview.png", {}):  # the certificate says that it is missing
+        with apart("export", "preview.png", {}):  # the certificate reports it as missing
             (folder / "preview.png").write_bytes(preview_png(plan, _filmed_from(reconstruction.capture)))
         with apart("export", "pictures", {}):
             if config.pictures:
@@ -125,7 +124,9 @@ def write_bundle(
         with apart("export", "review.html", {}):
             review = review_html(plan, certificate, _filmed_from(reconstruction.capture), seen)
             (folder / "review.html").write_text(review, encoding="utf-8")
-        _write_json(folder / "manifest.json", manifest | {"files": checksums(folder)})  # last: it vouches for the others
+        _write_json(
+            folder / "manifest.json", manifest | {"files": checksums(folder)}
+        )  # last, as it contains the other files' checksums
         progress.at(0.9, "packing")
         write_zip(folder, scratch / "bundle.zip")
         (scratch / "bundle.zip").replace(destination)
@@ -136,7 +137,7 @@ def write_bundle(
 
 
 def _with_meshes(scene: ArticulatedScene, folder: Path, texture_max_px: int) -> tuple[Plan, dict[str, str]]:
-    """The meshes written: what the bundle holds, and what is left out because it cannot be written, with a line each."""
+    """Write the meshes; returns the plan of the written objects, and the reason for each object left out."""
     lost: dict[str, str] = {}
     for item in scene.objects:
         with apart("export", item.name, lost):
@@ -160,7 +161,7 @@ def _without(scene: ArticulatedScene, lost: Mapping[str, str]) -> ArticulatedSce
 
 
 def check_bundle(path: Path, *, sapien_python: str | None = None, progress: Progress = SILENT) -> Certificate:
-    """Judge a bundle, zip or folder, as it is, and whether its files are those that were certified when it was written.
+    """Certify an existing bundle, zip or folder, including its files' checksums.
 
     Raises BundleError on a foreign, truncated or unsafe one.
     """
@@ -173,7 +174,7 @@ def check_bundle(path: Path, *, sapien_python: str | None = None, progress: Prog
 
 
 def grip_bundle(path: Path, films: Path | None = None, *, progress: Progress = SILENT) -> GripperCertificate:
-    """Let the gripper open every joint of a bundle, zip or folder, and move its free things; films go to the folder `films`.
+    """Let the gripper open every joint of a bundle, zip or folder, and move its free objects; films go to the folder `films`.
 
     Raises BundleError on a foreign, truncated or unsafe one, and on one without a readable scene.xml.
     """
@@ -181,7 +182,7 @@ def grip_bundle(path: Path, films: Path | None = None, *, progress: Progress = S
 
 
 def reach_bundle(path: Path, films: Path | None = None, *, progress: Progress = SILENT) -> ArmCertificate:
-    """Let an arm open every joint of a bundle that it can reach; films and the map of where it stands go to `films`.
+    """Let an arm open every reachable joint of a bundle; films and the map of its base positions go to `films`.
 
     Raises as grip_bundle does, and BackendUnavailable without the arm's extra.
     """

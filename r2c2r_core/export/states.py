@@ -11,5 +11,5 @@ names them."""
 
 
 def position(joint: Joint, state: str) -> float:
-    """Where a joint stands in a state, rad or m."""
+    """Position of a joint in a state, rad or m."""
     return STATES[state] * joint.upper

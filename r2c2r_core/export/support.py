@@ -1,8 +1,8 @@
-"""What a free-standing thing stands on: what carries it, or a plate of its own foot's size, so that it does not fall.
+"""Support of free-standing objects: a surface of the scene, or a plate of the base's size, so that they do not fall.
 
-A scan leaves millimetres between a bottle and its worktop: it is let down, or lifted out, by exactly those. A mug on a counter
-that is no object of the scene would drop to the floor in the first second. The scan saw it rest there, so a plate stands in
-for the surface; the manifest says so.
+A scan leaves gaps or overlaps of millimetres between a bottle and its worktop: the object is moved vertically to contact. A
+mug on a counter that is not an object of the scene would drop to the floor in the first second. As the scan saw it at rest,
+a plate replaces the surface; the manifest records this.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,14 +18,14 @@ from r2c2r_core.model.materials import CHIPBOARD
 from r2c2r_core.model.scene import Box, Inertial, Link
 
 PLATE_M = 0.01
-_FOOT_M = 0.02  # colliders are looked at this far above the lowest point
+_FOOT_M = 0.02  # height above the lowest point within which colliders form the base
 _GAP_M = 1e-4  # no contact at rest, no visible fall
-_HIGHER_M, _LOWER_M = 0.02, 0.012  # what counts as standing on it: a support this far above or below the foot
-_SHARE = 0.3  # of the foot's corners
+_HIGHER_M, _LOWER_M = 0.02, 0.012  # range of a supporting surface above or below the base
+_SHARE = 0.3  # minimum fraction of the base's corners on a support
 
 
 def supported(plan: Plan) -> Plan:
-    """The plan with every free thing standing on what carries it, or on a plate where nothing does and one has room."""
+    """The plan with every free object on its supporting surface, or on a plate if there is none and a plate fits."""
     bodies, plates = {body.name: body for body in plan.bodies}, list[Body]()
     lowest_first = sorted((b for b in plan.bodies if b.free and _colliders(b).size), key=lambda b: _colliders(b)[:, 2].min())
     for name in [body.name for body in lowest_first]:
@@ -37,7 +37,7 @@ def supported(plan: Plan) -> Plan:
 
 
 def _support(thing: Body, bodies: Mapping[str, Body], floor_z_m: float) -> tuple[dict[str, Body], list[Body]]:
-    """The bodies of a thing on what carries it, or the plate that does where there is room for one."""
+    """The bodies of an object moved onto its support, or a supporting plate if one fits."""
     points = _colliders(thing)
     others = [c for body in bodies.values() if body.object_name != thing.object_name for c in collider_corners_world(body)]
     under_m = _carried_at(points, others, floor_z_m)
@@ -50,7 +50,7 @@ def _support(thing: Body, bodies: Mapping[str, Body], floor_z_m: float) -> tuple
 
 
 def _carried_at(points: Points, others: Sequence[Points], floor_z_m: float) -> float | None:
-    """Height of the floor or of a collider's top that lies under the foot, or under the middle, about where it ends."""
+    """Height of the highest floor or collider top near the base, under its middle or enough of its corners."""
     bottom = float(points[:, 2].min())
     heights = [floor_z_m] if abs(bottom - floor_z_m) <= _LOWER_M else []
     foot = points[points[:, 2] < bottom + _FOOT_M, :2]
@@ -68,7 +68,7 @@ def _carried_at(points: Points, others: Sequence[Points], floor_z_m: float) -> f
 
 
 def _lifted(body: Body, lift_m: float) -> Body:
-    """The body of a thing that was moved along the vertical."""
+    """The body moved vertically."""
     raised = Rigid3(np.eye(3), np.array([0.0, 0.0, lift_m])) @ body.world_from_body
     return replace(body, world_from_body=raised, parent_from_body=raised if body.parent == WORLD else body.parent_from_body)
 
@@ -88,7 +88,7 @@ def _inside_plan(probes: np.ndarray, outline: np.ndarray) -> np.ndarray:
 
 
 def _plate(thing: Body, points: Points) -> Body:
-    """A box under the thing's foot, turned as the thing is about the vertical."""
+    """A box under the object's base, with the object's yaw."""
     own = thing.world_from_body.rotation
     yaw = np.arctan2(own[1, 0], own[0, 0])
     c, s = np.cos(yaw), np.sin(yaw)
@@ -132,7 +132,7 @@ def _moves(body: Body) -> bool:
 
 
 def _in_the_way(plate: Body, movers: Sequence[Points]) -> bool:
-    """Whether the plate's bounds meet those of anything that moves."""
+    """Whether the plate's bounding box meets that of a moving collider."""
     own = collider_corners_world(plate)[0]
     low, high = own.min(axis=0), own.max(axis=0)
     return any(bool(((c.max(axis=0) > low) & (c.min(axis=0) < high)).all()) for c in movers)

@@ -1,4 +1,4 @@
-"""One joint at a time: swept for overlaps, pushed for travel, and what stands in its way named."""
+"""Per-joint tests: overlap over the sweep, travel under a push, and obstacles."""
 
 from typing import Any
 
@@ -13,11 +13,11 @@ POSITIONS = 21
 DRIVE_FORCE_N, DRIVE_TORQUE_NM = 30.0, 10.0  # about what one hand gives a drawer or a door
 DRIVE_SECONDS = 6.0
 NEEDED_TRAVEL = 0.98
-NEEDED_CAVITY = 0.9  # walls apart: shelves and linings take the rest
+NEEDED_CAVITY = 0.9  # without walls: shelves and linings fill the rest
 
 
 def examine_joint(strict: Any, solid: Any, name: str) -> tuple[JointResult, list[Finding]]:
-    """Sweep and push one joint, all others closed; `solid` is the `strict` model with free-standing things in it."""
+    """Sweep and push one joint, all others closed; `solid` is the `strict` model with free-standing objects."""
     deepest, notes = _swept(strict, name)
     blockers = things_in_the_way(solid, name)
     notes += [finding("blocked-by", name, f"{blocker.name} stands in its way") for blocker in blockers]
@@ -53,7 +53,7 @@ def push_open(model: Any, joint: str) -> float:
 
 
 def things_in_the_way(solid: Any, name: str) -> list[Blocker]:
-    """Free-standing things that the joint's part runs into, each with where in the sweep it first does."""
+    """Free-standing objects that the joint's part hits, with the position of first contact."""
     import mujoco
 
     movers, free, scratch = movers_of(solid, name), free_bodies(solid), mujoco.MjData(solid)

@@ -1,4 +1,4 @@
-"""Joints whose parts meet when both are open: true of many real kitchens, and worth knowing before a robot finds out."""
+"""Collisions between parts of two open joints, as in many real kitchens."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,27 +11,27 @@ from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, joint_names, mover
 from r2c2r_core.export.rules.table import finding
 from r2c2r_core.model.report import Blocker, Finding
 
-_POSITIONS = 6  # of each of the two joints: every 15 to 20 degrees
+_POSITIONS = 6  # per joint: every 15 to 20 degrees
 _ALL_POSITIONS = 21
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Meeting:
-    """Two joints that cannot both stand open everywhere."""
+    """Two joints whose parts collide at some open positions."""
 
     joints: tuple[str, str]
     depth_m: float  # deepest overlap
-    first_at: tuple[float, float]  # of each joint, the least position at which they meet
+    first_at: tuple[float, float]  # for each joint, the smallest position at which they meet
 
     @property
     def finding(self) -> Finding:
-        """It in words."""
+        """The collision as a finding."""
         first, second = self.joints
         message = f"meets {second} when both are open (by up to {1000 * self.depth_m:.0f} mm): open one at a time"
         return finding("together", first, message)
 
     def blocker_of(self, joint: str) -> Blocker | None:
-        """What the meeting means for one joint."""
+        """The other joint as an obstacle of `joint`; None if the collision does not involve it."""
         if joint not in self.joints:
             return None
         own = self.joints.index(joint)
@@ -39,7 +39,7 @@ class Meeting:
 
 
 def meetings(model: Any) -> list[Meeting]:
-    """Every pair of joints whose parts overlap somewhere when both are open."""
+    """All pairs of joints whose parts overlap at some pair of open positions."""
     names = joint_names(model)
     reach = {name: _swept_box(model, name) for name in names}
     found = []
@@ -55,7 +55,7 @@ def meetings(model: Any) -> list[Meeting]:
 
 
 def all_together(model: Any) -> float:
-    """Deepest overlap in metres while every joint opens at the same share of its range."""
+    """Deepest overlap in metres while all joints open by the same fraction of their range."""
     import mujoco
 
     ranges = {name: model.joint(name).range for name in joint_names(model)}
@@ -84,7 +84,7 @@ def _positions(model: Any, name: str) -> np.ndarray:
 
 
 def _swept_box(model: Any, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Low and high corner (world) of all that a joint's part passes through, by its geoms' bounding spheres."""
+    """Low and high corner (world) of the swept volume of a joint's part, by its geoms' bounding spheres."""
     import mujoco
 
     data = mujoco.MjData(model)

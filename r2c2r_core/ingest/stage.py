@@ -36,7 +36,7 @@ __all__ = ["IngestConfig", "level_scan", "open_images", "read_capture", "read_re
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IngestConfig:
-    """Settings of ingest."""  # a LiDAR's handle of 2 x 20 cm stays; the outliers of the paper are mostly true surface
+    """How a recording is read."""  # a LiDAR's handle of 2 x 20 cm stays; the outliers of the paper are mostly true surface
 
     most_frames: int = setting(600, "frames kept of a longer recording, every n-th; numbers stay", ge=1, le=100_000)
     near_m: float = setting(0.08, "least depth believed, in m: a phone's LiDAR starts at about 0.1", ge=0, le=100)

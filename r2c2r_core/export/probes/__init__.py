@@ -1,1 +1,1 @@
-"""Scripts that load a bundle in an engine and write down what it holds; each runs by its path, in a process of its own."""
+"""Scripts that load a bundle in an engine and write out its values; each runs by path in a separate process."""

@@ -1,4 +1,4 @@
-"""Load a URDF in PyBullet and write what it holds: `python bullet.py scene.urdf answer.json`."""
+"""Load a URDF in PyBullet and write out its values: `python bullet.py scene.urdf answer.json`."""
 
 import json
 import sys
@@ -10,11 +10,11 @@ import numpy as np
 
 
 def read_back(urdf: str) -> dict[str, Any]:
-    """Joints and bodies as PyBullet holds them; the world link must hold the scene without a flag."""
+    """Joints and bodies as stored by PyBullet; the world link must fix the scene without a flag."""
     import pybullet
 
     client = pybullet.connect(pybullet.DIRECT)
-    # without the flag PyBullet makes up an inertia from the colliders
+    # without the flag PyBullet computes an inertia from the colliders
     body = pybullet.loadURDF(urdf, flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
     kinds = {pybullet.JOINT_REVOLUTE: "revolute", pybullet.JOINT_PRISMATIC: "prismatic"}
     joints, bodies = {}, {}
@@ -22,7 +22,7 @@ def read_back(urdf: str) -> dict[str, Any]:
         info = pybullet.getJointInfo(body, index)
         state = pybullet.getLinkState(body, index, computeForwardKinematics=True)
         dynamics = pybullet.getDynamicsInfo(body, index)
-        principal = _rotation(pybullet, state[1])  # world from principal axes: in these PyBullet says axis and moments
+        principal = _rotation(pybullet, state[1])  # world from principal axes, in which PyBullet gives axis and moments
         bodies[info[12].decode()] = {
             "mass_kg": dynamics[0],
             "com_world": state[0],

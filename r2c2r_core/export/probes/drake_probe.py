@@ -1,7 +1,7 @@
-"""Load scene.sdf in Drake and write what it holds: `python drake_probe.py scene.sdf answer.json`.
+"""Load scene.sdf in Drake and write out its values: `python drake_probe.py scene.sdf answer.json`.
 
-Runs in Drake's own environment, so it imports nothing of r2c2r. Every joint is set to its ends and the scene simulated for a
-moment: what is not finite then is a problem. Drake has a damping of joints, and no dry friction.
+Runs in Drake's own environment, so it imports nothing from r2c2r. Every joint is set to its limits and the scene simulated
+briefly: a non-finite value is a problem. Drake has joint damping, but no dry friction.
 """
 
 import json
@@ -16,7 +16,7 @@ _SECONDS = 0.05
 
 
 def read_back(scene: Path) -> dict[str, Any]:
-    """Joints and bodies as Drake holds them, closed."""
+    """Joints and bodies as stored by Drake, joints closed."""
     from pydrake.multibody.parsing import Parser  # type: ignore[import-not-found]  # lives in an environment of its own
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph  # type: ignore[import-not-found]
     from pydrake.systems.analysis import Simulator  # type: ignore[import-not-found]
@@ -24,7 +24,7 @@ def read_back(scene: Path) -> dict[str, Any]:
 
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, 0.002)
-    parser = Parser(plant)  # one that is not kept takes the models with it
+    parser = Parser(plant)  # the models are deleted with their parser
     parser.AddModels(str(scene))
     plant.Finalize()
     diagram = builder.Build()

@@ -1,7 +1,7 @@
-"""Load scene.xml in MJX and write what it holds: `python mjx_probe.py scene.xml answer.json`.
+"""Load scene.xml in MJX and write out its values: `python mjx_probe.py scene.xml answer.json`.
 
-Runs in MJX's own environment, so it imports nothing of r2c2r but its neighbours. What is read back are the arrays on MJX's
-device. Every joint is swept; from each position MJX and MuJoCo step side by side.
+Runs in MJX's own environment, so it imports nothing from r2c2r but its neighbouring scripts. Values are read back from the
+arrays on MJX's device. Every joint is swept; from each position MJX and MuJoCo step in parallel.
 """
 
 import json
@@ -17,7 +17,7 @@ from sweeping import HELD, Stepped, sweep_beside_mujoco  # type: ignore[import-n
 
 
 def read_back(scene: Path) -> dict[str, Any]:
-    """Joints and bodies as MJX holds them, closed; `problem` where it moves otherwise than MuJoCo."""
+    """Joints and bodies as stored by MJX, joints closed; `problem` where its motion differs from MuJoCo's."""
     import jax  # type: ignore[import-not-found]  # lives in an environment of its own
     from mujoco import mjx
 

@@ -1,4 +1,4 @@
-"""Compile a URDF or an MJCF in MuJoCo: what it holds. It knows no largest joint velocity."""
+"""Compile a URDF or an MJCF in MuJoCo and read back its values. MuJoCo has no maximum joint velocity."""
 
 from pathlib import Path
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def read_back(scene: Path) -> dict[str, Any]:
-    """Joints and bodies as MuJoCo holds them; raises what MuJoCo raises on a scene it refuses."""
+    """Joints and bodies as stored by MuJoCo; raises MuJoCo's own errors on a rejected scene."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_path(str(scene))
@@ -17,7 +17,7 @@ def read_back(scene: Path) -> dict[str, Any]:
 
 
 def held_by(model: Any, data: Any) -> dict[str, Any]:
-    """What a model holds whose kinematics `data` is computed for."""
+    """Joints and bodies of a model, with kinematics already computed in `data`."""
     import mujoco
 
     moving = [j for j in range(model.njnt) if model.jnt_type[j] in _KINDS]

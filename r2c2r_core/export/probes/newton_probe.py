@@ -1,8 +1,8 @@
-"""Load scene.usda in Newton, on the CPU, and write what it holds: `python newton_probe.py scene.usda answer.json`.
+"""Load scene.usda in Newton, on the CPU, and write out its values: `python newton_probe.py scene.usda answer.json`.
 
-Runs in Newton's own environment, so it imports nothing of r2c2r. Every joint is put to its end in turn and the scene stepped by
-Newton's MuJoCo solver: what is not finite then is a problem. Newton reads friction and armature in its own words, damping and
-effort from the drive; it has no body for what stands fast.
+Runs in Newton's own environment, so it imports nothing from r2c2r. Every joint in turn is set to its limit and the scene
+stepped by Newton's MuJoCo solver: a non-finite value is a problem. Newton reads friction and armature from its own schema,
+damping and effort from the drive; it has no body for fixed parts.
 """
 
 import json
@@ -16,11 +16,11 @@ import numpy as np
 _STEPS, _STEP_S = 10, 0.002
 _KINDS = {0: "prismatic", 1: "revolute"}  # newton.JointType
 _COLLIDES = 2  # newton.ShapeFlags.COLLIDE_SHAPES
-_HELD = 0.05  # of the travel that a joint may move in 0.02 s, let go at its end
+_HELD = 0.05  # maximum fraction of its travel that a joint may move in 0.02 s when released at its limit
 
 
 def read_back(scene: Path) -> dict[str, Any]:
-    """Joints and bodies as Newton holds them, closed."""
+    """Joints and bodies as stored by Newton, joints closed."""
     import newton  # type: ignore[import-not-found]  # lives in an environment of its own
     import warp  # type: ignore[import-not-found]
     from newton.usd import SchemaResolverNewton, SchemaResolverPhysx  # type: ignore[import-not-found]
@@ -44,7 +44,7 @@ def read_back(scene: Path) -> dict[str, Any]:
 
 
 def _fixed(scene: Path) -> list[str]:
-    """What has a mass and no body of its own: Newton makes it part of the world."""
+    """Names of prims with a mass but without a rigid body, which Newton merges into the world."""
     from pxr import Usd, UsdPhysics
 
     stage = Usd.Stage.Open(str(scene))  # prims end with their stage
@@ -83,7 +83,7 @@ def _body(model: Any, closed: Any, body: int) -> dict[str, Any]:
 
 
 def _swept(newton: Any, model: Any, moving: list[int]) -> str:
-    """What goes wrong with a joint at its end, in words; empty where nothing does."""
+    """Description of the first joint that fails at its limit; empty where none does."""
     solver, control = newton.solvers.SolverMuJoCo(model), model.control()
     for joint in moving:
         name = str(model.joint_label[joint]).rsplit("/", 1)[-1]

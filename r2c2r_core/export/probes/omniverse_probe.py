@@ -1,6 +1,6 @@
-"""What NVIDIA's asset validator says of scene.usda: `python omniverse_probe.py scene.usda answer.json`.
+"""Run NVIDIA's asset validator on scene.usda: `python omniverse_probe.py scene.usda answer.json`.
 
-Runs in an environment of its own (omniverse-asset-validator and usd-core), so it imports nothing of r2c2r.
+Runs in a separate environment (omniverse-asset-validator and usd-core), so it imports nothing from r2c2r.
 """
 
 import json
@@ -12,7 +12,7 @@ from typing import Any
 
 
 def issues_of(scene: Path) -> dict[str, Any]:
-    """Every issue of every rule: the rule's id where it has one, else its name; how serious; where; what."""
+    """All issues of all rules: the rule's id, else its name; severity; location; message."""
     logging.disable(logging.INFO)
     from omni.asset_validator import ValidationEngine  # type: ignore[import-not-found]  # lives in an environment of its own
 

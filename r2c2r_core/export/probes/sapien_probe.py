@@ -1,6 +1,6 @@
-"""Load a URDF in SAPIEN and write what it holds: `python sapien_probe.py scene.urdf answer.json`.
+"""Load a URDF in SAPIEN and write out its values: `python sapien_probe.py scene.urdf answer.json`.
 
-Runs in SAPIEN's own environment, so it imports nothing of r2c2r. Visuals are stripped first: SAPIEN 3 needs a Vulkan GPU for
+Runs in SAPIEN's own environment, so it imports nothing from r2c2r. Visuals are stripped first: SAPIEN 3 needs a Vulkan GPU for
 them even to load. Its URDF loader drops joint friction, effort and velocity (3.0.3: `articulation_builder.py` sets limits and
 damping only, every joint keeps PhysX's default friction of 0.05), so those are not read.
 """
@@ -16,7 +16,7 @@ import numpy as np
 
 
 def read_back(urdf: Path) -> dict[str, Any]:
-    """Joints and bodies as SAPIEN holds them."""
+    """Joints and bodies as stored by SAPIEN."""
     import sapien  # type: ignore[import-not-found]  # lives in an environment of its own
     from sapien import physx
 

@@ -1,4 +1,4 @@
-"""Every joint swept in an engine that runs MuJoCo's models, and in MuJoCo itself beside it. Imports nothing of r2c2r."""
+"""Comparison sweep of every joint in an engine for MuJoCo models and in MuJoCo. Imports nothing from r2c2r."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,13 +17,15 @@ Stepped = np.ndarray
 
 _SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of each joint's travel
 _STEPS = 10
-_APART = 2e-3  # rad or m within 10 steps of 2 ms: single precision and another order of contacts, not another scene
+_APART = (
+    2e-3  # rad or m within 10 steps of 2 ms: allows for single precision and another order of contacts, not for another scene
+)
 
 
 def sweep_beside_mujoco(model: Any, stepped: Callable[[np.ndarray, int], Stepped]) -> str:
-    """Where the engine leaves MuJoCo, in words; empty where both go the same way from every position of every joint.
+    """Description of the engine's deviations from MuJoCo; empty where both move alike from every position of every joint.
 
-    `stepped` gives the positions after so many steps at rest from some.
+    `stepped` returns the positions after a number of steps, started at rest from given positions.
     """
     for joint in range(model.njnt):
         if model.jnt_type[joint] not in (2, 3):  # slides and hinges

@@ -1,4 +1,4 @@
-"""Read scene.usda with the USD library: what it holds, and what the library's own validators say of it."""
+"""Read scene.usda with the USD library: its values, and the errors of the library's own validators."""
 
 import json
 import sys
@@ -12,7 +12,7 @@ _FRAMES_M = 1e-4  # single precision of joint frames metres away from the origin
 
 
 def read_back(path: Path) -> dict[str, Any]:
-    """Joints and bodies as USD holds them, lengths in metres, angles in radians; raises what the library raises."""
+    """Joints and bodies as stored in USD, lengths in metres, angles in radians; raises the library's own errors."""
     from pxr import Usd, UsdGeom, UsdPhysics
 
     stage = Usd.Stage.Open(str(path))
@@ -53,7 +53,7 @@ def _kind(prim: Any) -> str | None:
 
 
 def _joint(prim: Any, cache: Any) -> dict[str, Any]:
-    """One joint; what dry friction and velocity PhysX is told stands in its schema PhysxJointAxisAPI."""
+    """One joint; dry friction and velocity are in PhysX's schema PhysxJointAxisAPI."""
     from pxr import UsdPhysics
 
     kind = _kind(prim)
@@ -95,13 +95,13 @@ def _body(prim: Any, cache: Any) -> dict[str, Any]:
 
 
 def _value(attribute: Any) -> float:
-    """An attribute's number; NaN where nobody wrote it."""
+    """An attribute's number; NaN where it is not authored."""
     value = attribute.Get() if attribute else None
     return float("nan") if value is None else float(value)
 
 
 def _joints_apart(prims: list[Any]) -> list[str]:
-    """Joints whose frame lies elsewhere when seen from their two bodies: an engine snaps them together on the first step."""
+    """Joints whose frame differs between their two bodies: an engine snaps them together on the first step."""
     from pxr import UsdGeom, UsdPhysics
 
     lines = []
@@ -119,7 +119,7 @@ def _joints_apart(prims: list[Any]) -> list[str]:
 
 
 def _frame(prim: Any, cache: Any, body: Any, position: Any, rotation: Any) -> np.ndarray:
-    """A joint's frame in the world, 4x4, as one of its bodies places it; no body is the world itself."""
+    """A joint's frame in the world, 4x4, as given by one of its bodies; no body means the world itself."""
     from pxr import Gf
 
     local = Gf.Matrix4d().SetRotate(Gf.Quatd(rotation.Get()))

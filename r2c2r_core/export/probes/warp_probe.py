@@ -1,7 +1,7 @@
-"""Load scene.xml in MuJoCo Warp, on the CPU, and write what it holds: `python warp_probe.py scene.xml answer.json`.
+"""Load scene.xml in MuJoCo Warp, on the CPU, and write out its values: `python warp_probe.py scene.xml answer.json`.
 
-Runs in an environment of its own, so it imports nothing of r2c2r but its neighbours. What is read back are Warp's arrays. Every
-joint is swept beside MuJoCo, and steps are counted in one world and in 256 at once.
+Runs in a separate environment, so it imports nothing from r2c2r but its neighbouring scripts. Values are read back from
+Warp's arrays. Every joint is swept in parallel with MuJoCo, and the step rate is measured for one world and for 256.
 """
 
 import json
@@ -21,11 +21,11 @@ _COUNTED_STEPS = 10
 _ROOM = {
     "njmax": 1024,
     "nconmax": 512,
-}  # constraints, contacts a world: else sized by the first state, and what is beyond is dropped
+}  # constraints, contacts per world: else sized by the first state, and any excess is dropped
 
 
 def read_back(scene: Path) -> dict[str, Any]:
-    """Joints and bodies as MuJoCo Warp holds them, closed; `problem` where it moves otherwise than MuJoCo."""
+    """Joints and bodies as stored by MuJoCo Warp, joints closed; `problem` where its motion differs from MuJoCo's."""
     import mujoco_warp  # type: ignore[import-not-found]  # lives in an environment of its own
     import warp  # type: ignore[import-not-found]
 

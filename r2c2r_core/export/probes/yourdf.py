@@ -1,4 +1,4 @@
-"""Load a URDF in yourdfpy: what it holds, and what its own validation says."""
+"""Load a URDF in yourdfpy: its values, and the errors of its own validation."""
 
 import logging
 import warnings
@@ -10,7 +10,7 @@ import numpy as np
 
 
 def read_back(scene: Path) -> dict[str, Any]:
-    """Joints and bodies as yourdfpy holds them, all meshes loaded."""
+    """Joints and bodies as stored by yourdfpy, with all meshes loaded."""
     import yourdfpy
 
     logger = logging.getLogger("yourdfpy.urdf")

@@ -1,1 +1,1 @@
-"""What the linter looks for, one file a subject; each rule is a line of `table.py`."""
+"""Rules of the linter, one file per subject; each rule is a line of `table.py`."""

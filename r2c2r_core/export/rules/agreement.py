@@ -1,4 +1,4 @@
-"""Whether the manifest and scene.xml tell the same story as scene.urdf."""
+"""Consistency of the manifest and scene.xml with scene.urdf."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ SUPPORT_SUFFIX = "_support"
 
 
 def check_agreement(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
-    """Required files, the manifest and scene.xml against the URDF, what scene.usda reads (its loader compares the rest)."""
+    """Check required files, manifest and scene.xml against the URDF, and scene.usda's references (its loader does the rest)."""
     for name in REQUIRED_FILES:
         if not (files.folder / name).is_file():
             yield finding("file-missing", name, "it is not in the bundle")
@@ -41,7 +41,7 @@ def check_agreement(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
 
 
 def _own_checks(files: BundleFiles) -> Iterator[Finding]:
-    """What a format itself finds wrong with its file; one that another package adds need not be in every bundle."""
+    """Findings of each format's own check; formats added by other packages need not be in every bundle."""
     for entry in formats():
         path = files.folder / entry.file
         if entry.check is None or not path.is_file():
@@ -95,7 +95,7 @@ def _objects(urdf: Urdf, objects: list[ManifestObject]) -> Iterator[Finding]:
 
 
 def _links_of(name: str, urdf: Urdf, names: list[str]) -> set[str]:
-    """Links that start with the object's name and with no longer object's name; supports are nobody's."""
+    """Links that start with the object's name and with no longer object's name; supports belong to no object."""
     longer = [other for other in names if other != name and other.startswith(f"{name}_")]
     return {
         link.name
@@ -192,7 +192,7 @@ def _mjcf_masses(urdf: Urdf, root: ET.Element) -> Iterator[Finding]:
 
 
 def _number(text: str) -> float:
-    """NaN, which nothing equals, for what is no number."""
+    """The number; NaN, which equals nothing, for invalid text."""
     try:
         return float(text)
     except ValueError:

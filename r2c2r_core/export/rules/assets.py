@@ -1,4 +1,4 @@
-"""Whether each asset, scene.sdf and the ROS package name files of the bundle alone, and assets have the right joints."""
+"""Checks that assets, scene.sdf and the ROS package refer only to files of the bundle, and that assets' joints match."""
 
 import json
 import math
@@ -24,7 +24,7 @@ _PACKAGE = re.compile(r"package://[a-z0-9_]+/")
 
 
 def check_assets(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
-    """Nothing of a bundle without these files, as older ones are; what was taken out of a newer one, its checksums tell."""
+    """Findings on assets; none for older bundles without these files (in newer ones, checksums detect removed files)."""
     objects = _objects(files)
     meshes = {shape.mesh for link in urdf.links for shape in link.shapes if shape.mesh is not None}
     meshes |= {name for item in objects for names in item["meshes"].values() for name in names}
@@ -41,7 +41,7 @@ def check_assets(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
 
 
 def _references(path: Path) -> list[str]:
-    """What a file reads, as it says it; of another kind of file nothing is known."""
+    """References in a file, as written; empty for other file types."""
     if path.suffix == ".usda":
         return [triple or single for triple, single in USD_REFERENCE.findall(path.read_text(errors="replace"))]
     if path.suffix == ".glb":
@@ -54,7 +54,7 @@ def _references(path: Path) -> list[str]:
 
 
 def _paths(name: str, references: Iterable[str], files: BundleFiles, meshes: Collection[str]) -> Iterator[Finding]:
-    """Each must be a file of the bundle, named from where the reading file stands; the scene's own `meshes` have rules."""
+    """Findings on references that are not bundle files relative to the referring file; the scene's `meshes` have own rules."""
     for reference in references:
         plain = "" if name.startswith("ros/") else posixpath.dirname(name)
         said = _PACKAGE.sub("", reference, count=1) if name.startswith("ros/") else reference
@@ -66,7 +66,7 @@ def _paths(name: str, references: Iterable[str], files: BundleFiles, meshes: Col
 
 
 def _same_joints(name: str, path: Path, urdf: Urdf, objects: list[dict[str, Any]]) -> Iterator[Finding]:
-    """Of scene.urdf, or of the manifest where those two differ, which has a rule of its own."""
+    """Findings on an asset's joints that match neither scene.urdf nor the manifest (their difference has its own rule)."""
     said = {joint["name"]: (joint["type"], joint["lower"], joint["upper"]) for item in objects for joint in item["joints"]}
     scene = {joint.name: _told(joint) for joint in urdf.joints}
     for joint in read_urdf(path).joints:
@@ -84,7 +84,7 @@ def _alike(one: _Told, other: _Told | None) -> bool:
 
 
 def _objects(files: BundleFiles) -> list[dict[str, Any]]:
-    """Of the manifest; none of one that breaks its schema, which has a rule of its own."""
+    """Objects of the manifest; empty if it breaks its schema, which has its own rule."""
     try:
         document = json.loads((files.folder / "manifest.json").read_bytes())
         return [item.model_dump() for item in Manifest.model_validate(document).objects]

@@ -1,4 +1,4 @@
-"""Files of a bundle as rules see them: safe paths, and meshes read once."""
+"""Files of a bundle for the rules: safe paths, and cached meshes."""
 
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -11,7 +11,7 @@ from r2c2r_core.disk import is_below
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObjMesh:
-    """What matters of an OBJ or STL file."""
+    """Content of an OBJ or STL file relevant to the rules."""
 
     vertices: Points
     faces: Faces
@@ -27,7 +27,7 @@ class BundleFiles:
     _meshes: dict[str, ObjMesh | None] = field(default_factory=dict)
 
     def path(self, reference: str) -> Path | None:
-        """The file a relative reference names, or None when the reference leaves the bundle or is no plain path."""
+        """The file of a relative reference, or None when it leaves the bundle or is not a plain path."""
         if not is_inside(reference):
             return None
         path = self.folder / reference
@@ -42,13 +42,13 @@ class BundleFiles:
 
 
 def is_inside(reference: str) -> bool:
-    """Whether a reference is a plain relative path that stays where it starts."""
+    """Whether a reference is a plain relative path that stays inside its folder."""
     parts = PurePosixPath(reference).parts
     return bool(parts) and ":" not in reference and "\\" not in reference and parts[0] != "/" and ".." not in parts
 
 
 def read_mesh(path: Path) -> ObjMesh | None:
-    """An OBJ or STL file; None when it holds no triangle or cannot be read."""
+    """Mesh of an OBJ or STL file; None when it has no triangle or cannot be read."""
     try:
         return _read_obj(path) if path.suffix.lower() == ".obj" else _read_stl(path)
     except (ValueError, OverflowError, IndexError, OSError, KeyError, TypeError):  # a face may name vertex 10^30

@@ -1,4 +1,4 @@
-"""Masses and inertias that a body can have."""
+"""Rules on the physical plausibility of masses and inertias."""
 
 from collections.abc import Iterator
 
@@ -11,11 +11,11 @@ from r2c2r_core.export.rules.files import BundleFiles
 from r2c2r_core.export.rules.table import finding
 from r2c2r_core.model.report import Finding
 
-_BEYOND_M = 0.02  # a fitted visual may end this far inside what the panels weigh
+_BEYOND_M = 0.02  # a fitted visual may end this far inside the panels that give the mass
 
 
 def check_inertia(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
-    """Every link but the bare root has an inertial that its size allows."""
+    """Check that every link but the bare root has an inertial consistent with its size."""
     for link in urdf.links:
         if link.inertial is None:
             if not (link.name == WORLD and not link.shapes):
@@ -40,7 +40,7 @@ def link_points(link: UrdfLink, files: BundleFiles) -> Points:
 
 def _possible(where: str, inertial: UrdfInertial, points: Points) -> Iterator[Finding]:
     if np.isnan(inertial.mass_kg) or np.isnan(inertial.inertia).any() or np.isnan(inertial.com_link).any():
-        return  # rule `number` has said so
+        return  # reported by rule `number`
     if inertial.mass_kg <= 0.0:
         yield finding("mass-positive", where, f"mass {inertial.mass_kg:.4g} kg")
         return

@@ -1,4 +1,4 @@
-"""Limits, axes and dynamics of moving joints."""
+"""Rules on limits, axes and dynamics of moving joints."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ _MOST_EFFORT = 500.0  # N or N m; furniture takes tens
 
 
 def check_joints(urdf: Urdf) -> Iterator[Finding]:
-    """Every moving joint has a unit axis, complete limits around zero, and friction."""
+    """Check that every moving joint has a unit axis, complete limits around zero, and friction."""
     for joint in urdf.joints:
         if joint.type in MOVING:
             length = float(np.linalg.norm(joint.axis))

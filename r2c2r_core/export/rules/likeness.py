@@ -1,4 +1,4 @@
-"""Likeness of the scene to what was filmed: contradictions, unsure places and hinges, joints that hardly open."""
+"""Rules on likeness to the recording: contradictions, uncertain placements and hinges, joints that hardly open."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -11,14 +11,16 @@ from r2c2r_core.export.rules.table import LIKENESS_RULES, finding
 from r2c2r_core.model.handle import Room
 from r2c2r_core.model.report import Finding, Likeness
 
-_SURE_HINGE = 0.8  # certainty of a side; doors without a telling handle have 0.75 (as a pair) or the share of their category
-_LEAST_TRAVEL = 0.5  # of what its kind opens: less, and its unit or its neighbour is in the wrong place
+_SURE_HINGE = (
+    0.8  # certainty of a hinge side; doors without an informative handle have 0.75 (as a pair) or their category's frequency
+)
+_LEAST_TRAVEL = 0.5  # of the category's travel: below, the unit or its neighbour is misplaced
 
 
 def judge_likeness(findings: Iterable[Finding]) -> Likeness:
-    """The verdict of these findings: failed where one is an error, doubtful where there is any.
+    """The likeness verdict of the findings: failed with any error, doubtful with any finding.
 
-    Findings of other rules, as of physics, say nothing about it. Each object is named once, with the first of its findings.
+    Findings of other rules, such as physics, are ignored. Each object is listed once, with its first finding.
     """
     about = sorted((found for found in findings if found.rule in LIKENESS_RULES), key=lambda found: found.severity)
     doubts = dict[str, str]()
@@ -30,7 +32,7 @@ def judge_likeness(findings: Iterable[Finding]) -> Likeness:
 
 
 def check_likeness(files: BundleFiles) -> Iterator[Finding]:
-    """What manifest.json says against itself; one that cannot be read is named by check_agreement."""
+    """Findings on contradictions in manifest.json; an unreadable one is reported by check_agreement."""
     path = files.folder / "manifest.json"
     if not path.is_file():
         return
@@ -49,7 +51,7 @@ def check_likeness(files: BundleFiles) -> Iterator[Finding]:
 
 
 def _contradictions(entries: list[dict[str, Any]], present: set[str]) -> Iterator[Finding]:
-    """Those among objects of the bundle: what was left out of it contradicts nothing there."""
+    """Findings on contradictions between objects of the bundle; omitted objects are ignored."""
     for entry in entries:
         if entry["rule"] in LIKENESS_RULES and present.issuperset(entry["objects"]):
             where = ", ".join(entry["objects"])
@@ -67,7 +69,7 @@ def _unsure_place(item: dict[str, Any]) -> Iterator[Finding]:
 
 
 def _unsure_hinges(objects: list[dict[str, Any]]) -> Iterator[Finding]:
-    """One finding for all doors whose side little tells: they are set together."""
+    """One finding for all doors with an uncertain hinge side, as they are set together."""
     unsure = {
         item["name"]
         for item in objects

@@ -1,4 +1,4 @@
-"""Mesh files: where they lie, what they hold, and whether an engine collides with what is drawn."""
+"""Rules on mesh files: paths, content, and agreement of colliders with visuals."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -13,12 +13,12 @@ from r2c2r_core.export.writers.meshes import MOST_COPLANAR, MOST_HULL_VERTICES, 
 from r2c2r_core.model.report import Finding
 
 _FLAT_M = 2e-4
-_DENT_M, _DENT_SHARE = 1e-3, 0.01  # how far inside its hull a vertex may lie: 1 mm, or 1 % of the size
-_FILLED_SHARE = 0.97  # of the hull's volume
+_DENT_M, _DENT_SHARE = 1e-3, 0.01  # maximum depth of a vertex inside its hull: 1 mm, or 1 % of the size
+_FILLED_SHARE = 0.97  # minimum fraction of the hull's volume
 
 
 def check_meshes(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
-    """Paths, formats, scales, textures, and convex colliders."""
+    """Check paths, formats, scales, textures, and convexity of colliders."""
     yield from _basenames(urdf)
     moving = {joint.child for joint in urdf.joints if joint.type in MOVING}
     for link in urdf.links:
@@ -28,7 +28,7 @@ def check_meshes(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
 
 
 def convexity_defect(mesh: ObjMesh) -> str | None:
-    """Why a collision mesh is flat or concave, in words that start with the rule's last word; None when it is convex."""
+    """Reason why a collision mesh is flat or concave, starting with the rule's last word; None when it is convex."""
     from scipy.spatial import ConvexHull, QhullError
 
     used = np.unique(mesh.faces)
@@ -53,7 +53,7 @@ def convexity_defect(mesh: ObjMesh) -> str | None:
 
 
 def most_coplanar(mesh: ObjMesh) -> int:
-    """Most vertices of a convex mesh that lie in one plane of its hull."""
+    """Maximum number of vertices of a convex mesh in one plane of its hull."""
     from scipy.spatial import ConvexHull
 
     points = mesh.vertices[np.unique(mesh.faces)]
@@ -61,7 +61,7 @@ def most_coplanar(mesh: ObjMesh) -> int:
 
 
 def _closed(mesh: ObjMesh) -> bool:
-    """Whether every edge, by position, is used as often one way as the other."""
+    """Whether the mesh is closed: every edge, by position, is used equally often in both directions."""
     _, same = np.unique(np.round(mesh.vertices, 6), axis=0, return_inverse=True)
     faces = same.ravel()[mesh.faces]
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])

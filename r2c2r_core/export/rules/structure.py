@@ -1,4 +1,4 @@
-"""Names, tree and joint types."""
+"""Rules on names, the tree and joint types."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ _WANTED = {"strippath": "false", "discardvisual": "false", "fusestatic": "false"
 
 
 def check_structure(urdf: Urdf) -> Iterator[Finding]:
-    """Numbers, names, one root, one tree, joint types, the <mujoco> block."""
+    """Check numbers, names, one root, one tree, joint types, the <mujoco> block."""
     for where, text in urdf.malformed:
         yield finding("number", where, f"cannot read {text} as finite numbers")
     yield from _names(urdf)

@@ -1,4 +1,4 @@
-"""Every rule of linter, simulation, likeness, hands and checksums: its name, how bad a hit is, what it protects from."""
+"""Table of all rules (linter, simulation, likeness, hands, checksums): name, severity, and the failure it prevents."""
 
 from typing import Literal, NamedTuple
 
@@ -6,7 +6,7 @@ from r2c2r_core.model.report import Finding
 
 
 class Rule(NamedTuple):
-    """One line of the table."""
+    """One row of the table."""
 
     severity: Literal["error", "warning"]
     protects: str
@@ -119,5 +119,5 @@ EVERY_RULE = RULES | SIMULATION_RULES | LIKENESS_RULES | HAND_RULES | SEAL_RULES
 
 
 def finding(rule: str, where: str, message: str) -> Finding:
-    """A hit of a rule of any table."""
+    """A finding of a rule in any table."""
     return Finding(rule=rule, severity=EVERY_RULE[rule].severity, where=where, message=message)

@@ -1,1 +1,1 @@
-"""One file a format; `table.py` lists them."""
+"""Writers, one file per format; `table.py` lists them."""

@@ -1,7 +1,7 @@
-"""scene.glb: the scene for web viewers, closed, with its joints as glTF animations: one clip a joint, and `all`.
+"""scene.glb: the scene for web viewers, closed, with joints as glTF animations: one clip per joint, and `all`.
 
-One node a link with the link's name (glTF 2.0). glTF is +Y up: the root node turns the world. It has no word for a joint: type,
-axis and limits stand in the node's `extras`.
+One node per link with the link's name (glTF 2.0). glTF is +Y up: the root node rotates the world. It has no joints: type,
+axis and limits are in the node's `extras`.
 """
 
 import json
@@ -30,7 +30,7 @@ _PLAIN = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
 
 
 def write_glb(plan: Plan, path: Path) -> None:
-    """Write the plan as one binary glTF with its textures in it, and each object's asset, which names them where they are."""
+    """Write the plan as one binary glTF with embedded textures, and each object's asset, which refers to texture files."""
     _write(plan, path, embedded=True)
     for asset in assets_of(plan):
         file = path.parent / asset_file(asset.name, ".glb")
@@ -41,7 +41,7 @@ def write_glb(plan: Plan, path: Path) -> None:
 def _write(plan: Plan, path: Path, *, embedded: bool) -> None:
     gltf = _Gltf(path.parent if embedded else None)
     nodes = {WORLD: _node(WORLD, Rigid3(Y_UP_FROM_WORLD[:3, :3], np.zeros(3)))}
-    materials: dict[str, int] = {}  # one a texture
+    materials: dict[str, int] = {}  # one per texture
     for body in plan.bodies:
         nodes[body.parent].setdefault("children", []).append(len(nodes))
         nodes[body.name] = _node(body.name, body.parent_from_body) | _mesh(body, gltf, materials)
@@ -63,7 +63,7 @@ def _write(plan: Plan, path: Path, *, embedded: bool) -> None:
 
 
 def check_glb(path: Path) -> Iterator[str]:
-    """Whether the container is whole: its header (glTF 2.0, section 4.4) tells magic, version and length."""
+    """Errors in the container: its header (glTF 2.0, section 4.4) gives magic, version and length."""
     content = path.read_bytes()
     if len(content) < 12 or content[:4] != b"glTF":
         yield "does not begin with 'glTF'"
@@ -76,7 +76,7 @@ def check_glb(path: Path) -> Iterator[str]:
 
 
 class _Gltf:
-    """The tables of a document that refer to one buffer, and the buffer; pictures of `folder` go into it, or stay files."""
+    """glTF tables and their single buffer; pictures of `folder` are embedded, or stay files if it is None."""
 
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
@@ -86,24 +86,24 @@ class _Gltf:
         self.binary = bytearray()
 
     def add(self, table: str, entry: dict[str, Any]) -> int:
-        """Number of the new entry."""
+        """Append an entry and return its number."""
         self.tables[table].append(entry)
         return len(self.tables[table]) - 1
 
     def picture(self, file: str) -> dict[str, Any]:
-        """Where a PNG is found."""
+        """Image entry for a PNG, by file or embedded."""
         if self.folder is None:
             return {"uri": file}
         return {"mimeType": "image/png", "bufferView": self.view((self.folder / file).read_bytes())}
 
     def view(self, content: bytes) -> int:
-        """Number of a new buffer view, aligned as accessors need it."""
+        """Append an aligned buffer view and return its number."""
         start = len(self.binary)
         self.binary += content + b"\0" * (-len(content) % 4)
         return self.add("bufferViews", {"buffer": 0, "byteOffset": start, "byteLength": len(content)})
 
     def accessor(self, values: np.ndarray, kind: str, *, bounds: bool = False) -> int:
-        """Number of a new accessor: 32-bit floats, or indices."""
+        """Append an accessor (32-bit floats, or indices) and return its number."""
         whole = values.dtype.kind in "iu"
         raw = np.ascontiguousarray(values, dtype="<u4" if whole else "<f4")
         entry: dict[str, Any] = {"componentType": _UNSIGNED if whole else _FLOAT, "count": len(raw), "type": kind}
@@ -119,7 +119,7 @@ def _node(name: str, parent_from_node: Rigid3) -> dict[str, Any]:
 
 
 def _handle_node(handle: Handle, plan: Plan) -> dict[str, Any]:
-    """An empty node in a handle, +Z into the front and +X along the grip."""
+    """An empty node at a handle, +Z into the front and +X along the grip."""
     body = plan.body(handle.link)
     size = [round(float(value), 6) for value in handle.size_m]
     extras = asdict(labels_of_handle(handle, body)) | {"handle": handle.kind, "joint": handle.joint, "size_m": size}
@@ -127,7 +127,7 @@ def _handle_node(handle: Handle, plan: Plan) -> dict[str, Any]:
 
 
 def _mesh(body: Body, gltf: _Gltf, materials: dict[str, int]) -> dict[str, int]:
-    """The node's reference to the mesh of a body; nothing for one without a shape."""
+    """The node's reference to the mesh of a body; empty for one without a shape."""
     visual, attributes = body.link.visual, dict[str, int]()
     if visual is not None and body.texture_file is not None:
         vertices, faces = visual.vertices, visual.faces
@@ -137,7 +137,7 @@ def _mesh(body: Body, gltf: _Gltf, materials: dict[str, int]) -> dict[str, int]:
         material = materials[body.texture_file]
     else:
         vertices, faces = box_mesh(body)
-        vertices, faces = vertices[faces].reshape(-1, 3), np.arange(3 * len(faces))  # flat shading: corners of their own
+        vertices, faces = vertices[faces].reshape(-1, 3), np.arange(3 * len(faces))  # flat shading: unshared corners
         plain = {"baseColorFactor": [*map(float, body.link.colour), 1.0], **_PLAIN}
         material = gltf.add("materials", {"name": f"{body.name}_vis", "pbrMetallicRoughness": plain})
     if not len(faces):
@@ -148,7 +148,7 @@ def _mesh(body: Body, gltf: _Gltf, materials: dict[str, int]) -> dict[str, int]:
 
 
 def _textured(gltf: _Gltf, file: str) -> int:
-    """Number of a new material that shows a PNG file."""
+    """Append a material with a PNG texture and return its number."""
     name = PurePosixPath(file).stem
     image = gltf.add("images", {"name": name, **gltf.picture(file)})
     look = {"baseColorTexture": {"index": gltf.add("textures", {"source": image})}, **_PLAIN}
@@ -156,7 +156,7 @@ def _textured(gltf: _Gltf, file: str) -> int:
 
 
 def _clips(plan: Plan, gltf: _Gltf, nodes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
-    """A clip of every joint, and before them one of all."""
+    """One clip of all joints, then one for each joint."""
     moving = [body for body in plan.bodies if body.joint is not None]
     if not moving:
         return []

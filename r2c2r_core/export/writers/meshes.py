@@ -1,4 +1,4 @@
-"""Meshes as files: OBJ + MTL + PNG for visuals (the one textured format every loader reads), plain OBJ for convex pieces."""
+"""Mesh files: OBJ + MTL + PNG for visuals (the only textured format every loader reads), plain OBJ for convex pieces."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ _IN_PLANE_M = 1e-5
 
 
 def write_body(body: Body, folder: Path, texture_max_px: int) -> None:
-    """Write the meshes of one body under `folder`: basenames are unique in the bundle, scale is baked in.
+    """Write the meshes of one body under `folder`, with basenames unique in the bundle and scale applied.
 
     Raises ExportFailed on a collider that no engine can use.
     """
@@ -36,9 +36,9 @@ def write_body(body: Body, folder: Path, texture_max_px: int) -> None:
 
 
 def convex_hull(points: Points, where: str) -> tuple[Points, Faces]:
-    """Vertices and outward faces of the convex hull, at most MOST_HULL_VERTICES of them and MOST_COPLANAR of a plane.
+    """Vertices and outward faces of the convex hull, with at most MOST_HULL_VERTICES and MOST_COPLANAR in one plane.
 
-    What is left out lies flattest.
+    The flattest vertices are removed first.
 
     Raises ExportFailed on flat points, which no engine can use.
     """
@@ -60,13 +60,13 @@ def convex_hull(points: Points, where: str) -> tuple[Points, Faces]:
 
 
 def coplanar(points: Points, planes: np.ndarray) -> np.ndarray:
-    """Which of the points (n,) lie in the plane that holds most of them; planes (m, 4) as qhull gives a hull's."""
+    """Mask (n,) of the points in the hull plane with most points; planes (m, 4) as given by qhull."""
     within = np.abs(points @ planes[:, :3].T + planes[:, 3]) < _IN_PLANE_M
     return np.asarray(within[:, np.argmax(within.sum(axis=0))])
 
 
 def _left_out(hull: Any) -> int | None:
-    """The flattest vertex where there are too many of them, or too many in one plane."""
+    """The flattest vertex if there are too many in total or in one plane; else None."""
     crowd = np.ones(len(hull.vertices), dtype=bool)
     if len(hull.vertices) <= MOST_HULL_VERTICES:
         crowd = coplanar(hull.points[hull.vertices], hull.equations)
@@ -76,7 +76,7 @@ def _left_out(hull: Any) -> int | None:
 
 
 def _sharpness(hull: Any) -> np.ndarray:
-    """By vertex of a hull: how far its corner is from flat (rad), times the area that meets there."""
+    """Sharpness of each hull vertex: deviation of its corner from flat (rad) times the adjacent area."""
     missing, area = np.full(len(hull.points), 2 * np.pi), np.zeros(len(hull.points))
     corners = hull.points[hull.simplices]
     for k in range(3):
@@ -98,7 +98,7 @@ def box_mesh(body: Body) -> tuple[Points, Faces]:
 
 
 def png_bytes(image: Image) -> bytes:
-    """An RGB image as PNG: of filtered photos run lengths are all that is to be gained, and quickly found."""
+    """An RGB image as PNG with run-length encoding, which is fast and sufficient for filtered photos."""
     how = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
     _, encoded = cv2.imencode(".png", image[..., ::-1], how)
     return encoded.tobytes()

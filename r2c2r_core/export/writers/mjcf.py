@@ -1,4 +1,4 @@
-"""scene.xml: MuJoCo's own format, with what URDF cannot say: textures, free things, a floor, contact exclusions.
+"""scene.xml: MuJoCo's own format, with features URDF lacks: textures, free bodies, a floor, contact exclusions.
 
 Visual geoms are in group 2 and collide with nothing; colliders are in group 3. Inertials are explicit, angles are radians.
 """
@@ -27,7 +27,7 @@ _FRICTION = f"{SURFACE_FRICTION} 0.01 0.001"  # sliding, spinning, rolling
 def write_mjcf(plan: Plan, path: Path) -> None:
     """Write the plan as one MJCF document with paths relative to its folder, and each object's asset.
 
-    The scene is whole, though MuJoCo could attach the assets: importers that parse MJCF themselves know no <attach>.
+    The scene does not attach the assets, as importers with their own MJCF parser do not support <attach>.
     """
     path.write_text(mjcf_text(plan))
     for asset in assets_of(plan):
@@ -37,7 +37,7 @@ def write_mjcf(plan: Plan, path: Path) -> None:
 
 
 def asset_mjcf_text(plan: Plan) -> str:
-    """One object's MJCF: names without the object's, which a scene that attaches it gives back as the prefix."""
+    """One object's MJCF, with names without the object's name, which a scene adds as the prefix when attaching it."""
     root = ET.Element("mujoco", model=plan.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     _add_defaults(root)
@@ -68,7 +68,7 @@ def mjcf_text(plan: Plan) -> str:
 
 
 def _add_bodies(root: ET.Element, worldbody: ET.Element, plan: Plan) -> None:
-    """Bodies, what they mean, and which of them never collide."""
+    """Add bodies, their semantics, and contact exclusions."""
     elements = {WORLD: worldbody}
     for body in plan.bodies:
         elements[body.name] = _add_body(elements[body.parent], body)
@@ -82,7 +82,7 @@ def _add_bodies(root: ET.Element, worldbody: ET.Element, plan: Plan) -> None:
 
 
 def _add_states(root: ET.Element, worldbody: ET.Element, plan: Plan) -> None:
-    """A keyframe for each state: positions in the order in which MuJoCo numbers bodies, which is the document's."""
+    """Add a keyframe for each state: positions in MuJoCo's body order, which is the document's."""
     bodies = [plan.body(element.attrib["name"]) for element in worldbody.iter("body")]
     keyframe = ET.SubElement(root, "keyframe")
     for state in STATES:
@@ -92,14 +92,14 @@ def _add_states(root: ET.Element, worldbody: ET.Element, plan: Plan) -> None:
 
 
 def _positions(body: Body, state: str) -> list[float]:
-    """Generalised positions of a body: its joint's, or its place where it is free."""
+    """Generalised positions of a body: its joint's, or its pose if it is free."""
     if body.free:
         return [*body.parent_from_body.translation, *quat_wxyz_of(body.parent_from_body.rotation)]
     return [] if body.joint is None else [position(body.joint, state)]
 
 
 def _add_meaning(root: ET.Element, plan: Plan) -> None:
-    """<custom>: a text named as each body and each site, `category=…;part=…;disposition=…` (several: by commas)."""
+    """Add <custom> texts named like bodies and sites: `category=…;part=…;disposition=…` (several: by commas)."""
     custom = ET.SubElement(root, "custom")
     said = [(body.name, labels_of(body)) for body in plan.bodies]
     said += [(handle.name, labels_of_handle(handle, plan.body(handle.link))) for handle in plan.handles]
@@ -170,7 +170,7 @@ def _add_visuals(element: ET.Element, body: Body) -> None:
 
 
 def _add_sites(element: ET.Element, body: Body, plan: Plan) -> None:
-    """A site in each handle, z into the front and x along the grip: a box of the grip's size, a small ball where one pushes."""
+    """Add a site at each handle, z into the front and x along the grip: a box of the grip's size, or a small ball to push."""
     for handle in plan.handles_of(body.name):
         pose = _pose(body.world_from_body.inverse @ handle.world_from_handle)
         grip = (

@@ -1,7 +1,6 @@
-"""The bundle as a ROS 2 package: build it with colcon, `ros2 launch <package> view.launch.py` shows it in RViz.
+"""ROS 2 package of the bundle: build it with colcon; `ros2 launch <package> view.launch.py` shows it in RViz.
 
-ros/scene.urdf is scene.urdf with `package://` paths, and with a frame for each handle (a link without mass, for tf
-alone).
+ros/scene.urdf is scene.urdf with `package://` paths and a frame for each handle (a link without mass, only for tf).
 """
 
 import re
@@ -16,7 +15,7 @@ URDF = "ros/scene.urdf"
 
 
 def write_ros(plan: Plan, path: Path) -> None:
-    """Write package.xml and what it needs beside it."""
+    """Write package.xml and the package's other files."""
     package = package_name(plan.name)
     path.write_text(_PACKAGE.format(package=package))
     files = {"CMakeLists.txt": _CMAKE, URDF: ros_urdf_text(plan), "ros/view.launch.py": _LAUNCH, "ros/view.rviz": _RVIZ}
@@ -27,13 +26,13 @@ def write_ros(plan: Plan, path: Path) -> None:
 
 
 def package_name(name: str) -> str:
-    """A name that ROS takes (REP 144): lower case, begins with a letter, single underscores."""
+    """A valid ROS package name (REP 144): lower case, starting with a letter, single underscores."""
     word = re.sub(r"_+", "_", re.sub(r"[^a-z0-9]+", "_", name.lower())).strip("_")
     return word if len(word) > 1 and word[0].isalpha() else f"scene_{word}".rstrip("_")
 
 
 def ros_urdf_text(plan: Plan) -> str:
-    """scene.urdf as ROS wants it."""
+    """scene.urdf adapted to ROS."""
     robot = ET.fromstring(urdf_text(plan))
     for mesh in robot.iter("mesh"):
         mesh.set("filename", f"package://{package_name(plan.name)}/{mesh.attrib['filename']}")

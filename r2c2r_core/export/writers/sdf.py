@@ -1,6 +1,6 @@
-"""scene.sdf: for Gazebo and Drake, a world with a model for each object; paths relative to its folder.
+"""scene.sdf: a world for Gazebo and Drake, with a model for each object; paths relative to its folder.
 
-A base is fixed to the world by a joint, so that free-standing things, which have none, are the only ones to fall.
+A base is fixed to the world by a joint; only free-standing objects have none and can fall.
 """
 
 import xml.etree.ElementTree as ET
@@ -26,7 +26,7 @@ def sdf_text(plan: Plan) -> str:
     world = ET.SubElement(root, "world", name=plan.name)
     _add_floor(world, plan)
     plates = [body for body in plan.bodies if body.is_support]
-    files = {body.name: body for body in plan.bodies}  # named from the scene's folder, not from the asset's
+    files = {body.name: body for body in plan.bodies}  # paths relative to the scene's folder, not the asset's
     for asset in assets_of(plan):
         model = _add_model(world, asset.name, world_from_asset(plan, asset.name))
         for body in asset.bodies:
@@ -47,7 +47,7 @@ def _add_model(world: ET.Element, name: str, pose: Rigid3) -> ET.Element:
 
 
 def _add_floor(world: ET.Element, plan: Plan) -> None:
-    """A plate: Drake 1.51 dies of a plane that comes before meshes."""
+    """Add the floor as a plate: Drake 1.51 crashes on a plane that precedes meshes."""
     model = ET.SubElement(world, "model", name="floor")
     ET.SubElement(model, "static").text = "true"
     ET.SubElement(model, "pose").text = f"0 0 {numbers(plan.floor_z_m - _FLOOR_M[2] / 2)} 0 0 0"
@@ -58,7 +58,7 @@ def _add_floor(world: ET.Element, plan: Plan) -> None:
 
 
 def _add_link(model: ET.Element, body: Body, named: Body) -> None:
-    """A body where its asset has it; `named` is the same body with its files as the scene sees them."""
+    """Add a body with its pose in the asset; `named` is the same body with file paths relative to the scene."""
     link = ET.SubElement(model, "link", name=body.name)
     _add_pose(link, body.world_from_body)
     inertial = ET.SubElement(link, "inertial")
@@ -100,7 +100,7 @@ def _add_surface(shape: ET.Element) -> None:
 
 
 def _add_joint(model: ET.Element, body: Body) -> None:
-    """At the child's frame, in whose axes SDF gives a joint's axis; a free base has none."""
+    """Add a joint at the child's frame, in whose axes SDF gives the joint axis; a free base has none."""
     joint = body.joint
     if body.free:
         return

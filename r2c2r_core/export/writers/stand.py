@@ -1,4 +1,4 @@
-"""Where scene.xml is first seen from: a camera before the fronts, a sun over its left shoulder, a plain floor."""
+"""Initial view of scene.xml: a camera in front of the fronts, a sun over its left shoulder, a plain floor."""
 
 import xml.etree.ElementTree as ET
 
@@ -10,18 +10,18 @@ from r2c2r_core.export.writers.text import numbers
 CAMERA = "front"
 
 _FOVY_DEG = 40.0
-_PICTURE = (1920, 1080)  # the largest picture `mujoco.Renderer` makes without an edit; MuJoCo's own default is 640 x 480
-_NARROWEST, _FILLED = 1.3, 0.8  # width over height of a picture that still holds everything, and how much of it is filled
-_SHADOW_PX = 8192  # 1 mm of a kitchen: the default draws steps along every shadow
+_PICTURE = (1920, 1080)  # the largest picture that `mujoco.Renderer` renders unchanged; MuJoCo's default is 640 x 480
+_NARROWEST, _FILLED = 1.3, 0.8  # narrowest aspect ratio that still shows everything, and the fraction of it filled
+_SHADOW_PX = 8192  # 1 mm in a kitchen: the default gives stepped shadow edges
 
 
 def add_view(root: ET.Element, plan: Plan) -> None:
-    """<statistic> and <visual>: what a viewer frames, how its pictures are lit."""
+    """Add <statistic> and <visual>: the viewer's framing and lighting."""
     corners = _corners(plan)
     low, high = corners.min(axis=0), corners.max(axis=0)
     ET.SubElement(root, "statistic", center=numbers((low + high) / 2), extent=numbers(_radius(low, high)))
     visual = ET.SubElement(root, "visual")
-    # pictures of a scan hold the light they were taken in: a strong ambient keeps their colours
+    # textures of a scan contain the light they were taken in: strong ambient light keeps their colours
     ET.SubElement(visual, "headlight", ambient="0.5 0.5 0.5", diffuse="0.25 0.25 0.25", specular="0 0 0")
     ET.SubElement(visual, "global", fovy=numbers(_FOVY_DEG), offwidth=str(_PICTURE[0]), offheight=str(_PICTURE[1]))
     ET.SubElement(visual, "quality", shadowsize=str(_SHADOW_PX))
@@ -29,13 +29,13 @@ def add_view(root: ET.Element, plan: Plan) -> None:
 
 
 def add_surroundings(worldbody: ET.Element, plan: Plan, surface: dict[str, str]) -> None:
-    """Sun, camera and floor; `surface` is how the floor touches."""
+    """Add sun, camera and floor; `surface` are the floor's contact parameters."""
     corners, forward = _corners(plan), -_facing(plan)
     low, high = corners.min(axis=0), corners.max(axis=0)
     centre, radius, right = (low + high) / 2, _radius(low, high), np.cross(forward, [0.0, 0.0, 1.0])
     sun = -0.8 * forward - 0.5 * right + np.array([0.0, 0.0, 1.3])
     light = {"name": "sun", "type": "directional", "diffuse": "0.45 0.45 0.45", "specular": "0 0 0"}
-    # a directional light shadows what lies round its position
+    # a directional light casts shadows only around its position
     ET.SubElement(
         worldbody, "light", {**light, "pos": numbers(centre + radius * sun / np.linalg.norm(sun)), "dir": numbers(-sun)}
     )

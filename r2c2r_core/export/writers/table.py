@@ -1,4 +1,4 @@
-"""The formats of a bundle. A new one is a file here and a line in FORMATS: linter, reports and app take it from there."""
+"""Table of the bundle's formats. A new one needs a file here and a line in FORMATS, read by linter, reports and app."""
 
 import logging
 from collections.abc import Callable, Collection, Iterable
@@ -21,21 +21,21 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """One file of the bundle that carries the scene."""
+    """One file format of the scene in the bundle."""
 
     name: str
     file: str
     opened_by: str
-    reads_meshes: bool  # the files below meshes/, too
+    reads_meshes: bool  # also uses the files below meshes/
     write: Callable[[Plan, Path], None]
-    loses: tuple[str, ...]  # what a reader of this file alone does not get
+    loses: tuple[str, ...]  # information that this file does not contain
     others: tuple[str, ...] = ()  # further files and folders of this format, in the bundle
     assets: str | None = None  # suffix of its file for each object below assets/
-    required: bool = True  # a bundle without it is incomplete; older ones have not every format
-    check: Callable[[Path], Iterable[str]] | None = None  # what is wrong with a written file, a line each
+    required: bool = True  # a bundle without it is incomplete; older bundles lack some formats
+    check: Callable[[Path], Iterable[str]] | None = None  # errors in a written file, one line each
 
     def owns(self, path: str) -> bool:
-        """Whether a file of the bundle is this format's: its scene, its assets, what stands beside them."""
+        """Whether a file of the bundle belongs to this format: its scene, its assets, or its other files."""
         own = path == self.file or any(path == other or path.startswith(f"{other}/") for other in self.others)
         return own or (path.startswith("assets/") and PurePosixPath(path).suffix == self.assets)
 
@@ -115,15 +115,15 @@ FORMATS: tuple[Format, ...] = (
 
 
 def formats() -> tuple[Format, ...]:
-    """Every format that is written, the project's own first; a file that is taken stays whose it is."""
+    """All formats, the project's own first; an added format cannot replace an existing file."""
     taken = {entry.file for entry in FORMATS}
     return (*FORMATS, *(entry for entry in added("r2c2r.formats", Format) if entry.file not in taken))
 
 
 def write_formats(plan: Plan, folder: Path, wanted: Collection[Format], *, progress: Progress = SILENT) -> None:
-    """Each wanted format's file; one that fails is left out, with a warning in the log, and is missing in the certificate.
+    """Write each wanted format; one that fails is skipped with a logged warning and reported missing in the certificate.
 
-    scene.urdf, by which the rest is judged, must be written, and what no scene is to blame for (a full disk) ends the export.
+    scene.urdf, the reference of the tests, must be written; failures independent of the scene (a full disk) end the export.
     """
     for entry in progress.each(wanted, "writing"):
         try:

@@ -1,4 +1,4 @@
-"""Numbers and rotations as simulators write them."""
+"""Text formatting of numbers, labels and rotations for simulator formats."""
 
 import re
 
@@ -15,7 +15,7 @@ def numbers(values: object) -> str:
 
 
 def words_of(labels: Labels) -> dict[str, str]:
-    """Labels as attributes: several dispositions with commas between; a category keeps to one line without `;`."""
+    """Labels as attributes: dispositions separated by commas, the category on one line without `;`."""
     category = re.sub(r"[\s;]+", " ", labels.category).strip()
     return {"category": category, "part": labels.part, "disposition": ",".join(labels.disposition)}
 
@@ -23,7 +23,7 @@ def words_of(labels: Labels) -> dict[str, str]:
 def rpy_of(rotation: Matrix3) -> np.ndarray:
     """Roll, pitch, yaw in radians about the fixed axes x, y, z (URDF: R = Rz Ry Rx)."""
     pitch = -np.arcsin(np.clip(rotation[2, 0], -1.0, 1.0))
-    if abs(rotation[2, 0]) > 1.0 - 1e-9:  # only yaw - roll (or their sum) is defined: put it all into yaw
+    if abs(rotation[2, 0]) > 1.0 - 1e-9:  # gimbal lock: only yaw - roll (or their sum) is defined, so all of it goes into yaw
         return np.array([0.0, pitch, np.arctan2(-rotation[0, 1], rotation[1, 1])])
     return np.array([np.arctan2(rotation[2, 1], rotation[2, 2]), pitch, np.arctan2(rotation[1, 0], rotation[0, 0])])
 

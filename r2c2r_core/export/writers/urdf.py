@@ -1,10 +1,10 @@
-"""scene.urdf: what yourdfpy, MuJoCo, PyBullet, SAPIEN and ROS all read without an edit.
+"""scene.urdf: readable without changes by yourdfpy, MuJoCo, PyBullet, SAPIEN and ROS.
 
-- One root link `world`, without mass and geometry: PyBullet then holds the scene still without `useFixedBase` (with a mass
-  it falls: measured), and every other link carries an inertial.
-- Free-standing things are joined by `fixed` joints here. `floating` would be the word for it, but PyBullet turns it into a
-  fixed joint with a warning, yourdfpy's `update_cfg(zero_cfg)` raises on it and viser shows a dead slider for it (measured
-  with 3.2.7, 0.0.60 and 1.1.1); scene.xml gives the same things a free joint, so they move in MuJoCo.
+- One root link `world`, without mass and geometry: PyBullet then fixes the scene without `useFixedBase` (with a mass
+  it falls: measured), and every other link has an inertial.
+- Free-standing objects have `fixed` joints here. `floating` would be correct, but PyBullet turns it into a fixed joint with
+  a warning, yourdfpy's `update_cfg(zero_cfg)` raises on it and viser shows a dead slider for it (measured with 3.2.7,
+  0.0.60 and 1.1.1); in scene.xml the same objects have a free joint, so they move in MuJoCo.
 - The `<mujoco>` block keeps visuals and static bodies in MuJoCo; the others ignore it.
 """
 
@@ -29,7 +29,7 @@ def write_urdf(plan: Plan, path: Path) -> None:
 
 
 def srdf_text(plan: Plan) -> str:
-    """Pairs that a planner need not look at: what a joint holds together. MoveIt and SAPIEN read it."""
+    """SRDF with disabled collision pairs of joined links, as read by MoveIt and SAPIEN."""
     robot = ET.Element("robot", name=plan.name)
     for body in plan.bodies:
         if body.parent != WORLD:
@@ -39,7 +39,7 @@ def srdf_text(plan: Plan) -> str:
 
 
 def urdf_text(plan: Plan, root: str | None = WORLD) -> str:
-    """The URDF document; `root` names its bare first link, None: the first body is the root, as of a thing that can fall."""
+    """The URDF document; `root` names its bare first link; with None the first body is the root, as for a free object."""
     robot = ET.Element("robot", name=plan.name)
     mujoco = ET.SubElement(robot, "mujoco")
     ET.SubElement(mujoco, "compiler", strippath="false", discardvisual="false", fusestatic="false")
@@ -56,7 +56,7 @@ def urdf_text(plan: Plan, root: str | None = WORLD) -> str:
 
 
 def _add_meaning(robot: ET.Element, plan: Plan) -> None:
-    """<r2c2r>: what URDF has no words for; README.txt lists it. Readers of URDF pass over elements they do not know."""
+    """Add <r2c2r>, data without a URDF element, listed in README.txt. URDF readers ignore unknown elements."""
     extension = ET.SubElement(robot, "r2c2r", version="1")
     for body in plan.bodies:
         ET.SubElement(extension, "labels", {"link": body.name, **words_of(labels_of(body))})

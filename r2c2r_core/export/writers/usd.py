@@ -1,11 +1,11 @@
 """scene.usda: USD with UsdPhysics, for Isaac Sim, Omniverse and other readers of USD; +Z up, metres, kilograms.
 
-The scene holds gravity and the floor, and places a layer of its own for each object, `assets/<object>/<object>.usda`, by
-reference; scene.usdz is all of it in one file. One articulation per object with joints, its root on the object's own prim
+The scene has gravity and the floor, and references a separate layer for each object, `assets/<object>/<object>.usda`;
+scene.usdz is all of it in one file. One articulation per object with joints, its root on the object's own prim
 (never on a body, never nested); bodies are siblings, joints beside them. A base is fixed to the object's prim and not to
-the world, so that it stands wherever the asset is put. UsdPhysics counts angles in degrees: limits, damping and velocities
-of hinges are converted. What UsdPhysics has no words for (dry friction, armature, largest velocity) is said in PhysX's
-schema PhysxJointAxisAPI, as plain attributes, so that no NVIDIA library is needed to write or to read it.
+the world, so that it moves with the asset. UsdPhysics uses degrees: limits, damping and velocities of hinges are converted.
+Quantities that UsdPhysics lacks (dry friction, armature, maximum velocity) are in PhysX's schema PhysxJointAxisAPI, as plain
+attributes, so that no NVIDIA library is needed to write or to read them.
 """
 
 import struct
@@ -28,12 +28,12 @@ from r2c2r_core.model.scene import Joint
 
 ROOT = "/Scene"
 _FLOOR_M = 20.0
-_FIRST_DAY = 1 << 5 | 1  # 1 January 1980, as DOS counts
+_FIRST_DAY = 1 << 5 | 1  # 1 January 1980 as a DOS date
 _X = np.array([1.0, 0.0, 0.0])
 
 
 def write_usd(plan: Plan, path: Path) -> None:
-    """Write the scene's layer, a layer of each object, and scene.usdz; files are named relative to the layer they stand in."""
+    """Write the scene's layer, a layer for each object, and scene.usdz; paths are relative to their layer."""
     from pxr import Sdf, UsdUtils
 
     for asset in assets_of(plan):
@@ -43,7 +43,7 @@ def write_usd(plan: Plan, path: Path) -> None:
         stage.GetRootLayer().Export(str(file))
     layer, stage = Sdf.Layer.CreateAnonymous(), _scene_stage(plan)
     layer.TransferContent(stage.GetRootLayer())
-    for name in object_names(plan):  # not on the stage: one in memory looks for what a relative path names, and warns
+    for name in object_names(plan):  # not on the stage: an in-memory one tries to resolve relative paths, and warns
         layer.GetPrimAtPath(f"{ROOT}/{name}").referenceList.prependedItems.append(
             Sdf.Reference(f"./{asset_file(name, '.usda')}")
         )
@@ -55,7 +55,7 @@ def write_usd(plan: Plan, path: Path) -> None:
 
 
 def _undate(package: Path) -> None:
-    """Put the first day that a zip can name in the place of every file's time: equal scenes are equal bytes."""
+    """Set every file's time to the earliest zip date, so that equal scenes give equal bytes."""
     content = bytearray(package.read_bytes())
     with ZipFile(package) as archive:
         entry = archive.start_dir
@@ -82,7 +82,7 @@ def _new_stage(root: str, kind: str) -> Any:
 
 
 def _asset_stage(plan: Plan) -> Any:
-    """One object and its materials, nothing of the room."""
+    """Stage of one object and its materials, without the rest of the scene."""
     root = f"/{plan.name}"
     stage = _new_stage(root, "component")
     _write_touch(stage, root)
@@ -94,7 +94,7 @@ def _asset_stage(plan: Plan) -> Any:
 
 
 def _scene_stage(plan: Plan) -> Any:
-    """Gravity, floor, the plates that hold things up, and a placed prim for each object."""
+    """Stage with gravity, floor, support plates, and a placed prim for each object."""
     from pxr import UsdGeom
 
     stage = _new_stage(ROOT, "assembly")
@@ -108,7 +108,7 @@ def _scene_stage(plan: Plan) -> Any:
 
 
 def _write_world(stage: Any, plan: Plan) -> None:
-    """Gravity and the floor."""
+    """Write gravity and the floor."""
     from pxr import Gf, UsdGeom, UsdPhysics
 
     scene = UsdPhysics.Scene.Define(stage, f"{ROOT}/physics")
@@ -126,7 +126,7 @@ def _write_world(stage: Any, plan: Plan) -> None:
 
 
 def _write_touch(stage: Any, root: str) -> Any:
-    """How surfaces touch."""
+    """Write the physics material of contacts."""
     from pxr import UsdPhysics, UsdShade
 
     touch = UsdShade.Material.Define(stage, f"{root}/touch")
@@ -138,7 +138,7 @@ def _write_touch(stage: Any, root: str) -> Any:
 
 
 def _write_looks(stage: Any, plan: Plan, root: str) -> dict[str, Any]:
-    """A preview material per texture; bodies of one object share it."""
+    """Write a preview material per texture; bodies of one object share it."""
     from pxr import Sdf, UsdGeom, UsdShade
 
     UsdGeom.Scope.Define(stage, f"{root}/looks")
@@ -170,7 +170,7 @@ def _write_looks(stage: Any, plan: Plan, root: str) -> dict[str, Any]:
 
 
 def _write_object(stage: Any, path: str, bodies: Sequence[Body], looks: dict[str, Any]) -> None:
-    """An object's bodies and joints; without joints it is a free body or a part of the room that never moves."""
+    """Write an object's bodies and joints; without joints it is a free body or a static part of the scene."""
     from pxr import UsdGeom, UsdPhysics
 
     prim = stage.GetPrimAtPath(path)
@@ -227,7 +227,7 @@ def _write_visuals(stage: Any, path: str, body: Body, looks: dict[str, Any]) -> 
 
 
 def _write_colliders(stage: Any, path: str, body: Body, root: str) -> None:
-    """Convex pieces and panels, as guides: engines touch them, renderers leave them out."""
+    """Write convex pieces and panels as guides: engines collide with them, renderers skip them."""
     from pxr import UsdGeom, UsdPhysics, UsdShade
 
     shapes = [
@@ -246,7 +246,7 @@ def _write_colliders(stage: Any, path: str, body: Body, root: str) -> None:
 
 
 def _write_handle(stage: Any, root: str, handle: Handle, body: Body) -> None:
-    """A frame in the handle, z into the front, x along the grip; what has no schema stands in attributes of r2c2r's own."""
+    """Write a frame at the handle, z into the front, x along the grip; data without a schema go into r2c2r attributes."""
     from pxr import Gf, Sdf, UsdGeom
 
     xform = UsdGeom.Xform.Define(stage, f"{root}/{body.name}/{handle.name}")
@@ -260,7 +260,7 @@ def _write_handle(stage: Any, root: str, handle: Handle, body: Body) -> None:
 
 
 def _write_joint(stage: Any, object_path: str, body: Body) -> None:
-    """Between a body and its parent; a base is fixed to the object's prim, which is no body and so a place in the world."""
+    """Write the joint between a body and its parent; a base is fixed to the object's prim, which is not a body."""
     from pxr import Gf, UsdPhysics
 
     joint = body.joint
@@ -301,7 +301,7 @@ def _write_joint(stage: Any, object_path: str, body: Body) -> None:
 
 
 def _label(prim: Any, **tokens: Sequence[str]) -> None:
-    """UsdSemantics labels by taxonomy; what has none gets none."""
+    """Write UsdSemantics labels by taxonomy, skipping empty ones."""
     from pxr import UsdSemantics
 
     for taxonomy, words in tokens.items():
@@ -318,8 +318,9 @@ def _say_physx(prim: Any, instance: str, **values: float) -> None:
 
 
 def _say_newton(prim: Any, joint: Joint) -> None:
-    """Newton reads neither PhysX's words nor, with MuJoCo's solver, its own: dry friction and armature in both. Damping is the
-    drive's, which both read.
+    """Write dry friction and armature for Newton in two schemas, its own and MuJoCo's.
+
+    Newton does not read PhysX's schema, nor its own with MuJoCo's solver. Damping is the drive's, which both read.
     """
     from pxr import Sdf
 
@@ -331,7 +332,7 @@ def _say_newton(prim: Any, joint: Joint) -> None:
 
 
 def _say_state(prim: Any, instance: str) -> None:
-    """Closed and at rest; Isaac Sim reads and writes a joint's state here."""
+    """Write the joint state, closed and at rest; Isaac Sim reads and writes it here."""
     from pxr import Sdf
 
     prim.AddAppliedSchema(f"PhysicsJointStateAPI:{instance}")
@@ -363,7 +364,7 @@ def _mesh(stage: Any, path: str, vertices: np.ndarray, faces: np.ndarray) -> Any
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.round(normals / np.maximum(lengths, 1e-12), 4).astype(np.float32)))
-    mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform)  # flat facets: corners are corners
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform)  # flat shading keeps sharp corners
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
     return mesh
 
