@@ -1,8 +1,8 @@
-"""A bundle against a raw sequence of Arti4D: the axis of every object that its people opened, and where that axis is.
+"""Evaluation of a bundle against a raw Arti4D sequence: direction and position of the joint axes that were opened.
 
-The truth (SEQUENCE.json: object → position, axis) is in the world of the sequence's odometry, which is the recording's own. Its
-names are nobody's prompts, so joints go with the nearest axes. It says neither type nor states: none is scored. Beside this
-project's errors stand Arti4D's own: the angle, and the distance of a point of the found axis from the true line.
+The truth (SEQUENCE.json: object → position, axis) is in the world of the sequence's odometry, which is the recording's own.
+Its names match no prompts, so joints are assigned to the nearest axes. It gives neither type nor states: none is scored.
+Arti4D's own errors are reported too: the angle, and the distance of a point of the found axis from the true line.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from r2c2r_core.evaluate.stage import Evaluation, ObjectRow, scene_metrics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.report import Metric
 
-_FARTHEST_M = 1.0  # between a true axis and the joint that is taken for it
+_FARTHEST_M = 1.0  # maximum distance between a true axis and its assigned joint
 _HINT = "give the folder of a raw sequence: rgb/, depth/, odom/ and SEQUENCE.json"
 
 
@@ -56,7 +56,7 @@ def read_axes(sequence: Path, world_from_capture: Rigid3) -> tuple[JointRecord, 
 
 
 def _truth_file(sequence: Path) -> Path:
-    """The JSON named as its folder; else as its odometry."""
+    """The JSON named like its folder, else like its odometry."""
     names = [sequence.resolve().name, *(file.stem for file in sorted((sequence / "odom").glob("*.csv")))]
     files = [sequence / f"{name}.json" for name in names]
     found = next((file for file in files if file.is_file()), None)
@@ -71,7 +71,7 @@ def _axis(name: str, entry: dict[str, Any], world_from_capture: Rigid3) -> Joint
 
 
 def _matched(truths: tuple[JointRecord, ...], found: list[_Found]) -> list[_Found | None]:
-    """The found joint of every true axis, so that they are nearest in total."""
+    """Assignment of found joints to true axes with minimum total distance."""
     matches: list[_Found | None] = [None] * len(truths)
     if truths and found:
         cost = np.array([[_apart(true, each.joint) for each in found] for true in truths])
@@ -81,13 +81,13 @@ def _matched(truths: tuple[JointRecord, ...], found: list[_Found]) -> list[_Foun
 
 
 def _apart(true: JointRecord, found: JointRecord) -> float:
-    """From the true position to the found joint's axis and origin, m, and a little for an axis that points elsewhere."""
+    """Assignment cost: distance of the true position from the found axis and origin, m, plus a term for the angle."""
     along = abs(float((found.origin - true.origin) @ found.axis))
     return line_point(found.origin, found.axis, true.origin) + 0.2 * along + axis_deg(true, found) / 90
 
 
 def line_point(origin: Vector3, axis: Vector3, point: Vector3) -> float:
-    """The distance of a point from a line."""
+    """Distance of a point from a line."""
     return float(np.linalg.norm(np.cross(point - origin, axis)))
 
 

@@ -1,8 +1,8 @@
-"""A dataset (the dataset stage says what is in it) against truth: its masks, and its aligned meshes.
+"""Evaluation of a dataset (see the dataset stage) against truth: its masks and aligned meshes.
 
-Of the aligned meshes: extents and centre along the true object's axes, the overlap of the boxes, and the yaw modulo 90
-degrees, since a mesh alone does not say which side is its front. Extents leave out half a percent of the surface on each
-side, so that a handle's tip counts as little as in the truth, whose boxes leave handles out.
+Aligned meshes are scored by extents and centre along the true object's axes, box IoU, and yaw modulo 90 degrees, since a
+mesh alone does not determine its front. Extents omit half a percent of the surface on each side, so that a handle's tip
+counts as little as in the truth, whose boxes exclude handles.
 """
 
 import hashlib
@@ -51,7 +51,7 @@ def evaluate_dataset(folder: Path, truth: Path) -> Evaluation:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest, after every file it names was found whole; raises BundleError naming the first that is not."""
+    """The manifest, with all its files verified; raises BundleError naming the first missing or damaged one."""
     path = folder / "manifest.json"
     try:
         manifest = read_json(path, BundleError, hint="write it with r2c2r dataset")
@@ -81,7 +81,7 @@ def _world_from_capture(manifest: dict[str, Any], folder: Path) -> Rigid3:
 
 
 def _aligned_box(folder: Path, name: str) -> ObjectRecord | None:
-    """The upright box of an object's aligned mesh, its yaw known modulo 90 degrees; None where there is no mesh."""
+    """The upright box of an object's aligned mesh, with yaw modulo 90 degrees; None where there is no mesh."""
     path = folder / "objects" / name / "aligned.glb"
     if not path.is_file():
         return None
@@ -91,13 +91,13 @@ def _aligned_box(folder: Path, name: str) -> ObjectRecord | None:
 
 
 def _surface_points(path: Path) -> tuple[Points, Points]:
-    """Points spread evenly over a mesh file's surface, and their normals."""
+    """Points sampled evenly on a mesh file's surface, and their normals."""
     import trimesh
 
     try:
         mesh = trimesh.load_scene(path).to_geometry()
         vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-    except Exception as error:  # the parser behind trimesh raises whatever broken bytes make it raise
+    except Exception as error:  # trimesh's parser may raise anything on damaged bytes
         raise BundleError(f"{path}: not a readable GLB ({error})", hint="write the dataset again") from error
     points, face = sample_surface(vertices, faces, _SAMPLES, np.random.default_rng(0))
     return points, face_normals(vertices, faces)[face]
@@ -119,7 +119,7 @@ def _row(true: ObjectRecord, folder: Path, found: dict[str, ObjectRecord | None]
 
 
 def _turned_like(box: ObjectRecord, true: ObjectRecord) -> ObjectRecord:
-    """The same box with its axes named as the truth's: of its four quarter turns the nearest."""
+    """The same box with axes ordered as the truth's: the nearest of its four quarter turns."""
     turns = [rotation_about_z(k * np.pi / 2) for k in range(4)]
     likeness = [np.trace(true.world_from_object.rotation.T @ box.world_from_object.rotation @ turn) for turn in turns]
     best = int(np.argmax(likeness))

@@ -1,4 +1,4 @@
-"""Extents in the object's own axes (paper eq. 17-20), observed and unobserved ones apart.
+"""Extent errors along the object's own axes (paper eq. 17-20), separately for observed and unobserved axes.
 
 The paper measures along world axes, which depends on the object's yaw: 2 degrees turn a 2 cm drawer front into 29 % error.
 """
@@ -25,7 +25,7 @@ def extent_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...
 
 
 def _sizes_along(truth: ObjectRecord, found: ObjectRecord) -> np.ndarray:
-    """The found sizes in the truth's order: width and depth change places when the yaw is off by 90 degrees."""
+    """The found sizes in the truth's order: width and depth are swapped when the yaw is off by 90 degrees."""
     turn = truth.world_from_object.rotation.T @ found.world_from_object.rotation
     sideways = not truth.turns_freely and abs(turn[0, 0]) < abs(turn[1, 0])
     return found.dimensions_m[[1, 0, 2]] if sideways else found.dimensions_m

@@ -1,4 +1,4 @@
-"""Masks against the true ones, frame by frame at RGB resolution."""
+"""Per-frame IoU of masks against truth at RGB resolution."""
 
 import struct
 from pathlib import Path
@@ -14,14 +14,14 @@ from r2c2r_core.model.report import Metric
 
 MIN_TRUTH_PX = 400
 _PNG = b"\x89PNG\r\n\x1a\n"
-_MOST_PIXELS = 64_000_000  # as of a recording's images
+_MOST_PIXELS = 64_000_000  # same limit as for a recording's images
 
 
 def mask_errors(truth: Path, found: Path, opened: frozenset[int] = frozenset()) -> tuple[Metric, ...]:
-    """Mean IoU of the frames whose true mask has at least 400 px, and the share of those frames that have a mask at all.
+    """Mean IoU of the frames whose true mask has at least 400 px, and the fraction of those frames that have a mask at all.
 
-    Both are folders of <frame:06d>.png with 0 or 255; a frame without a found mask counts as IoU 0. The mean over the frames in
-    which a front of it stands open (`opened`) comes beside it.
+    Both are folders of <frame:06d>.png with 0 or 255; a frame without a found mask counts as IoU 0. The mean over the frames
+    in which one of its fronts is open (`opened`) is reported too.
     """
     overlaps, present, ajar = [], [], []
     for file in sorted(truth.glob("*.png")):

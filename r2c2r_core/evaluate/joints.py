@@ -1,4 +1,4 @@
-"""Joints: type, hinge side, axis, pivot, limits, and the paper's range ratio."""
+"""Joint metrics: type, hinge side, axis, pivot, limits, and the paper's range ratio."""
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -38,7 +38,7 @@ def line_distance(origin_a: np.ndarray, axis_a: np.ndarray, origin_b: np.ndarray
     length = float(np.linalg.norm(normal))
     if length < 1e-6:  # parallel
         return float(np.linalg.norm(apart - (apart @ axis_a) * axis_a))
-    # Nearly parallel lines meet somewhere far off, which says nothing about the hinge: measure across at its middle.
+    # Nearly parallel lines meet far away, which is meaningless for the hinge: measure across at its middle.
     if length < np.sin(np.radians(10)):
         along = axis_b * float(apart @ axis_a) / float(axis_b @ axis_a)
         return float(np.linalg.norm(apart - along))
@@ -48,7 +48,7 @@ def line_distance(origin_a: np.ndarray, axis_a: np.ndarray, origin_b: np.ndarray
 def pair_joints(
     truths: tuple[JointRecord, ...], found: tuple[JointRecord, ...]
 ) -> list[tuple[JointRecord, JointRecord | None]]:
-    """Each true joint with its own found one, so that the origins are nearest in total."""
+    """Each true joint with its found one, by the assignment with minimum total distance of origins."""
     if not found:
         return [(joint, None) for joint in truths]
     cost = np.array([[float(np.linalg.norm(a.origin - b.origin)) + (a.type != b.type) for b in found] for a in truths])
@@ -58,14 +58,14 @@ def pair_joints(
 
 
 def _hinge_agrees(truth: ObjectRecord, found: ObjectRecord, a: JointRecord, b: JointRecord) -> bool:
-    """Same edge of the front as seen by a person facing it, and opening the same way."""
+    """Whether the hinge is at the same edge of the front, seen from outside, and opens the same way."""
     if b.type != "revolute" or float(a.axis @ b.axis) < np.cos(np.radians(45)):
         return False
     return _side(truth, a) == _side(found, b)
 
 
 def _side(thing: ObjectRecord, joint: JointRecord) -> str:
-    """left, right, top or bottom: where the hinge line passes the box's centre."""
+    """Side on which the hinge line passes the box's centre: left, right, top or bottom."""
     axis = thing.world_from_object.inverse.turn(joint.axis)
     origin = thing.world_from_object.inverse.apply(joint.origin)
     if abs(axis[2]) > abs(axis[0]):
@@ -75,7 +75,7 @@ def _side(thing: ObjectRecord, joint: JointRecord) -> str:
 
 
 def axis_deg(a: JointRecord, b: JointRecord) -> float:
-    """The angle between two axes, whichever way each points, degrees."""
+    """Angle between two axes regardless of sign, degrees."""
     return float(np.degrees(np.arccos(np.clip(abs(float(a.axis @ b.axis)), 0.0, 1.0))))
 
 

@@ -1,8 +1,7 @@
-"""Joints that were filmed while they opened: the state of every frame, stops, limits and insides against what is true.
+"""Metrics of filmed joint motion: per-frame states, stops, limits and interior lengths against truth.
 
-Only joints that open in the recording are scored; of the others, whether something was seen to move that did not. A frame
-that shows the front and of which no state is known counts as wrong, and so does every frame of a joint that is missing or of
-another type.
+Only joints that open in the recording are scored; for the others, false motions are counted. A frame that shows the front
+but has no known state counts as wrong, and so does every frame of a joint that is missing or of another type.
 """
 
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ STATE_TOLERANCE = {"revolute": float(np.radians(2.0)), "prismatic": 0.006}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointScore:
-    """One true joint that opens, and what was found of it."""
+    """Score of one true joint that opens."""
 
     name: str
     type: str  # the true one
@@ -28,15 +27,15 @@ class JointScore:
     pivot_mm: float | None  # of revolute ones
     shown: int  # frames that show the front
     shown_right: int  # with the right state
-    open_shown: int  # those in which it stands open
+    open_shown: int  # those in which it is open
     open_right: int
-    stop_right: bool | None  # None: none was seen, and none is claimed
-    limit_right: bool  # measured where it stopped, and right; not called measured where it did not
-    inner_depth_mm: float | None  # signed error; None: not seen, or nothing is true of it
+    stop_right: bool | None  # None: no stop in the truth, and none reported
+    limit_right: bool  # reported as measured and right if it stopped; not reported as measured if it did not
+    inner_depth_mm: float | None  # signed error; None: not seen, or no truth
 
 
 def motion_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
-    """The means over the joints of an object that open; what does not apply is None with its reason."""
+    """Means over the opening joints of an object; a metric that does not apply is None with its reason."""
     scores = joint_scores(truth, found)
     false = false_motions(truth, found)
     shown, shown_open = sum(s.shown for s in scores), sum(s.open_shown for s in scores)
@@ -58,7 +57,7 @@ def motion_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...
 
 
 def joint_scores(truth: ObjectRecord, found: ObjectRecord | None) -> tuple[JointScore, ...]:
-    """One score of every true joint that opens; of an object that is not there, nothing is right."""
+    """Scores of all true joints that open; for a missing object everything is wrong."""
     others = () if found is None else found.joints
     return tuple(
         _score(a, a.motion, b) for a, b in pair_joints(truth.joints, others) if a.motion is not None and a.motion.opens
@@ -66,13 +65,13 @@ def joint_scores(truth: ObjectRecord, found: ObjectRecord | None) -> tuple[Joint
 
 
 def open_frames(truth: ObjectRecord) -> frozenset[int]:
-    """The frames that show a front of it which is not closed."""
+    """Frames that show an open front of the object."""
     motions = [joint.motion for joint in truth.joints if joint.motion is not None]
     return frozenset(i for motion in motions for i in motion.shown if (motion.states[i] or 0.0) > 0)
 
 
 def false_motions(truth: ObjectRecord, found: ObjectRecord) -> float | None:
-    """How many joints of an object are said to have moved that did not; None where the truth says nothing of motion."""
+    """Number of joints of an object with falsely reported motion; None where the truth has no motion."""
     pairs = [(a.motion, b) for a, b in pair_joints(truth.joints, found.joints) if a.motion is not None]
     if not pairs:
         return None

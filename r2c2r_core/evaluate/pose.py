@@ -1,4 +1,4 @@
-"""Where the object stands and how it is turned."""
+"""Pose metrics: position and yaw of an object."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _ROUND = "round about its vertical axis"
 def pose_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
     """Distance of the box centres and of the front faces' centres in mm, and the yaw in degrees.
 
-    The front is reported apart because a built-in unit's back, and with it the centre, cannot be seen.
+    The front is reported separately because a built-in unit's back, and with it the centre, is not observed.
     """
     centre = found.world_from_object.translation - truth.world_from_object.translation
     return (
@@ -41,6 +41,6 @@ def _yaw(truth: ObjectRecord, found: ObjectRecord) -> Metric:
 
 
 def yaw_between(truth: ObjectRecord, found: ObjectRecord) -> float:
-    """By how much the found object is turned about the true one's vertical axis, rad."""
+    """Rotation of the found object about the true one's vertical axis, rad."""
     turn = truth.world_from_object.rotation.T @ found.world_from_object.rotation
     return float(np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1]))

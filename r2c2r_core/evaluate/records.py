@@ -15,7 +15,7 @@ from r2c2r_core.errors import BundleError
 from r2c2r_core.geometry.transforms import Rigid3
 
 _TRUTH = "give the truth.json that belongs to the recording; r2c2r sample writes one"
-_FARTHEST = 1e6  # metres; a kitchen has no such number, and squares of larger ones overflow
+_FARTHEST = 1e6  # metres; beyond any kitchen, and squares of larger numbers overflow
 MIN_SEEN_PX, MIN_SEEN_SHARE = 400, 0.25
 """From which a frame shows a front: as many of its pixels, and as much of its outline, as a person needs to see its state."""
 _POSE_KEYS = ("capture_from_object", "world_from_object", "pose")
@@ -23,7 +23,7 @@ _POSE_KEYS = ("capture_from_object", "world_from_object", "pose")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MotionRecord:
-    """How a joint moved in the recording, true or found; states in rad or m, 0 closed."""
+    """Motion of a joint in the recording, true or found; states in rad or m, 0 closed."""
 
     states: Mapping[int, float | None]  # by frame number; None: not known
     shown: frozenset[int]  # truth only: the frames that show its front
@@ -33,7 +33,7 @@ class MotionRecord:
 
     @property
     def opens(self) -> bool:
-        """Whether a frame shows it open."""
+        """Whether a frame that shows the front has it open."""
         return any((self.states[i] or 0.0) > 0 for i in self.shown)
 
 
@@ -47,8 +47,8 @@ class JointRecord:
     origin: Vector3
     lower: float
     upper: float
-    limit_source: str  # "truth", or what the manifest says
-    motion: MotionRecord | None = None  # None: nothing is said of it
+    limit_source: str  # "truth", or the manifest's source
+    motion: MotionRecord | None = None  # None: not given
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,13 +61,13 @@ class ObjectRecord:
     world_from_object: Rigid3
     joints: tuple[JointRecord, ...]
     observed_axes: tuple[bool, bool, bool] | None = None  # truth only; None: not stated
-    scan_fit: Mapping[str, float] | None = None  # of a bundle: how its mesh fits the scan, as its manifest says; None: unknown
-    turns_freely: bool = False  # truth only: round about its vertical axis, so that yaw means nothing
+    scan_fit: Mapping[str, float] | None = None  # of a bundle: its mesh's fit to the scan, from its manifest; None: unknown
+    turns_freely: bool = False  # truth only: rotationally symmetric about the vertical, so yaw is undefined
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BundleRecord:
-    """What the evaluation reads of a manifest."""
+    """The content of a manifest used by the evaluation."""
 
     objects: tuple[ObjectRecord, ...]
     world_from_capture: Rigid3
@@ -87,7 +87,7 @@ def read_bundle(path: Path) -> BundleRecord:
 
 
 def read_truth(path: Path, world_from_capture: Rigid3) -> tuple[ObjectRecord, ...]:
-    """The objects of a truth file, taken from the capture frame into the world; raises BundleError."""
+    """The objects of a truth file, transformed from the capture frame to the world; raises BundleError."""
     document = _parse(read_bounded(path, BundleError, hint=_TRUTH), path, _TRUTH)
     try:
         return tuple(_object(entry, world_from_capture) for entry in document["objects"])
@@ -166,7 +166,7 @@ def _joint(entry: dict[str, Any], world_from_file: Rigid3) -> JointRecord:
 
 
 def joint_line(origin: Any, axis: Any, world_from_file: Rigid3) -> tuple[Vector3, Vector3]:
-    """A point and the unit direction of a file's axis, in the world; raises ValueError or TypeError for what is neither."""
+    """A point and the unit direction of a file's axis, in the world; raises ValueError or TypeError on invalid values."""
     direction = _vector(axis)
     length = float(np.linalg.norm(direction))
     if length < 1e-9:
@@ -175,7 +175,7 @@ def joint_line(origin: Any, axis: Any, world_from_file: Rigid3) -> tuple[Vector3
 
 
 def _true_motion(entry: dict[str, Any]) -> MotionRecord:
-    """Of a truth file: one state of every frame, and how much of the front each shows."""
+    """Motion from a truth file: a state for every frame, and the frames that show enough of the front."""
     states = {i: float(value) for i, value in enumerate(entry["states"])}
     seen = zip(entry["seen_px"], entry["seen_share"], strict=True)
     shown = frozenset(i for i, (px, share) in enumerate(seen) if px >= MIN_SEEN_PX and share >= MIN_SEEN_SHARE)
@@ -191,7 +191,7 @@ def _true_motion(entry: dict[str, Any]) -> MotionRecord:
 
 
 def _found_motion(entry: dict[str, Any] | None) -> MotionRecord | None:
-    """Of a manifest: states of the frames in which its front was found."""
+    """Motion from a manifest: states of the frames in which the front was found."""
     if entry is None:
         return None
     states = {int(each["frame"]): None if each["value"] is None else float(each["value"]) for each in entry["states"]}

@@ -1,4 +1,4 @@
-"""Shape: how much of the space the two boxes share (exactly, for both are solids), and how the mesh fits the scan."""
+"""Shape metrics: exact solid IoU of the boxes, and the mesh's fit to the scan."""
 
 from dataclasses import replace
 from typing import Literal
@@ -16,11 +16,11 @@ _SCAN_METRICS: tuple[tuple[str, str, str, Literal["lower", "higher"]], ...] = (
     ("f_score_1cm", "f_score_1cm", "share", "higher"),
     ("f_score_2cm", "f_score_2cm", "share", "higher"),
 )
-_THINNEST_M = 1e-6  # boxes that share less than this count as apart
+_THINNEST_M = 1e-6  # boxes with a thinner intersection count as disjoint
 
 
 def shape_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
-    """Solid IoU of the boxes, exact (no voxels), and what the bundle says of its mesh beside the scan it was made from."""
+    """Exact solid IoU of the boxes (no voxels), and the bundle's own figures of its mesh's fit to the scan."""
     overlap = Metric(name="box_iou", value=box_iou(truth, found), unit="share", better="higher", tolerance=0.01)
     return (overlap, *(_scan_metric(found, *entry) for entry in _SCAN_METRICS))
 
@@ -38,7 +38,7 @@ def _scan_metric(found: ObjectRecord, name: str, key: str, unit: str, better: Li
 
 
 def box_iou(truth: ObjectRecord, found: ObjectRecord) -> float:
-    """Solid intersection over union of two boxes in any pose; of a thing that is round, whose box has any yaw, at equal yaw."""
+    """Solid IoU of two boxes in any pose; at equal yaw for a round object, whose box has an arbitrary yaw."""
     if truth.turns_freely:
         found = _turned_to(truth, found)
     volumes = float(np.prod(truth.dimensions_m)), float(np.prod(found.dimensions_m))
@@ -54,7 +54,7 @@ def _turned_to(truth: ObjectRecord, found: ObjectRecord) -> ObjectRecord:
 
 
 def _shared_volume(a: ObjectRecord, b: ObjectRecord) -> float:
-    """Volume of the intersection: the convex body behind all twelve faces."""
+    """Volume of the intersection of two boxes: the convex body inside all twelve half-spaces."""
     from scipy.optimize import linprog
     from scipy.spatial import ConvexHull, HalfspaceIntersection
 

@@ -1,4 +1,4 @@
-"""A bundle against what is true (paper section 5, with the definitions of the product's metric set)."""
+"""Evaluation of a bundle against truth (paper section 5, with the definitions of the product's metric set)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from r2c2r_core.evaluate.shape import box_iou, shape_errors
 from r2c2r_core.evaluate.table import to_text
 from r2c2r_core.model.report import Metric
 
-MIN_BOX_IOU = 0.25  # objects of other names are taken for the same from this overlap on
+MIN_BOX_IOU = 0.25  # minimum overlap for matching objects of different names
 VERSION = 1
 
 Comparison = Callable[[ObjectRecord, ObjectRecord], tuple[Metric, ...]]
@@ -28,7 +28,7 @@ COMPARISONS: tuple[Comparison, ...] = (extent_errors, pose_errors, joint_errors,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectRow:
-    """One true object and how well it was rebuilt."""
+    """One true object with its reconstruction metrics."""
 
     name: str
     category: str
@@ -38,7 +38,7 @@ class ObjectRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evaluation:
-    """All objects, and the means over them."""
+    """Metrics of all objects, and their means."""
 
     rows: tuple[ObjectRow, ...]
     scene: tuple[Metric, ...]
@@ -73,9 +73,9 @@ class Evaluation:
 
 
 def evaluate_bundle(bundle: Path, truth: Path, *, masks: Path | None = None) -> Evaluation:
-    """Compare a bundle (zip or folder) with truth.json; `masks` is what `r2c2r run --masks` wrote.
+    """Compare a bundle (zip or folder) with truth.json; `masks` is the output of `r2c2r run --masks`.
 
-    Raises BundleError when a file cannot be read. True masks are looked for in truth_masks/ beside the truth file.
+    Raises BundleError when a file cannot be read. True masks are read from truth_masks/ beside the truth file.
     """
     if masks is not None and not masks.is_dir():
         raise BundleError(f"{masks}: no such folder", hint="give the folder that r2c2r run --masks wrote")
@@ -97,7 +97,7 @@ def compare_objects(
 
 
 def match_objects(truths: tuple[ObjectRecord, ...], found: tuple[ObjectRecord, ...]) -> list[ObjectRecord | None]:
-    """The found object of every true one: by name, the rest by box IoU (Hungarian, at least MIN_BOX_IOU)."""
+    """The found object for each true one: by name, the rest by box IoU (Hungarian, at least MIN_BOX_IOU)."""
     by_name = {thing.name: thing for thing in found}
     matches = [by_name.get(true.name) for true in truths]
     taken = {thing.name for thing in matches if thing is not None}
@@ -125,7 +125,7 @@ def _row(true: ObjectRecord, found: ObjectRecord | None, truth_masks: Path, mask
 
 
 def scene_metrics(rows: tuple[ObjectRow, ...]) -> tuple[Metric, ...]:
-    """The share of objects found, and the mean of every metric over the objects it applies to."""
+    """The fraction of objects found, and the mean of every metric over the objects it applies to."""
     share = float(np.mean([row.matched is not None for row in rows])) if rows else None
     means = [
         Metric(

@@ -32,7 +32,7 @@ _COLUMNS = (
 
 
 def to_text(rows: Sequence[tuple[str, str, Sequence[Metric]]], scene: Sequence[Metric]) -> str:
-    """A table with one line an object and the means below; rows are (name, category, metrics)."""
+    """A table with one line per object and the means below; rows are (name, category, metrics)."""
     lines = [("object", "category", *(title for _, title, _ in _COLUMNS))]
     lines += [(shown(name), shown(category), *_cells(metrics)) for name, category, metrics in rows]
     lines.append(("mean", "", *_cells(scene)))
