@@ -1,4 +1,4 @@
-"""A bundle's scene with an arm in it, which stands where it is told."""
+"""A bundle's scene with an arm at a given base pose."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from r2c2r_core.robot.kinematics import Chain, chain_of, solve
 from r2c2r_core.robot.motion import about
 from r2c2r_core.robot.rig import PREFIX, Rig, compiled_with, hand_of
 
-_FOLLOWED = 2  # iterations from one command to the next
-_FOUND = 60  # from anywhere
+_FOLLOWED = 2  # IK iterations from one command to the next
+_FOUND = 60  # IK iterations from an arbitrary start
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 class Stand(NamedTuple):
-    """Where the arm stands on the floor, and how high its root is lifted."""
+    """Base pose of the arm: position and yaw on the floor, and lift of its root."""
 
     x_m: float
     y_m: float
@@ -28,22 +28,22 @@ class Stand(NamedTuple):
 
     @property
     def world_from_base(self) -> Rigid3:
-        """Of the arm's root."""
+        """Pose of the arm's root."""
         return Rigid3(about(_UP, self.yaw_rad), np.array([self.x_m, self.y_m, self.lift_m]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Arm(Rig):
-    """The arm: its joints are driven through springs to the angles that bring its tool somewhere."""
+    """The arm, with joints driven through springs to the IK solution of a tool pose."""
 
     chain: Chain
     angles: np.ndarray  # (7,) addresses in qpos
     drives: np.ndarray  # (7,) actuators
     mocap: int  # of its root
-    start: np.ndarray  # (7,) the angles from which `put` looks for others; written to
+    start: np.ndarray  # (7,) start angles of the IK in `put`; mutable
 
     def stand(self, stand: Stand, start: np.ndarray) -> None:
-        """Set its base down, and the angles it begins with."""
+        """Set the base pose and the start angles."""
         base = stand.world_from_base
         self.data.mocap_pos[self.mocap] = base.translation
         self.data.mocap_quat[self.mocap] = (np.cos(stand.yaw_rad / 2), 0.0, 0.0, np.sin(stand.yaw_rad / 2))
@@ -51,13 +51,13 @@ class Arm(Rig):
 
     @property
     def world_from_base(self) -> Rigid3:
-        """Where its root is."""
+        """Current pose of the root."""
         w, _, _, z = self.data.mocap_quat[self.mocap]
         return Rigid3(about(_UP, 2 * float(np.arctan2(z, w))), self.data.mocap_pos[self.mocap].copy())
 
     @property
     def base_force_n(self) -> float:
-        """What it pulls or pushes everything with."""
+        """Magnitude of the net contact force on the environment, in N."""
         import mujoco
 
         net, force, contacts = np.zeros(3), np.zeros(6), self.data.contact
@@ -68,7 +68,7 @@ class Arm(Rig):
         return float(np.linalg.norm(net))
 
     def meets_itself(self) -> bool:
-        """Whether links of it overlap now."""
+        """Whether links overlap each other now."""
         contacts = self.data.contact
         return any(
             a in self.own and b in self.own and contacts.dist[number] < 0
@@ -76,18 +76,18 @@ class Arm(Rig):
         )
 
     def put(self, pose: Rigid3, width_m: float) -> None:
-        """Bring the tool somewhere at once, from the angles it starts with."""
+        """Set the tool pose at once, by IK from the start angles."""
         self.bend(self._angles(pose, self.start, _FOUND), width_m)
         self.data.ctrl[self.drives] = self.data.qpos[self.angles]
         self.data.ctrl[self.width] = width_m
 
     def bend(self, angles: np.ndarray, width_m: float) -> None:
-        """Set its joints."""
+        """Set the joint angles and the finger width."""
         self.data.qpos[self.angles] = angles
         self.data.qpos[self.fingers] = width_m / 2
 
     def command(self, pose: Rigid3, width_m: float) -> None:
-        """Where the tool is to be driven: on from the angles that were commanded last."""
+        """Drive the tool to a pose, by IK from the last commanded angles."""
         self.data.ctrl[self.drives] = self._angles(pose, self.data.ctrl[self.drives], _FOLLOWED)
         self.data.ctrl[self.width] = width_m
 
@@ -98,7 +98,7 @@ class Arm(Rig):
 def arm_in(scene: Path, change: Callable[[Any], None] | None = None) -> Arm:
     """The arm in a scene.xml, at the origin.
 
-    Raises ValueError where scene.xml is none, BackendUnavailable without the extra.
+    Raises ValueError where scene.xml is invalid, BackendUnavailable without the extra.
     """
     import mujoco
 

@@ -1,4 +1,4 @@
-"""The arm's certificate: where on the floor it may stand for which joints, and every joint opened and closed from there."""
+"""The arm's certificate: base positions for each joint, and trials that open and close every joint from them."""
 
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -20,31 +20,31 @@ from r2c2r_core.robot.view import Surfaces, surfaces_of
 
 ARM_VERSION = 1
 MAP = "standing.svg"
-_WAYS = 4  # of a joint that are looked at, until one is reached from somewhere
-_SEEN_M = 0.8  # on all sides of a front: the arm is in the picture
+_WAYS = 4  # maximum grasps tested per joint until one is reachable
+_SEEN_M = 0.8  # margin around a front, so that the arm is in the picture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ArmCertificate:
-    """Every joint of a bundle, from where it was tried."""
+    """Results of all joints of a bundle, with base positions."""
 
     grips: tuple[Grip, ...]
     floor: Floor
-    reached: dict[str, dict[Stand, Reach]]  # of every joint
-    places: dict[Stand, tuple[str, ...]]  # the fewest that serve every joint within reach
+    reached: dict[str, dict[Stand, Reach]]  # by joint
+    places: dict[Stand, tuple[str, ...]]  # a small set of base positions that serves every reachable joint
 
     @property
     def opened(self) -> int:
-        """Joints that the arm opened and closed."""
+        """Number of joints that the arm opened and closed."""
         return sum(grip.passed for grip in self.grips)
 
 
 def certify_with_arm(
     scene: Path, films: Path | None = None, *, moving: bool = True, progress: Progress = SILENT
 ) -> ArmCertificate:
-    """Stand the arm where it reaches and let it open every joint of a scene.xml; pictures and the map go to `films`.
+    """Place the arm within reach and let it open every joint of a scene.xml; pictures and the map go to `films`.
 
-    Raises ValueError where the file is no scene, BackendUnavailable without the arm's extra.
+    Raises ValueError where the file is not a scene, BackendUnavailable without the arm's extra.
     """
     arm, gripper = arm_in(scene), gripper_in(scene)
     joints = joints_of(arm.model)
@@ -90,7 +90,7 @@ def arm_to_json(certificate: ArmCertificate) -> dict[str, Any]:
 
 
 def _reached(arm: Arm, gripper: Rig, travel: Travel, floor: Floor) -> tuple[Way, dict[Stand, Reach]] | None:
-    """The first way of the gripper with nothing in it that the arm can go from somewhere, and from where."""
+    """The first collision-free grasp that the arm can reach, with its base positions; None where there is none."""
     reset(gripper)
     for way in islice(clear_ways(gripper, travel), _WAYS):
         if found := reaches(arm, travel, way, floor.stands):
@@ -101,7 +101,7 @@ def _reached(arm: Arm, gripper: Rig, travel: Travel, floor: Floor) -> tuple[Way,
 def _from(
     arm: Arm, travel: Travel, way: Way, stand: Stand, reach: Reach, surfaces: Surfaces | None
 ) -> tuple[Grip, Film | None]:
-    """The joint tried from one place."""
+    """Trial of a joint from one base position."""
 
     def begin() -> None:
         reset(arm)

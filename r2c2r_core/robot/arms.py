@@ -1,4 +1,4 @@
-"""The arms that may try every joint of a bundle; the first is none, which needs nothing and is the default."""
+"""Arms for the joint trials of a bundle; the first is none, which needs no extra and is the default."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The gripper's certificate: every joint of a bundle opened and closed, every free thing moved, by friction alone."""
+"""The gripper's certificate: trials that open and close every joint and move every free object, by friction alone."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -28,39 +28,39 @@ _NAN = float("nan")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grip:
-    """How it went at one joint or thing; the last attempt's numbers, the strongest grip's where none sufficed."""
+    """Result at one joint or object: numbers of the last attempt, or of the strongest grip where none succeeded."""
 
     kind: Kind
     name: str
-    method: Method | Literal["pick"] | None  # None: none was found
+    method: Method | Literal["pick"] | None  # None: no grasp found
     passed: bool
-    grip_n: float = _NAN  # that sufficed, or the most that was tried
+    grip_n: float = _NAN  # grip force that sufficed, or the largest tried
     opened: float = _NAN  # 0..1 of the travel
     left_open: float = _NAN  # 0..1 of the travel at the end
-    reach_m: float = _NAN  # between where the pads closed and where they were meant to
+    reach_m: float = _NAN  # distance between the actual and the planned position of the closed pads
     slip_m: float = _NAN
-    force_n: float = _NAN  # most that the base gave while it moved the joint
-    off_m: float = _NAN  # of a thing, from where it was to be put
-    touched: tuple[tuple[str, float], ...] = ()  # what else the gripper met, and the most force in N
+    force_n: float = _NAN  # maximum base force while moving the joint
+    off_m: float = _NAN  # final distance of an object from its goal
+    touched: tuple[tuple[str, float], ...] = ()  # other bodies touched, and the maximum force in N
     why: str = ""
     blame: Blame | None = None
-    film: str | None = None  # file name without ending
+    film: str | None = None  # file name without extension
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GripperCertificate:
-    """Every joint and thing of a bundle."""
+    """Results of all joints and free objects of a bundle."""
 
     grips: tuple[Grip, ...]
 
     def share(self, kind: str) -> tuple[int, int]:
-        """How many passed, and of how many."""
+        """Number of passed trials of a kind, and their total."""
         own = [grip for grip in self.grips if grip.kind == kind]
         return sum(grip.passed for grip in own), len(own)
 
     @property
     def passed(self) -> bool:
-        """Whether every joint was opened and closed; a thing that cannot be picked up fails no kitchen."""
+        """Whether every joint was opened and closed; objects that cannot be picked up do not count."""
         done, count = self.share("joint")
         return done == count
 
@@ -68,9 +68,9 @@ class GripperCertificate:
 def certify_with_gripper(
     scene: Path, films: Path | None = None, *, moving: bool = True, progress: Progress = SILENT
 ) -> GripperCertificate:
-    """Try every joint and free thing of a scene.xml; a sheet of pictures of each goes to `films`, and if `moving` a GIF.
+    """Try every joint and free object of a scene.xml; a contact sheet of each goes to `films`, and if `moving` a GIF.
 
-    Raises ValueError where the file is no scene.
+    Raises ValueError where the file is not a scene.
     """
     return GripperCertificate(grips=tuple(try_share(scene, films, moving, progress=progress)))
 
@@ -78,7 +78,7 @@ def certify_with_gripper(
 def try_share(
     scene: Path, films: Path | None, moving: bool, first: int = 0, step: int = 1, *, progress: Progress = SILENT
 ) -> list[Grip]:
-    """Every `step`-th of the joints and free things of a scene.xml, joints before things, from the `first` on."""
+    """Trials of every `step`-th joint or free object of a scene.xml from index `first`, joints before objects."""
     rig = gripper_in(scene)
     surfaces = surfaces_of(rig.model) if films is not None else None
     joints, things = joints_of(rig.model), {body_words(rig.model, body): body for body in things_of(rig.model)}
@@ -109,7 +109,7 @@ def gripper_to_json(certificate: GripperCertificate) -> dict[str, Any]:
 
 
 def grip_to_json(grip: Grip) -> dict[str, Any]:
-    """How it went at one joint or thing."""
+    """Result at one joint or object as JSON."""
     numbers = ("grip_n", "opened", "left_open", "reach_m", "slip_m", "force_n", "off_m")
     return {
         "kind": grip.kind,
@@ -139,7 +139,7 @@ def _joint(rig: Rig, joint: str, surfaces: Surfaces | None) -> tuple[Grip, Film 
 def tried(
     rig: Rig, travel: Travel, way: Way, begin: Callable[[], None], filmed: Callable[[], Film] | None
 ) -> tuple[Grip, Film | None]:
-    """Opened and closed that way, with the stronger grip where the first does not do; `begin` puts all to where it starts."""
+    """Trial of a grasp, with the stronger grip if the first fails; `begin` resets the scene."""
     measured, verdict, film, grip_n = Measured(), None, None, _NAN
     for grip_n in GRIPS_N:
         rig.grip_with(grip_n)
@@ -197,14 +197,14 @@ def _thing(rig: Rig, body: int, surfaces: Surfaces | None) -> tuple[Grip, Film |
 
 
 def film_of_joint(rig: Rig, travel: Travel, surfaces: Surfaces, least_m: float = 0.4) -> Film:
-    """A film of its front, at least so much on all sides of it."""
+    """A film of the joint's front, with at least `least_m` on all sides."""
     pose, front = travel.world_from_closed, travel.part.front
     reach_m = max(0.8 * float(front.size[0]), 0.8 * float(front.size[2]), least_m)
     return film_of(surfaces, rig.model, pose.apply(front.centre), _level(-pose.rotation[:, 1]), reach_m)
 
 
 def _seen_from(rig: Rig, pick: Pick) -> Vector3:
-    """The level direction from a thing to the bundle's own camera, or else to where the gripper comes from."""
+    """Horizontal direction from an object to the bundle's camera, else to the gripper's approach side."""
     if rig.model.ncam:
         return _level(rig.data.cam_xpos[0] - pick.grasp.translation)
     return _level(-pick.grasp.rotation[:, 0])
@@ -221,7 +221,7 @@ def _touched(rig: Rig, measured: Measured) -> tuple[tuple[str, float], ...]:
 
 
 def filmed_to(grip: Grip, film: Film | None, folder: Path | None, moving: bool) -> Grip:
-    """The grip with the name of its pictures, which are written."""
+    """Write the film and return the grip with its file name."""
     if film is None or folder is None or not film.moments:
         return grip
     folder.mkdir(parents=True, exist_ok=True)

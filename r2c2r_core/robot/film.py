@@ -1,4 +1,4 @@
-"""A short film of the gripper at one joint or thing, and its sheet of pictures."""
+"""A short film of the gripper at one joint or object, and its contact sheet."""
 
 import io
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.robot.rig import Rig
 from r2c2r_core.robot.view import Poses, Surfaces, aimed, look, poses_now
 
-FRAME_S = 0.3  # of the simulation between two pictures
+FRAME_S = 0.3  # simulated time between two pictures
 SIZE = (208, 156)
 _FIELD_RAD = 0.9
 _COLOURS = 64
@@ -22,7 +22,7 @@ _SHEET = 8  # pictures of the sheet
 
 @dataclass(slots=True, kw_only=True)
 class Film:
-    """Moments as the simulation goes on, drawn when they are asked for."""
+    """Recorded moments of a running simulation, rendered on demand."""
 
     surfaces: Surfaces
     model: Any
@@ -32,13 +32,13 @@ class Film:
     _next_s: float = 0.0
 
     def watch(self, rig: Rig) -> None:
-        """Keep the moment when one is due."""
+        """Record the current poses when the next frame is due."""
         if rig.data.time + 1e-9 >= self._next_s:
             self.moments.append(poses_now(rig.data))
             self._next_s = rig.data.time + FRAME_S
 
     def gif(self) -> bytes:
-        """All moments, at real speed."""
+        """All moments as a GIF in real time."""
         from PIL import Image as Pictures
 
         drawn = [Pictures.fromarray(self._picture(moment)) for moment in self.moments]
@@ -50,14 +50,14 @@ class Film:
         return file.getvalue()
 
     def sheet(self) -> Image:
-        """A few of the moments side by side, in two rows."""
+        """Contact sheet: a few moments in two rows."""
         at = np.linspace(0, len(self.moments) - 1, _SHEET).round().astype(int)
         chosen = [self._picture(self.moments[number]) for number in at]
         rows = [np.concatenate(chosen[start : start + _SHEET // 2], axis=1) for start in (0, _SHEET // 2)]
         return np.concatenate(rows, axis=0)
 
     def sheet_jpg(self) -> bytes:
-        """The sheet as a file."""
+        """The contact sheet as JPEG bytes."""
         return cv2.imencode(".jpg", self.sheet()[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
 
     def _picture(self, moment: Poses) -> Image:
@@ -65,7 +65,7 @@ class Film:
 
 
 def film_of(surfaces: Surfaces, model: Any, target: Vector3, outward: Vector3, reach_m: float) -> Film:
-    """A film from in front and aside of a place that faces `outward` (level, unit), everything within `reach_m` in it."""
+    """A film of `target`, which faces `outward` (level, unit), from front and side, with `reach_m` around it in view."""
     side = np.cross([0.0, 0.0, 1.0], outward)
     away = (outward + 0.75 * side + np.array([0.0, 0.0, 0.45])) * reach_m / np.tan(_FIELD_RAD / 2)
     camera, camera_from_world = aimed(target + away, target + 0.3 * reach_m * outward, SIZE, _FIELD_RAD)

@@ -1,4 +1,4 @@
-"""Where to hold a handle, or to touch a front without one, and what would be in the gripper's way there and on the way."""
+"""Grasp candidates for handles and push contacts for fronts without one, with collision checks along the motion."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -12,18 +12,18 @@ from r2c2r_core.robot.handles import Board, Part
 from r2c2r_core.robot.motion import Hold, Travel, about
 from r2c2r_core.robot.rig import HALF_PAD_M, STROKE_M, TIP_M, Rig, tool_rotation
 
-BACK_M = 0.12  # before the handle, where an approach begins
-MARGIN_M = 0.002  # beside the handle, for either finger
-_BESIDE_M = 0.012  # beside the handle on the way there, where the stroke allows it
-_BEHIND_M = 0.006  # past the bar, where there is room
-_OFF_FRONT_M = 0.002  # between the tips and the front, at most a quarter of what stands out
-EJECTED_M = 0.04  # own choice: push latches are sold that throw a front out by 14 to 40 mm
-_HOOK_M = 0.01  # of the fingertip behind an edge
-_INSET_M = 0.03  # from the edge, where a front is pressed and pushed
-_PRESS_M = 0.006  # behind the face, for the base's springs to press with about 20 N
-_TOUCH_M = 0.001  # an overlap that counts
+BACK_M = 0.12  # distance from the handle at which an approach begins
+MARGIN_M = 0.002  # minimum clearance between the handle and each finger
+_BESIDE_M = 0.012  # clearance to the handle during the approach, where the stroke allows it
+_BEHIND_M = 0.006  # reach of the tips past the bar, where there is space
+_OFF_FRONT_M = 0.002  # clearance between tips and front, at most a quarter of the protrusion
+EJECTED_M = 0.04  # own choice: commercial push latches eject a front by 14 to 40 mm
+_HOOK_M = 0.01  # depth of the fingertip behind an edge
+_INSET_M = 0.03  # distance from the edge at which a front is pressed and pushed
+_PRESS_M = 0.006  # target depth behind the face, at which the base's springs press with about 20 N
+_TOUCH_M = 0.001  # minimum overlap that counts
 _INTO = np.array([0.0, 1.0, 0.0])  # the front's inward normal, in its body
-_SHARES = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9)  # of the travel that are looked at beforehand
+_SHARES = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9)  # fractions of the travel that are checked beforehand
 
 
 Method = Literal["pinch", "side", "drag", "push"]
@@ -33,17 +33,17 @@ a sliding door; a front without a handle pressed until its latch throws it out, 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Way:
-    """How a joint is opened and closed, and what the gripper would run into: body and depth in metres."""
+    """A plan to open and close a joint, with expected collisions: body and depth in metres."""
 
     method: Method
     opens: Hold
-    closes: Hold | None = None  # None: the same hold, without letting go
-    presses: Hold | None = None  # before it opens
+    closes: Hold | None = None  # None: the same hold, without releasing
+    presses: Hold | None = None  # push before opening
     clashes: dict[int, float] = field(default_factory=dict)
 
     @property
     def worst_m(self) -> float:
-        """Deepest overlap."""
+        """Deepest expected overlap, in metres."""
         return max(self.clashes.values(), default=0.0)
 
 
@@ -54,7 +54,7 @@ def holdable(bar: Board) -> tuple[int, ...]:
 
 
 def best_way(rig: Rig, travel: Travel) -> Way | None:
-    """The way that runs into least, a pinch before others; None where a handle fits between no fingers."""
+    """The plan with the least collision, preferring pinches; None where the handle does not fit between the fingers."""
     best: Way | None = None
     for way in _ways(travel):
         tried = replace(way, clashes=clashes(rig, travel, way))
@@ -66,7 +66,7 @@ def best_way(rig: Rig, travel: Travel) -> Way | None:
 
 
 def clear_ways(rig: Rig, travel: Travel) -> Iterator[Way]:
-    """Ways that run into nothing, one of each turn of the wrist, in the order of `best_way`."""
+    """Collision-free plans, one per wrist rotation, in the order of `best_way`."""
     known: set[bytes] = set()
     for way in _ways(travel):
         turn = np.append(way.opens.body_from_tool.rotation.round(3), way.opens.follow).tobytes() + way.method.encode()
@@ -76,7 +76,7 @@ def clear_ways(rig: Rig, travel: Travel) -> Iterator[Way]:
 
 
 def clashes(rig: Rig, travel: Travel, way: Way) -> dict[int, float]:
-    """What the gripper would overlap on its way to the part and along 90 % of the joint's travel, the grip itself left out."""
+    """Collisions of the gripper on the approach and along 90 % of the joint's travel, without the grasp itself."""
     import mujoco
 
     scratch = mujoco.MjData(rig.model)
@@ -98,7 +98,7 @@ STATIONS_OF_A_LEG = 3 + len(_SHARES)
 
 
 def stations(travel: Travel, way: Way) -> Iterator[tuple[Rigid3, float, float]]:
-    """Pose, width and joint position of each moment that is looked at: on the way there, then on the joint's; for each hold."""
+    """Checked configurations of each hold (pose, width, joint position): along the approach, then along the joint's travel."""
     start, end = way.opens.starts, _SHARES[-1] * travel.upper
     legs = [(way.opens, start), *([(way.closes, end)] if way.closes is not None else [])]
     for hold, at in legs:
@@ -110,9 +110,9 @@ def stations(travel: Travel, way: Way) -> Iterator[tuple[Rigid3, float, float]]:
 
 
 def overlaps(rig: Rig, held: int) -> Iterator[tuple[int, float]]:
-    """Bodies that the rig's robot overlaps now, and how deep; its pads on what is held are left out.
+    """Bodies that the robot overlaps now, with depth, except its pads on the grasped part.
 
-    Geoms of it that have a gap meet things from that far.
+    Robot geoms with a gap count as touching from that distance.
     """
     model, contacts = rig.model, rig.data.contact
     for number, (a, b) in enumerate(contacts.geom[: rig.data.ncon]):
@@ -133,14 +133,14 @@ def _ways(travel: Travel) -> Iterator[Way]:
         if part.bar is not None:
             yield _beside(travel, part.bar, along)
         for inset_m in (_INSET_M, _INSET_M / 2):
-            for up in (0.0, -0.25, 0.25):  # what passes in front may have a handle
+            for up in (0.0, -0.25, 0.25):  # the part that passes in front may have a handle
                 yield Way(method="drag", opens=_on_face(travel, -along, inset_m, press_m=_PRESS_M, up=up))
     elif part.bar is None:
         yield from (_pushed(travel, edge) for edge in _edges(travel))
 
 
 def _pinches(travel: Travel, bar: Board) -> Iterator[Hold]:
-    """Every grasp worth trying, the plainest first: the bar's middle, then towards its ends, narrower beside it, tilted."""
+    """Grasp candidates, simplest first: the bar's middle, then towards its ends, with less clearance, tilted."""
     for tilt in (0.0, 0.5, -0.5):
         for beside_m in (_BESIDE_M, MARGIN_M):
             for side in holdable(bar):
@@ -151,13 +151,13 @@ def _pinches(travel: Travel, bar: Board) -> Iterator[Hold]:
 
 
 def _pinch(part: Part, bar: Board, side: int, along: float, tilt: float, beside_m: float, follow: float) -> Hold:
-    """Pads on both faces of the bar's `side`; the tips just past the bar, and off the front behind it."""
+    """Pinch with pads on both faces of the bar's `side`, and the tips just past the bar, clear of the front."""
     off_front = min(_OFF_FRONT_M, part.protrusion_m / 4) + HALF_PAD_M * abs(np.sin(tilt))
     tip = min(part.front.low[1] - off_front, bar.high[1] + _BEHIND_M)
     place = bar.centre
     place[1] = tip
     place[2 - side] += along * bar.size[2 - side]
-    stroke = np.eye(3)[side] * (-1.0 if side == 0 else 1.0)  # to the left of who looks along the approach, or up
+    stroke = np.eye(3)[side] * (-1.0 if side == 0 else 1.0)  # to the left when looking along the approach, or up
     approach = about(stroke, tilt) @ _INTO
     width = float(bar.size[side])
     return Hold(
@@ -169,11 +169,11 @@ def _pinch(part: Part, bar: Board, side: int, along: float, tilt: float, beside_
 
 
 def _beside(travel: Travel, bar: Board, along: Vector3) -> Way:
-    """The fingertip on the trailing side of a sliding door's handle to open it, on the leading one to close it."""
+    """Push of a sliding door by its handle: fingertip on the trailing side to open, on the leading side to close."""
     off = float(np.abs(along) @ bar.size) / 2 + HALF_PAD_M + _OFF_FRONT_M / 4
     tip = min(travel.part.front.low[1] - min(_OFF_FRONT_M, travel.part.protrusion_m / 4), bar.high[1] + _BEHIND_M)
     place = np.array([bar.centre[0], tip - TIP_M, bar.centre[2]])
-    turned = tool_rotation(_INTO, np.cross(_INTO, along))  # its breadth, the lesser side, along the way
+    turned = tool_rotation(_INTO, np.cross(_INTO, along))  # its narrower side along the motion
     opens, closes = (
         Hold(body_from_tool=Rigid3(turned, place + sign * off * along), wide_m=0.0, held_m=0.0) for sign in (-1.0, 1.0)
     )
@@ -181,7 +181,7 @@ def _beside(travel: Travel, bar: Board, along: Vector3) -> Way:
 
 
 def _pushed(travel: Travel, edge: Vector3) -> Way:
-    """The face pressed near an edge, the edge pulled from behind once the latch has thrown it out, the face pushed shut."""
+    """Plan for a push latch: press the face near an edge, pull the ejected edge from behind, push the face shut."""
     front = travel.part.front
     middle = front.centre + np.abs(edge) * front.size / 2 * edge
     thrown = EJECTED_M / max(travel.radius_of(middle), 1e-3)
@@ -200,9 +200,9 @@ def _pushed(travel: Travel, edge: Vector3) -> Way:
 
 
 def _on_face(travel: Travel, edge: Vector3, inset_m: float, press_m: float, up: float = 0.0) -> Hold:
-    """The closed fingertips on the face, `inset_m` from an edge and `up` of its length off that edge's middle.
+    """Contact of the closed fingertips on the face, `inset_m` from an edge, at fraction `up` of its length from its middle.
 
-    `press_m` lies behind the face, so that the base's springs press.
+    The target is `press_m` behind the face, so that the base's springs press.
     """
     front = travel.part.front
     place = front.centre + (np.abs(edge) @ front.size / 2 - inset_m) * edge
@@ -212,7 +212,7 @@ def _on_face(travel: Travel, edge: Vector3, inset_m: float, press_m: float, up: 
 
 
 def _edges(travel: Travel) -> Iterable[Vector3]:
-    """Outward directions, in the body, of the edges a finger may pull: a door's free one, or all of a drawer, the top first."""
+    """Outward directions, in the body, of edges to pull: a door's free edge, or all edges of a drawer, the top first."""
     across, up = np.eye(3)[0], np.eye(3)[2]
     if not travel.hinged:
         return (up, across, -across, -up)
@@ -223,7 +223,7 @@ def _edges(travel: Travel) -> Iterable[Vector3]:
 
 
 def _slides_along(travel: Travel) -> Vector3 | None:
-    """The direction, in the body, in which a sliding door opens within its own plane; None of what opens outwards."""
+    """Opening direction, in the body, of a sliding door within its own plane; None if it opens outwards."""
     axis = _axis_body(travel)
     if travel.hinged or abs(axis[1]) > 0.7:
         return None
@@ -236,5 +236,5 @@ def _axis_body(travel: Travel) -> Vector3:
 
 
 def body_words(model: Any, body: int) -> str:
-    """What a body is called for a person."""
+    """Readable name of a body."""
     return "the floor or a wall" if body == 0 else str(model.body(body).name)

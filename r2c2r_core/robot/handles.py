@@ -1,4 +1,4 @@
-"""What of a moving part a gripper can hold: its handle as the bundle describes it, and its front, read from the colliders."""
+"""Graspable geometry of a moving part: its handle as described by the bundle, and its front, from the colliders."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,32 +20,32 @@ class Board:
 
     @property
     def centre(self) -> Vector3:
-        """Its middle."""
+        """Centre of the box."""
         return np.asarray((self.low + self.high) / 2)
 
     @property
     def size(self) -> Vector3:
-        """Its sides."""
+        """Side lengths of the box."""
         return np.asarray(self.high - self.low)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Part:
-    """What one joint moves."""
+    """The part moved by one joint."""
 
     joint: str
     body: int
     front: Board
-    bar: Board | None  # the grip of its handle, the foremost of several; None: it has none, one pushes
+    bar: Board | None  # the grip of its handle, the foremost of several; None: no handle, it is pushed
 
     @property
     def protrusion_m(self) -> float:
-        """How far the handle stands out of the front."""
+        """Protrusion of the handle from the front."""
         return 0.0 if self.bar is None else float(self.front.low[1] - self.bar.low[1])
 
 
 def part_of(model: Any, joint: str) -> Part | None:
-    """The front of what a joint moves and its handle; None where it has no board."""
+    """The front and handle of the part moved by a joint; None where it has no board."""
     body = int(model.joint(joint).bodyid[0])
     boards = [
         Board(low=model.geom_pos[g] - model.geom_size[g], high=model.geom_pos[g] + model.geom_size[g])
@@ -60,7 +60,7 @@ def part_of(model: Any, joint: str) -> Part | None:
 
 
 def _grips(model: Any, body: int) -> Iterator[Board]:
-    """The grips of a body's handles: sites of scene.xml that are boxes, whose axes are the body's in some order."""
+    """Grips of a body's handles: box sites of scene.xml, whose axes are a permutation of the body's."""
     import mujoco
 
     for site in range(model.nsite):

@@ -1,4 +1,4 @@
-"""Where an arm's tool is at given joint angles, and the angles that bring it somewhere: many at once."""
+"""Batched forward and inverse kinematics of an arm."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -8,25 +8,25 @@ import numpy as np
 
 from r2c2r_core.geometry.transforms import Rigid3
 
-_DAMPING = 0.02  # of the least squares, m: singular poses are passed slowly
-_TURN_M = 0.3  # a rad off counts as much
-_MOST_RAD = 0.25  # that a joint turns in one iteration
-_HOMING = 0.05  # of the way back to rest in one iteration, where the tool does not notice
+_DAMPING = 0.02  # of the least squares, m: slows down near singularities
+_TURN_M = 0.3  # weight of a radian of rotation error, in m
+_MOST_RAD = 0.25  # maximum joint step of one iteration
+_HOMING = 0.05  # null-space step towards rest per iteration, as a fraction of the way
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Chain:
-    """Hinges in a row, each about the z of its own frame."""
+    """A serial chain of hinges, each about the z axis of its own frame."""
 
     parent_from_joint: np.ndarray  # (j, 4, 4) at angle zero
     last_from_tool: np.ndarray  # (4, 4)
     low: np.ndarray  # (j,) rad
     high: np.ndarray
-    rest: np.ndarray  # (j,) what spare freedom goes back to
+    rest: np.ndarray  # (j,) target of the null-space motion
 
 
 class Solved(NamedTuple):
-    """Angles, and by how much the tool misses."""
+    """IK solutions with their residual tool errors."""
 
     angles: np.ndarray  # (n, j)
     off_m: np.ndarray  # (n,)
@@ -34,10 +34,10 @@ class Solved(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """Where everything is at given angles."""
+    """Tool poses and Jacobians at given angles."""
 
     base_from_tool: np.ndarray  # (n, 4, 4)
-    jacobian: np.ndarray  # (n, 6, j) of the tool's place and turn, in the base's frame
+    jacobian: np.ndarray  # (n, 6, j) of the tool's position and rotation, in the base's frame
 
 
 def chain_of(model: Any, joints: tuple[str, ...], tool: str, rest: tuple[float, ...]) -> Chain:
@@ -60,7 +60,7 @@ def chain_of(model: Any, joints: tuple[str, ...], tool: str, rest: tuple[float, 
 
 
 def placed(chain: Chain, angles: np.ndarray) -> Placed:
-    """The tool, and how it moves with each joint."""
+    """Forward kinematics: tool poses and geometric Jacobians."""
     count, joints = angles.shape
     pose = np.broadcast_to(np.eye(4), (count, 4, 4))
     axes, anchors = np.zeros((count, joints, 3)), np.zeros((count, joints, 3))
@@ -78,9 +78,9 @@ def placed(chain: Chain, angles: np.ndarray) -> Placed:
 
 
 def solve(chain: Chain, base_from_tool: np.ndarray, start: np.ndarray, iterations: int) -> Solved:
-    """Angles within the limits that bring the tool to each pose (n, 4, 4), found from `start` (n, j) by damped least squares.
+    """Inverse kinematics within joint limits for tool poses (n, 4, 4), from `start` (n, j) by damped least squares.
 
-    Spare freedom goes towards rest (Liegeois 1977).
+    Null-space motion goes towards rest (Liegeois 1977).
     """
     angles = np.clip(start, chain.low, chain.high)
     damping, joints = _DAMPING**2 * np.eye(6), np.eye(angles.shape[1])
@@ -99,9 +99,9 @@ def solve(chain: Chain, base_from_tool: np.ndarray, start: np.ndarray, iteration
 
 
 def ease(chain: Chain, angles: np.ndarray) -> float:
-    """The least, over all angles (n, j), by which the tool gives way to the joints: 0 where it cannot move some way.
+    """Minimum dexterity over all angles (n, j); 0 at a singularity.
 
-    The smallest singular value of its motion (metres, a rad counting as 0.3 m), less near a joint's limit (Tsai 1986).
+    The smallest singular value of the Jacobian (metres, a rad counting as 0.3 m), reduced near joint limits (Tsai 1986).
     """
     jacobian = placed(chain, angles).jacobian.copy()
     jacobian[:, 3:] *= _TURN_M
@@ -115,7 +115,7 @@ def matrices(poses: list[Rigid3]) -> np.ndarray:
 
 
 def _error(wanted: np.ndarray, now: np.ndarray) -> np.ndarray:
-    """(n, 6): metres and radians from the pose now to the one that is wanted, in the base's frame."""
+    """Pose error (n, 6) from current to wanted in metres and radians, in the base's frame."""
     turn = wanted[:, :3, :3] @ now[:, :3, :3].transpose(0, 2, 1)
     twist = np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], axis=1)
     sine, cosine = np.linalg.norm(twist, axis=1) / 2, (np.trace(turn, axis1=1, axis2=2) - 1) / 2

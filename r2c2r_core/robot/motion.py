@@ -1,4 +1,4 @@
-"""Where a moving part is at each position of its joint, and where the tool goes with it."""
+"""Poses of a moving part along its joint's travel, and of a tool that holds it."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ _HINGE = 3  # mjtJoint
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Travel:
-    """One joint's way, in the world."""
+    """Travel of one joint, in the world."""
 
     part: Part
     hinged: bool
@@ -26,7 +26,7 @@ class Travel:
     address: int  # of its position in qpos
 
     def world_from_body(self, position: float) -> Rigid3:
-        """The part's pose there."""
+        """The part's pose at a joint position."""
         if not self.hinged:
             return Rigid3(self.world_from_closed.rotation, self.world_from_closed.translation + position * self.axis)
         turn = about(self.axis, position)
@@ -34,29 +34,29 @@ class Travel:
         return Rigid3(turn @ self.world_from_closed.rotation, shift)
 
     def radius_of(self, point_body: Vector3) -> float:
-        """Metres that a point of the part travels per radian, or per metre."""
+        """Metres travelled by a point of the part per radian, or per metre."""
         if not self.hinged:
             return 1.0
         arm = self.world_from_closed.apply(point_body) - self.anchor
         return float(np.linalg.norm(np.cross(self.axis, arm)))
 
     def position(self, rig: Rig) -> float:
-        """Of the joint now."""
+        """Current position of the joint."""
         return float(rig.data.qpos[self.address])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Hold:
-    """A grasp: where the tool stands on the part, and how the wrist goes with it."""
+    """A grasp: the tool's pose on the part, and how the wrist follows the motion."""
 
     body_from_tool: Rigid3
-    wide_m: float  # between the pads on the way there
-    held_m: float  # between the pads when they touch
-    starts: float = 0.0  # position of the joint from which on it holds
-    follow: float = 1.0  # how much of a hinge's turn the wrist follows; less, and the bar turns between the pads
+    wide_m: float  # width between the pads during the approach
+    held_m: float  # width between the pads in contact
+    starts: float = 0.0  # joint position at which the grasp begins
+    follow: float = 1.0  # fraction of a hinge's rotation that the wrist follows; below 1, the bar turns between the pads
 
     def world_from_tool(self, travel: Travel, position: float, back_m: float = 0.0) -> Rigid3:
-        """The tool's pose at a position of the joint, or `back_m` before it along the approach."""
+        """The tool's pose at a joint position, retracted by `back_m` along the approach."""
         pose = travel.world_from_body(position) @ self.body_from_tool
         rotation = pose.rotation
         if travel.hinged and self.follow < 1.0:
@@ -65,7 +65,7 @@ class Hold:
 
 
 def travel_of(rig: Rig, joint: str) -> Travel | None:
-    """The way of a joint of the rig's scene; None where nothing it moves has a board."""
+    """Travel of a joint of the rig's scene; None where no moved body has a board."""
     import mujoco
 
     part = part_of(rig.model, joint)

@@ -1,4 +1,4 @@
-"""The gripper opens one joint by its handle and closes it again: commands, step by step, and what was measured meanwhile."""
+"""Commands for the gripper to open and close one joint by its handle, and measurements during execution."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -18,15 +18,15 @@ CLOSED_SHARE = 0.02
 SPEED_M_S = 0.35  # of the handle
 _TURN_RAD_S = 1.2
 _APPROACH_S, _SETTLE_S, _SQUEEZE_S, _CROSS_S, _PATIENCE_S = 0.8, 0.15, 0.35, 1.2, 1.0
-_BEYOND = 0.04  # of the travel: the base is driven a little further, since its springs give
-_LOST_M = 0.05  # between tool and handle: the grip is lost, or the joint does not follow
+_BEYOND = 0.04  # overshoot of the commanded travel, to compensate for the base's springs
+_LOST_M = 0.05  # distance between tool and handle at which the grip is lost, or the joint does not follow
 
 Phase = Literal["approach", "squeeze", "open", "close", "release"]
 Watch = Callable[[Rig], None]
 
 
 class Command(NamedTuple):
-    """What the gripper is told."""
+    """One command of the gripper."""
 
     pose: Rigid3
     width_m: float
@@ -35,20 +35,20 @@ class Command(NamedTuple):
 
 @dataclass(slots=True, kw_only=True)
 class Measured:
-    """What one attempt showed."""
+    """Measurements of one attempt."""
 
-    reach_m: float = float("nan")  # between where the pads closed and where they were meant to
-    opened: float = 0.0  # share of the travel
-    closed: float = 1.0  # share of the travel that was left at the end
-    slip_m: float = 0.0  # of the pads along the handle, since they closed
-    force_n: float = 0.0  # most that the base gave while it moved the joint
-    held: float = 0.0  # share of the time from squeeze to release in which a pad touched the part
-    touched: dict[int, float] = field(default_factory=dict)  # what else the gripper touched: body, most force in N
+    reach_m: float = float("nan")  # distance between the actual and the planned position of the closed pads
+    opened: float = 0.0  # fraction of the travel
+    closed: float = 1.0  # remaining fraction of the travel at the end
+    slip_m: float = 0.0  # of the pads along the handle since closing
+    force_n: float = 0.0  # maximum base force while moving the joint
+    held: float = 0.0  # fraction of the time from squeeze to release with a pad in contact with the part
+    touched: dict[int, float] = field(default_factory=dict)  # other bodies touched: body, maximum force in N
     seconds: float = 0.0  # simulated
 
 
 def attempt(rig: Rig, travel: Travel, way: Way, watch: Watch | None = None) -> Measured:
-    """Open and close the joint, from the rig's reset state; the scene stays as it ends."""
+    """Open and close the joint from the rig's reset state; the scene is left in its final state."""
     measured, held_at, moving, contacts = Measured(), None, 0, 0
     first = way.presses or way.opens
     rig.put(first.world_from_tool(travel, 0.0, BACK_M), first.wide_m)
@@ -76,12 +76,12 @@ def attempt(rig: Rig, travel: Travel, way: Way, watch: Watch | None = None) -> M
 
 
 def commands(rig: Rig, travel: Travel, way: Way) -> Iterator[Command]:
-    """What opens the joint and closes it again, a command a step; ends early where the part does not follow."""
+    """Commands that open and close the joint, one per step; ends early where the part does not follow."""
     away = (OPEN_SHARE + _BEYOND) * travel.upper
     if way.presses is not None:
         yield from _approach(rig, travel, way.presses, 0.0)
         yield from _release(rig, travel, way.presses)
-        rig.data.qpos[travel.address] = way.opens.starts  # the latch, which no bundle holds, throws the front out
+        rig.data.qpos[travel.address] = way.opens.starts  # simulates the push latch, which is not in the bundle
         yield from _cross(rig, way.opens.world_from_tool(travel, way.opens.starts, BACK_M))
     yield from _approach(rig, travel, way.opens, way.opens.starts)
     yield from wait(rig, Command(way.opens.world_from_tool(travel, way.opens.starts), 0.0, "squeeze"), _SQUEEZE_S)
@@ -104,7 +104,7 @@ def _approach(rig: Rig, travel: Travel, hold: Hold, position: float) -> Iterator
 
 
 def _along(rig: Rig, travel: Travel, hold: Hold, phase: Phase, ends: tuple[float, float], enough: float) -> Iterator[Command]:
-    """Along the joint's way from one end past `enough`, and a moment's patience there."""
+    """Commands along the joint's travel from one end until past `enough`, with a short wait there."""
     sign = np.sign(ends[1] - ends[0])
     for share in ramp(rig, _seconds(travel, hold)):
         yield Command(hold.world_from_tool(travel, ends[0] + share * (ends[1] - ends[0])), 0.0, phase)
@@ -119,7 +119,7 @@ def _along(rig: Rig, travel: Travel, hold: Hold, phase: Phase, ends: tuple[float
 
 
 def _release(rig: Rig, travel: Travel, hold: Hold) -> Iterator[Command]:
-    """Fingers open where they are, then back."""
+    """Commands that open the fingers in place, then retract."""
     at = travel.position(rig)
     yield from wait(rig, Command(hold.world_from_tool(travel, at), hold.wide_m, "release"), _SQUEEZE_S)
     for share in ramp(rig, _APPROACH_S):
@@ -127,7 +127,7 @@ def _release(rig: Rig, travel: Travel, hold: Hold) -> Iterator[Command]:
 
 
 def _cross(rig: Rig, target: Rigid3) -> Iterator[Command]:
-    """Straight to another pose, the turn spread over the way."""
+    """Commands along a straight line to another pose, with interpolated rotation."""
     start = rig.world_from_tool
     turn = np.asarray(cv2.Rodrigues(target.rotation @ start.rotation.T)[0]).ravel()
     for share in ramp(rig, _CROSS_S):
@@ -147,7 +147,7 @@ def _lost(rig: Rig, travel: Travel, hold: Hold) -> bool:
 
 
 def _touches(rig: Rig, part: int, measured: Measured) -> bool:
-    """Whether a pad touches the part; what else is touched is noted."""
+    """Whether a pad touches the part; records contacts with other bodies."""
     touching = False
     for pull in rig.pulls():
         if pull.body == part:
@@ -158,7 +158,7 @@ def _touches(rig: Rig, part: int, measured: Measured) -> bool:
 
 
 def reset(rig: Rig) -> None:
-    """Everything as the scene says, the clock at zero."""
+    """Reset the simulation to the scene's initial state at time zero."""
     import mujoco
 
     mujoco.mj_resetData(rig.model, rig.data)
@@ -166,6 +166,6 @@ def reset(rig: Rig) -> None:
 
 
 def joints_of(model: Any) -> list[str]:
-    """Hinges and slides of the scene with a way to go."""
+    """Names of the scene's hinges and slides with a non-empty range."""
     names = [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in (2, 3)]
     return [n for n in names if not n.startswith(PREFIX) and model.joint(n).range[1] > model.joint(n).range[0]]

@@ -1,8 +1,7 @@
-"""A Franka Panda with its hand, as a MjSpec: the description that pybullet's wheel ships (Apache-2.0, after franka_ros).
+"""A Franka Panda with its hand, as a MjSpec, from the description in pybullet's wheel (Apache-2.0, after franka_ros).
 
-Its masses are that file's, its inertias too (0.1 kg m2 a link, more than the real ones). It stands on a lifting
-column, holds itself
-against gravity, and is driven through springs like libfranka's example `joint_impedance_control`.
+Masses and inertias are that file's (0.1 kg m2 per link, more than the real ones). The arm stands on a lifting column, is
+gravity-compensated, and is driven through springs like libfranka's example `joint_impedance_control`.
 """
 
 import importlib.util
@@ -15,11 +14,11 @@ NAME = "Franka Panda"
 SOURCE = "pybullet_data/franka_panda of pybullet, Apache-2.0"
 JOINTS = tuple(f"panda_joint{number}" for number in range(1, 8))
 ROOT = "panda_link0"
-LIFTS_M = (0.1, 0.4, 0.7, 1.0, 1.3)  # own choice: of its root above the floor, on a lifting column
+LIFTS_M = (0.1, 0.4, 0.7, 1.0, 1.3)  # own choice: heights of its root above the floor, on a lifting column
 SHOULDER_M = 0.333  # above its root
 REACH_M = 0.855 + 0.107 + 0.102  # from the shoulder: Franka's data sheet to the wrist, the flange, the hand
 PEDESTAL_RADIUS_M = 0.2
-CLEAR_M = 0.015  # own choice: between its links and everything, where it is looked for where to stand
+CLEAR_M = 0.015  # own choice: clearance between its links and all else when base positions are searched
 RESTS = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)  # Franka's "ready" pose, rad
 
 _SPRINGS = (600.0, 600.0, 600.0, 600.0, 250.0, 150.0, 50.0)  # N m/rad, of libfranka's example
@@ -30,7 +29,7 @@ _HAND_FROM_FINGER_Z_M = 0.0584
 _LINKS = ("panda_link0", "panda_link1", "panda_link2", "panda_link3", "panda_link4", "panda_link5", "panda_link6")
 _HAND = ("panda_hand", "panda_leftfinger", "panda_rightfinger")
 _WRIST = ("panda_link7", "panda_link8", *_HAND)
-_BESIDE = 3  # links whose hulls overlap at rest
+_BESIDE = 3  # maximum distance in the chain of links whose hulls may overlap at rest
 
 
 def panda_spec() -> Any:
@@ -52,7 +51,7 @@ def panda_spec() -> Any:
     root.add_geom(
         name="pedestal",
         type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[PEDESTAL_RADIUS_M / 2**0.5] * 2 + [LIFTS_M[-1] / 2],  # what of it is below the floor meets nothing there
+        size=[PEDESTAL_RADIUS_M / 2**0.5] * 2 + [LIFTS_M[-1] / 2],  # the part below the floor collides with nothing
         pos=[0.0, 0.0, -LIFTS_M[-1] / 2 - 0.005],
         rgba=[0.35, 0.37, 0.4, 1.0],
         gap=CLEAR_M,
@@ -74,7 +73,7 @@ def _folder() -> Path:
 
 
 def _described(folder: Path) -> str:
-    """The URDF, its meshes found; only its colliders, which are drawn too: 300 triangles a link."""
+    """The URDF with resolved mesh paths and colliders only, which also serve as visuals: 300 triangles per link."""
     text = (folder / "panda.urdf").read_text(encoding="utf-8").replace("package://meshes/", "")
     head, _, rest = text.partition("<robot")
     _, _, rest = rest.partition(">")
@@ -113,7 +112,7 @@ def _with_actuators(spec: Any) -> None:
         finger = spec.joint(name)
         finger.name, finger.damping = side, [4.0, 0.0, 0.0]
         finger.actfrclimited = 0
-    for equality in list(spec.equalities):  # the description's mimic
+    for equality in list(spec.equalities):  # from the description's mimic joint
         spec.delete(equality)
     linkage = spec.add_equality(name="linkage", type=mujoco.mjtEq.mjEQ_JOINT, name1="left", name2="right")
     linkage.data[:2], linkage.solref = [0.0, 1.0], [0.005, 1.0]
@@ -126,7 +125,7 @@ def _with_actuators(spec: Any) -> None:
 
 
 def _without_own_contacts(spec: Any) -> None:
-    """Hulls of links near each other overlap though the links do not."""
+    """Exclude contacts of nearby links, whose hulls overlap though the links do not."""
     chain = [*_LINKS, *_WRIST]
     for number, first in enumerate(chain):
         for second in chain[number + 1 :]:

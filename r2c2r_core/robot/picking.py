@@ -1,4 +1,4 @@
-"""The gripper picks up a free-standing thing and puts it down 10 cm further."""
+"""Pick and place of a free-standing object with the gripper, over 10 cm."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -14,19 +14,19 @@ from r2c2r_core.robot.ramps import approach_from, ramp, wait
 from r2c2r_core.robot.rig import STROKE_M, TIP_M, Rig, tool_rotation
 
 FURTHER_M = 0.10
-NEAR_M = 0.03  # to where it was to be put, to have been put there
+NEAR_M = 0.03  # maximum distance from the goal for success
 _UPRIGHT = np.cos(np.deg2rad(15.0))
 _LIFT_M = 0.06
-_DEEP_M = 0.035  # of a thing between the fingers, at most
+_DEEP_M = 0.035  # maximum depth of an object between the fingers
 _UP = np.array([0.0, 0.0, 1.0])
 _TURNS = np.deg2rad(np.arange(0.0, 360.0, 30.0))
 _TOUCH_M = 0.001
-_NEAR_PADS_M = 0.025  # of their middle: what of a thing held from above tells its width
+_NEAR_PADS_M = 0.025  # around the pads' middle: the part of an object grasped from above that determines its width
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pick:
-    """Where to hold a thing and where to put it."""
+    """A planned grasp and placement of an object."""
 
     body: int
     grasp: Rigid3  # world_from_tool when the pads close
@@ -37,25 +37,25 @@ class Pick:
 
 
 class Put(NamedTuple):
-    """How it went."""
+    """Result of a pick and place."""
 
     lifted_m: float
-    off_m: float  # from where it was to stand
+    off_m: float  # from its goal
     upright: float  # cosine of its tilt
 
     @property
     def done(self) -> bool:
-        """Whether it stands where it was to be put."""
+        """Whether the object was lifted and stands upright at its goal."""
         return bool(self.lifted_m > _LIFT_M / 2 and self.off_m < NEAR_M and self.upright > _UPRIGHT)
 
 
 def things_of(model: Any) -> list[int]:
-    """Bodies that stand free."""
+    """Bodies with a free joint."""
     return [int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == 0]
 
 
 def plan_pick(rig: Rig, body: int) -> Pick | str:
-    """The first grasp and place with nothing in the way; otherwise why there is none."""
+    """The first collision-free grasp and placement, or the reason why there is none."""
     shifts = list(_free_places(rig, body))
     if not shifts:
         return "no free place 10 cm further on what it stands on"
@@ -71,7 +71,7 @@ def plan_pick(rig: Rig, body: int) -> Pick | str:
 
 
 def pick_and_place(rig: Rig, pick: Pick, watch: Watch | None = None) -> Put:
-    """From the rig's reset state."""
+    """Execute a pick and place from the rig's reset state."""
     start, highest = rig.world_from_body(pick.body), 0.0
     rig.put(_back(pick.grasp, BACK_M), pick.wide_m)
     for pose, width in commands(rig, pick):
@@ -86,7 +86,7 @@ def pick_and_place(rig: Rig, pick: Pick, watch: Watch | None = None) -> Put:
 
 
 def commands(rig: Rig, pick: Pick) -> Iterator[tuple[Rigid3, float]]:
-    """Poses and widths: there, hold, lift, across, down, let go, back, a moment's rest."""
+    """Tool poses and widths: approach, grasp, lift, move across, lower, release, retract, wait."""
     above, over, there = (
         Rigid3(pick.grasp.rotation, pick.grasp.translation + shift)
         for shift in (_LIFT_M * _UP, _LIFT_M * _UP + pick.shift, pick.shift)
@@ -105,7 +105,7 @@ def commands(rig: Rig, pick: Pick) -> Iterator[tuple[Rigid3, float]]:
 
 
 def _grasps(rig: Rig, body: int, shift: Vector3) -> Iterator[Pick]:
-    """Every grasp whose stroke holds the thing: from each side at half its height, then from above."""
+    """Grasps that fit the stroke: from each side at half the object's height, then from above."""
     points = _points_world(rig, body)
     low, high = points.min(axis=0), points.max(axis=0)
     for tilt in (0.0, 0.5, np.pi / 2):
@@ -133,7 +133,7 @@ def _grasps(rig: Rig, body: int, shift: Vector3) -> Iterator[Pick]:
 
 
 def _free_places(rig: Rig, body: int) -> Iterator[Vector3]:
-    """Shifts after which the thing stands on its support and touches nothing else."""
+    """Shifts after which the object stands on its support without touching anything else."""
     import mujoco
 
     model, points = rig.model, _points_world(rig, body)
@@ -156,7 +156,7 @@ def _free_places(rig: Rig, body: int) -> Iterator[Vector3]:
 
 
 def _stands(model: Any, data: Any, point: Vector3, body: int) -> bool:
-    """Whether something lies just below a point."""
+    """Whether a collider lies just below a point."""
     import mujoco
 
     hit = np.zeros(1, np.int32)
@@ -166,7 +166,7 @@ def _stands(model: Any, data: Any, point: Vector3, body: int) -> bool:
 
 
 def _in_the_way(rig: Rig, pick: Pick) -> bool:
-    """Whether the gripper overlaps anything, the thing between its pads left out, where it takes it or where it puts it."""
+    """Whether the gripper overlaps anything but the object at the pick or the place pose."""
     import mujoco
 
     scratch = mujoco.MjData(rig.model)
@@ -186,7 +186,7 @@ def _in_the_way(rig: Rig, pick: Pick) -> bool:
 
 
 def _points_world(rig: Rig, body: int) -> Points:
-    """Corners and vertices of the thing's colliders, in the world."""
+    """Corners and vertices of the object's colliders, in the world."""
     model, data = rig.model, rig.data
     _place(model, data)
     found = []

@@ -1,4 +1,4 @@
-"""Commands over time: waiting, and going slowly at both ends."""
+"""Time profiles of commands: waiting, and smooth ramps."""
 
 from collections.abc import Iterator
 from typing import TypeVar
@@ -10,13 +10,13 @@ T = TypeVar("T")
 
 
 def wait(rig: Rig, command: T, seconds: float) -> Iterator[T]:
-    """The same, over and over."""
+    """The same command for a duration."""
     for _ in range(round(seconds / rig.step_s)):
         yield command
 
 
 def ramp(rig: Rig, seconds: float) -> Iterator[float]:
-    """0 to 1, slowly at both ends."""
+    """A smooth ramp from 0 to 1, slow at both ends."""
     count = max(round(seconds / rig.step_s), 1)
     for number in range(1, count + 1):
         t = number / count

@@ -1,4 +1,4 @@
-"""A bundle's scene with a gripper in it: its bodies by name, its commands, and what it touches."""
+"""A bundle's scene with a floating gripper: commands, state and contacts."""
 
 import math
 from abc import ABC, abstractmethod
@@ -15,9 +15,9 @@ from r2c2r_core.geometry.transforms import Rigid3
 GRIPPER = Path(__file__).with_name("gripper.xml")
 STROKE_M = 0.08
 TIP_M = 0.010  # from the tool's origin to the fingers' tips
-HALF_PAD_M = 0.009  # of a fingertip's breadth
+HALF_PAD_M = 0.009  # half the width of a fingertip
 GRIPS_N = (20.0, 40.0)
-CONTROL_STEPS = 5  # of the simulation between two commands
+CONTROL_STEPS = 5  # simulation steps between two commands
 PREFIX = "gripper/"
 _AXES = ("x", "y", "z", "yaw", "pitch", "roll")
 
@@ -25,14 +25,14 @@ _AXES = ("x", "y", "z", "yaw", "pitch", "roll")
 class Pull(NamedTuple):
     """One contact of the gripper."""
 
-    body: int  # that it touches; 0 is the world
+    body: int  # touched body; 0 is the world
     geom: int  # of the gripper
     force_n: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rig(ABC):
-    """The compiled scene, and where in it the numbers of whatever holds the two fingers are."""
+    """The compiled scene, with the model indices of a robot with two fingers."""
 
     model: Any
     data: Any
@@ -44,48 +44,48 @@ class Rig(ABC):
 
     @abstractmethod
     def put(self, pose: Rigid3, width_m: float) -> None:
-        """Set the tool down somewhere, at rest: before anything starts."""
+        """Set the tool's pose at rest, before the simulation starts."""
 
     @abstractmethod
     def command(self, pose: Rigid3, width_m: float) -> None:
-        """Where the tool is to be driven, by bounded forces, and how wide the fingers."""
+        """Drive the tool to a pose with bounded forces, and the fingers to a width."""
 
     @property
     @abstractmethod
     def base_force_n(self) -> float:
-        """What it pulls or pushes the tool with."""
+        """Magnitude of the force on the tool, in N."""
 
     @property
     def world_from_tool(self) -> Rigid3:
-        """Where the pads are."""
+        """Pose of the tool, between the pads."""
         return Rigid3(self.data.site_xmat[self.tool].reshape(3, 3).copy(), self.data.site_xpos[self.tool].copy())
 
     @property
     def width_m(self) -> float:
-        """Between the pads."""
+        """Width between the pads."""
         return float(self.data.qpos[self.fingers].sum())
 
     def world_from_body(self, body: int) -> Rigid3:
-        """Of any body."""
+        """Pose of a body."""
         return Rigid3(self.data.xmat[body].reshape(3, 3).copy(), self.data.xpos[body].copy())
 
     def grip_with(self, force_n: float) -> None:
-        """The most that either pad presses with."""
+        """Set the maximum force of each pad."""
         self.model.actuator_forcerange[self.width] = (-force_n, force_n)
 
     def step(self) -> None:
-        """One command's time."""
+        """Advance the simulation by one command."""
         import mujoco
 
         mujoco.mj_step(self.model, self.data, CONTROL_STEPS)
 
     @property
     def step_s(self) -> float:
-        """Seconds of one command."""
+        """Duration of one command in seconds."""
         return float(self.model.opt.timestep) * CONTROL_STEPS
 
     def pulls(self) -> Iterator[Pull]:
-        """Everything the robot touches now."""
+        """Current contacts of the robot."""
         import mujoco
 
         force = np.zeros(6)
@@ -99,24 +99,24 @@ class Rig(ABC):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Gripper(Rig):
-    """A gripper that floats: its base moves in six directions."""
+    """A floating gripper whose base has six degrees of freedom."""
 
     axes: np.ndarray  # (6,) addresses in qpos of x, y, z, yaw, pitch, roll
     drives: np.ndarray  # (6,) their actuators
 
     @property
     def base_force_n(self) -> float:
-        """What the base pulls or pushes with."""
+        """Magnitude of the base's actuator force, in N."""
         return float(np.linalg.norm(self.data.actuator_force[self.drives[:3]]))
 
     def put(self, pose: Rigid3, width_m: float) -> None:
-        """Set the gripper down somewhere, at rest."""
+        """Set the gripper's pose at rest."""
         self.data.qpos[self.axes] = axes_of(pose, self.data.qpos[self.axes[3]])
         self.data.qpos[self.fingers] = width_m / 2
         self.command(pose, width_m)
 
     def command(self, pose: Rigid3, width_m: float) -> None:
-        """Where the base is to be driven, and how wide the fingers."""
+        """Drive the base to a pose, and the fingers to a width."""
         self.data.ctrl[self.drives] = axes_of(pose, self.data.qpos[self.axes[3]])
         self.data.ctrl[self.width] = width_m
 
@@ -124,7 +124,7 @@ class Gripper(Rig):
 def gripper_in(scene: Path, change: Callable[[Any], None] | None = None) -> Gripper:
     """The gripper in a scene.xml, parked at the origin; `change` edits the scene's MjSpec before.
 
-    Raises ValueError where scene.xml is none.
+    Raises ValueError where scene.xml is invalid.
     """
     import mujoco
 
@@ -155,7 +155,7 @@ def compiled_with(scene: Path, robot: Any, change: Callable[[Any], None] | None 
 
 
 def hand_of(model: Any, data: Any, base: str) -> dict[str, Any]:
-    """What every rig has: the model, its fingers, its tool and its geoms; `base` is the robot's first body."""
+    """Fields common to all rigs: model, data, fingers, tool and geoms; `base` is the robot's first body."""
     root = model.body(base).id
     own = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] == root]
     return {
@@ -173,7 +173,7 @@ def axes_of(pose: Rigid3, near_yaw: float = 0.0) -> np.ndarray:
     """x, y, z, yaw, pitch, roll of a pose: R = Rz(yaw) Ry(pitch) Rx(roll), the yaw on the turn nearest to `near_yaw`."""
     r = pose.rotation
     pitch = np.arcsin(np.clip(-r[2, 0], -1.0, 1.0))
-    if np.hypot(r[0, 0], r[1, 0]) < 1e-6:  # straight up or down: yaw and roll are one
+    if np.hypot(r[0, 0], r[1, 0]) < 1e-6:  # gimbal lock: pointing straight up or down, yaw and roll coincide
         yaw, roll = near_yaw, _roll_left(r, near_yaw, float(pitch))
     else:
         yaw, roll = np.arctan2(r[1, 0], r[0, 0]), np.arctan2(r[2, 1], r[2, 2])
@@ -182,7 +182,7 @@ def axes_of(pose: Rigid3, near_yaw: float = 0.0) -> np.ndarray:
 
 
 def pose_of(axes: np.ndarray) -> Rigid3:
-    """The pose that the six axes give."""
+    """Pose from the six axis positions."""
     yaw, pitch, roll = axes[3:]
     return Rigid3(_about(2, yaw) @ _about(1, pitch) @ _about(0, roll), np.array(axes[:3], dtype=np.float64))
 

@@ -1,4 +1,4 @@
-"""Where an arm may stand on the floor to open which joints: its tool reaches every pose of the way, and it meets nothing."""
+"""Search of base positions on the floor from which an arm opens each joint: reachable and collision-free."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,34 +16,34 @@ from r2c2r_core.robot.motion import Hold, Travel
 from r2c2r_core.robot.panda import LIFTS_M, PEDESTAL_RADIUS_M, REACH_M, SHOULDER_M
 
 GRID_M = 0.1
-_NEAR_M = 0.25  # of the base from a pose of the tool, across the floor
+_NEAR_M = 0.25  # minimum horizontal distance of the base from a tool pose
 _OFF_M, _OFF_RAD = 0.002, 0.01
 _FIRST, _NEXT = 35, 15  # iterations
 _LEAST_EASE = 0.01  # own choice: below it the springs pulled the test kitchen's doors with 200 N
-_JUMP_RAD = 1.2  # of a joint between two poses that follow each other
-_ELBOWS = ((0.0, 0.0), (0.8, 0.0), (-0.8, 0.0), (0.0, 0.6))  # what is added to the third and the second joint's rest
+_JUMP_RAD = 1.2  # maximum joint step between two successive poses
+_ELBOWS = ((0.0, 0.0), (0.8, 0.0), (-0.8, 0.0), (0.0, 0.6))  # offsets of the third and the second joint from rest
 _ABOVE_FLOOR_M = 0.02
-_FLIP = Rigid3(np.diag([1.0, -1.0, -1.0]))  # the tool turned over: its fingers are alike
+_FLIP = Rigid3(np.diag([1.0, -1.0, -1.0]))  # the tool turned over, as its fingers are interchangeable
 
 
 class Reach(NamedTuple):
-    """A joint that can be opened from a place."""
+    """Reachability of a joint from a base position."""
 
-    start: np.ndarray  # (7,) angles before the handle
+    start: np.ndarray  # (7,) angles in front of the handle
     flipped: bool
-    ease: float  # the least on the way
+    ease: float  # minimum along the motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Floor:
-    """Places to stand in a grid, and what stands there already."""
+    """Grid of base positions, and furniture outlines."""
 
     stands: tuple[Stand, ...]
     furniture: Any  # shapely polygons, the world's x and y
 
 
 def free_floor(model: Any, data: Any, own: frozenset[int], handles: list[Vector3]) -> Floor:
-    """Every place of a grid within reach of a handle where the pedestal meets nothing; the arm looks at the handles around."""
+    """Grid positions within reach of a handle where the pedestal is collision-free; the arm faces the nearby handles."""
     furniture = shapely.union_all(list(_footprints(model, data, own)))
     if not handles:
         return Floor(stands=(), furniture=furniture)
@@ -62,7 +62,7 @@ def free_floor(model: Any, data: Any, own: frozenset[int], handles: list[Vector3
 
 
 def reaches(arm: Arm, travel: Travel, way: Way, stands: tuple[Stand, ...]) -> dict[Stand, Reach]:
-    """From which places the arm opens the joint that way and closes it, with every other joint closed."""
+    """Base positions from which the arm can open and close the joint, with every other joint closed."""
     import mujoco
 
     steps = list(stations(travel, way))
@@ -79,7 +79,7 @@ def reaches(arm: Arm, travel: Travel, way: Way, stands: tuple[Stand, ...]) -> di
 
 
 def flipped(way: Way) -> Way:
-    """The same with the tool turned over."""
+    """The same plan with the tool turned over."""
 
     def turned(hold: Hold | None) -> Hold | None:
         return None if hold is None else replace(hold, body_from_tool=hold.body_from_tool @ _FLIP)
@@ -90,9 +90,9 @@ def flipped(way: Way) -> Way:
 
 
 def fewest_places(reached: dict[str, dict[Stand, Reach]]) -> dict[Stand, list[str]]:
-    """Places that together serve every joint that any serves: each time the one that serves most of what is left.
+    """Greedy set cover: base positions that together serve all reachable joints.
 
-    Of equals, the one where the joints stay farthest from their limits.
+    Ties are resolved by the largest distance of the joints from their limits.
     """
     left = {joint for joint, stands in reached.items() if stands}
     places: dict[Stand, list[str]] = {}
@@ -105,7 +105,7 @@ def fewest_places(reached: dict[str, dict[Stand, Reach]]) -> dict[Stand, list[st
 
 
 def _nearby(stands: tuple[Stand, ...], tools: list[Vector3]) -> list[Stand]:
-    """Every place and lift from which no pose is farther from the shoulder than the arm is long, nor too near."""
+    """Base positions and lifts from which all poses are within arm length of the shoulder, and not too near."""
     at, found = np.array(tools), []
     for stand in stands:
         across = np.linalg.norm(at[:, :2] - stand[:2], axis=1)
@@ -116,7 +116,7 @@ def _nearby(stands: tuple[Stand, ...], tools: list[Vector3]) -> list[Stand]:
 
 
 def _reached(arm: Arm, poses: list[Rigid3], stands: list[Stand]) -> Iterator[tuple[Stand, bool, np.ndarray]]:
-    """Every place from which the tool comes to every pose in turn without a jump, and the angles (poses, 7) there."""
+    """Base positions from which the tool reaches every pose in turn without a joint jump, with angles (poses, 7)."""
     world_from_tool = matrices(poses)
     trials = [(stand, flip, elbow) for stand in stands for elbow in _ELBOWS for flip in (False, True)]
     if not trials:
@@ -142,7 +142,7 @@ def _reached(arm: Arm, poses: list[Rigid3], stands: list[Stand]) -> Iterator[tup
 
 
 def _bent(arm: Arm, base_from_tool: np.ndarray, elbow: tuple[float, float]) -> np.ndarray:
-    """Angles to begin the search with: at rest, turned to where the tool goes."""
+    """Start angles of the IK: at rest, turned towards the tool's target."""
     angles = arm.chain.rest.copy()
     angles[0] = np.arctan2(base_from_tool[1, 3], base_from_tool[0, 3])
     angles[1] += elbow[1]
@@ -151,7 +151,7 @@ def _bent(arm: Arm, base_from_tool: np.ndarray, elbow: tuple[float, float]) -> n
 
 
 def _meets(probe: Arm, travel: Travel, stand: Stand, angles: np.ndarray, steps: list[tuple[Rigid3, float, float]]) -> bool:
-    """Whether the arm overlaps anything at any of the poses, the pads on the part left out."""
+    """Whether the arm overlaps anything at any of the poses, except its pads on the part."""
     import mujoco
 
     for bent, (_, width, position) in zip(angles, steps, strict=True):
@@ -168,7 +168,7 @@ def _meets(probe: Arm, travel: Travel, stand: Stand, angles: np.ndarray, steps: 
 
 
 def _footprints(model: Any, data: Any, own: frozenset[int]) -> Iterator[Any]:
-    """Outlines on the floor of what a pedestal would meet, the closed doors too."""
+    """Floor outlines of all obstacles of the pedestal, including closed doors."""
     for geom in range(model.ngeom):
         if geom in own or not model.geom_contype[geom] or model.geom_type[geom] == 0:
             continue

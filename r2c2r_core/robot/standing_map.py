@@ -1,4 +1,4 @@
-"""The floor plan with where the arm may stand for how many joints, as SVG."""
+"""SVG floor plan of base positions, coloured by the number of joints within reach."""
 
 from collections import defaultdict
 from html import escape
@@ -19,7 +19,7 @@ _FROM, _TO = np.array([219.0, 234.0, 247.0]), np.array([8.0, 81.0, 156.0])  # on
 
 
 def standing_svg(floor: Floor, reached: dict[str, dict[Stand, Reach]], places: dict[Stand, tuple[str, ...]]) -> str:
-    """Furniture in grey, each place coloured by how many joints it serves, the chosen ones numbered and listed below."""
+    """Map with furniture in grey, positions coloured by number of joints served, chosen ones numbered and listed below."""
     served = _served(reached)
     low, high = _bounds(floor, list(served))
     width, height = (high - low) * _PX_PER_M
@@ -48,7 +48,7 @@ def standing_svg(floor: Floor, reached: dict[str, dict[Stand, Reach]], places: d
 
 
 def _served(reached: dict[str, dict[Stand, Reach]]) -> dict[tuple[float, float], int]:
-    """How many joints each place serves, whatever the lift."""
+    """Number of joints served by each position, at any lift."""
     found: dict[tuple[float, float], set[str]] = defaultdict(set)
     for joint, stands in reached.items():
         for stand in stands:
@@ -75,7 +75,7 @@ def _cell(x: float, y: float, count: int, most: int) -> str:
 
 
 def _place(number: int, stand: Stand, low: np.ndarray, high: np.ndarray) -> str:
-    """A numbered disc, and which way the arm looks."""
+    """A numbered disc with the arm's direction."""
     x, y = (stand.x_m - low[0]) * _PX_PER_M, (high[1] - stand.y_m) * _PX_PER_M
     tip_x, tip_y = x + 26 * np.cos(stand.yaw_rad), y - 26 * np.sin(stand.yaw_rad)
     return (

@@ -1,4 +1,4 @@
-"""Why the gripper could not do it, in a sentence, and whose doing that is."""
+"""Diagnosis of a failed gripper trial: a sentence and the cause."""
 
 from typing import Any, Literal, NamedTuple
 
@@ -19,14 +19,14 @@ _LEANS_N = 2.0
 
 
 class Verdict(NamedTuple):
-    """What failed, and whose doing it is."""
+    """The reason of a failure and its cause."""
 
     why: str
     blame: Blame
 
 
 def unholdable(travel: Travel | None) -> Verdict:
-    """Of a joint that no way was found for."""
+    """Verdict on a joint without a feasible grasp."""
     if travel is None or travel.part.bar is None:
         return Verdict("nothing of it is a board that a finger could hold or push: its colliders are meshes", "scan")
     across, _, upright = 1000 * travel.part.bar.size
@@ -35,7 +35,7 @@ def unholdable(travel: Travel | None) -> Verdict:
 
 
 def verdict_on(model: Any, travel: Travel, way: Way, measured: Measured) -> Verdict | None:
-    """None where the joint was opened and closed."""
+    """Verdict on an attempt; None where the joint was opened and closed."""
     if measured.opened >= OPEN_SHARE and measured.closed <= CLOSED_SHARE:
         return None
     done = (
@@ -61,7 +61,7 @@ def verdict_on(model: Any, travel: Travel, way: Way, measured: Measured) -> Verd
 
 
 def _obstacle(travel: Travel, way: Way, measured: Measured) -> int | None:
-    """The body that was most in the way: leant on, or foreseen."""
+    """The main obstacle: the body pressed most, or with the deepest expected collision."""
     leant = {body: force for body, force in measured.touched.items() if force > _LEANS_N}
     if leant:
         return max(leant, key=lambda body: leant[body])

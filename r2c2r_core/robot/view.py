@@ -1,4 +1,4 @@
-"""Pictures of a running simulation, drawn on the CPU without GL: colour, depth, and which body each pixel shows."""
+"""CPU rendering of a running simulation without GL: colour, depth and body index per pixel."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -13,13 +13,13 @@ from r2c2r_core.geometry.transforms import Rigid3
 
 _SKY = 246.0
 _LONGEST_M = 0.5  # side of a floor tile: the rasteriser drops triangles that cross the near plane
-_FLOOR_M = 3.0  # half side of what is drawn of an endless plane
-_SEEN_GROUPS = (0, 2)  # the gripper, and what a bundle shows
+_FLOOR_M = 3.0  # half side of the drawn part of an infinite plane
+_SEEN_GROUPS = (0, 2)  # the gripper, and a bundle's visuals
 _PLANE, _BOX, _MESH = 0, 6, 7  # mjtGeom
 
 
 class Seen(NamedTuple):
-    """What a camera sees."""
+    """A rendered camera image."""
 
     rgb: Image
     depth_m: DepthMetres  # 0: nothing
@@ -28,7 +28,7 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Surfaces:
-    """The triangles of every geom that is seen, in the geom's frame."""
+    """Triangles of all visible geoms, in their own frames."""
 
     geoms: np.ndarray  # (g,) of the model
     starts: np.ndarray  # (g + 1,) of their corners
@@ -39,7 +39,7 @@ class Surfaces:
 
 
 def surfaces_of(model: Any) -> Surfaces:
-    """Everything to draw of a model."""
+    """The drawable surfaces of a model."""
     shown = [model.geom_group[g] in _SEEN_GROUPS or model.geom_type[g] == _PLANE for g in range(model.ngeom)]
     seen = [int(g) for g in np.flatnonzero(shown) if model.geom_rgba[g][3] > 0.05]
     parts = [(g, *shape) for g in seen if (shape := _triangles(model, g)) is not None]
@@ -54,19 +54,19 @@ def surfaces_of(model: Any) -> Surfaces:
 
 
 class Poses(NamedTuple):
-    """Where every geom of a model is, as MjData has it."""
+    """Poses of all geoms of a model, as in MjData."""
 
     geom_xpos: np.ndarray  # (g, 3)
     geom_xmat: np.ndarray  # (g, 9)
 
 
 def poses_now(data: Any) -> Poses:
-    """Kept of a simulation that goes on, to be drawn later."""
+    """A copy of the current geom poses, for later rendering."""
     return Poses(data.geom_xpos.copy(), data.geom_xmat.copy())
 
 
 def look(surfaces: Surfaces, model: Any, data: Any, camera: Intrinsics, camera_from_world: Rigid3) -> Seen:
-    """What the camera sees with a model as `data` (MjData, or Poses that were kept) has it."""
+    """Rendering of the model at the poses of `data` (MjData, or stored Poses)."""
     corners = np.zeros_like(surfaces.corners)
     for number, geom in enumerate(surfaces.geoms):
         part = slice(surfaces.starts[number], surfaces.starts[number + 1])
@@ -103,7 +103,7 @@ def _albedo(surfaces: Surfaces, number: np.ndarray, uv: np.ndarray) -> np.ndarra
 
 
 def _light(depth_m: DepthMetres, camera: Intrinsics) -> np.ndarray:
-    """0.6 to 1 by how a surface is turned to the eye, from the depth alone."""
+    """Headlight shading 0.6 to 1 by surface orientation, from depth alone."""
     rows, columns = np.indices(depth_m.shape)
     x, y = (columns + 0.5 - camera.cx) / camera.fx * depth_m, (rows + 0.5 - camera.cy) / camera.fy * depth_m
     points = np.stack([x, y, depth_m], axis=-1)
@@ -113,7 +113,7 @@ def _light(depth_m: DepthMetres, camera: Intrinsics) -> np.ndarray:
 
 
 def _triangles(model: Any, geom: int) -> tuple[Points, np.ndarray] | None:
-    """Corners (3 m, 3) and uv of a geom; None of a shape that no bundle has."""
+    """Corners (3 m, 3) and uv of a geom; None for a shape that does not occur in bundles."""
     kind = model.geom_type[geom]
     if kind == _MESH:
         return _mesh(model, int(model.geom_dataid[geom]))
@@ -167,7 +167,7 @@ def _box(half: Vector3) -> Points:
 
 
 def _tiles(reach: np.ndarray) -> Points:
-    """A rectangle in z = 0, in tiles."""
+    """Triangles of a tiled rectangle in z = 0."""
     steps = [np.linspace(-r, r, max(round(2 * r / _LONGEST_M), 1) + 1) for r in reach]
     squares = [
         [[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y0, 0], [x1, y1, 0], [x0, y1, 0]]
