@@ -1,6 +1,6 @@
 """Gymnasium environments on bundles and their variants (extra `r2c2r[gym]`): `import r2c2r_core.gym` registers them.
 
-Without gymnasium nothing is registered, and nothing but this package misses it.
+Without gymnasium nothing is registered; no other package depends on it.
 """
 
 from importlib.util import find_spec

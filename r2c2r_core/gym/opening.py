@@ -1,4 +1,4 @@
-"""r2c2r/Open-v0: open one joint."""
+"""Environment r2c2r/Open-v0: open one joint."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,11 +19,11 @@ _LOOKS = 21  # along the joint's travel
 
 
 class OpenEnv(RobotEnv):
-    """The joint opened to 90 % of its travel ends the episode; one without a handle starts thrown out by its push latch.
+    """Environment of opening a joint to 90 % of its travel; a front without a handle starts ejected by its push latch.
 
     State (20): the tool in the frame of its grasp on the part (3, m), the approach and stroke axes of that grasp in the world
-    (6), of the tool (6), width in strokes, share opened, its speed a second, whether a pad touches the part, force of the base
-    in 100 N. Reward: 5 times the share gained, and the metres by which the tool came nearer to its grasp; 1 at success.
+    (6), of the tool (6), width in strokes, fraction opened, its speed per second, whether a pad touches the part, force of the
+    base in 100 N. Reward: 5 times the fraction gained, and the metres by which the tool approached its grasp; 1 at success.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class OpenEnv(RobotEnv):
         self.joint = joint
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """A scene, this joint closed, and others that stand ajar in its way; the rest as they stand there."""
+        """Reset to a scene with this joint and those in its way closed; all others as in the scene."""
         rig = self.begin(seed, options)
         if self.joint not in joints_of(rig.model):
             raise BundleError(f"joint {self.joint}: there is none", hint=f"there are {', '.join(joints_of(rig.model))}")
@@ -67,12 +67,12 @@ class OpenEnv(RobotEnv):
         return self.observed(self._state()), float(reward), done, False, self._info()
 
     def view(self) -> tuple[Vector3, Vector3]:
-        """The front."""
+        """Camera target: the front's centre, and its outward direction."""
         pose = self.travel.world_from_closed
         return pose.apply(self.travel.part.front.centre), -pose.rotation[:, 1]
 
     def _progress(self) -> tuple[float, float]:
-        """Share opened, and metres to the grasp."""
+        """Fraction opened, and distance in metres to the grasp."""
         position = self.travel.position(self.rig)
         goal = self.way.opens.world_from_tool(self.travel, position).translation
         return position / self.travel.upper, float(np.linalg.norm(goal - self.rig.world_from_tool.translation))
@@ -93,7 +93,7 @@ class OpenEnv(RobotEnv):
 
 
 def close_in_the_way(rig: Rig, travel: Travel) -> None:
-    """Close the joints whose parts, as they stand ajar, the part would run into."""
+    """Close the joints whose parts, being ajar, would block the part."""
     import mujoco
 
     scratch, model = mujoco.MjData(rig.model), rig.model
@@ -113,7 +113,7 @@ def close_in_the_way(rig: Rig, travel: Travel) -> None:
 
 
 def _joint_moving(model: Any, body: int) -> int | None:
-    """The hinge or slide that moves a body, if one does."""
+    """The hinge or slide that moves a body, or None."""
     while body:
         first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
         if count and model.jnt_type[first] in (2, 3) and not model.joint(first).name.startswith("gripper/"):

@@ -1,4 +1,4 @@
-"""r2c2r/PickPlace-v0: pick up one thing and put it down 10 cm further."""
+"""Environment r2c2r/PickPlace-v0: pick up one object and put it down 10 cm further."""
 
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,11 @@ _REST_M_S = 0.02
 
 
 class PickPlaceEnv(RobotEnv):
-    """The thing upright, at rest, let go and within 3 cm of its goal ends the episode, once it was lifted.
+    """Environment of moving an object to a goal; success if it was lifted, then released upright at rest within 3 cm of it.
 
-    State (20): the tool from its grasp on the thing where that stands now (3, m), the thing from its goal (3), its up axis (3),
-    its velocity (3), the tool's axes (6) and width in strokes, how high it was lifted at most (m). Reward: metres by which the
-    tool came nearer to its grasp, 5 times those by which the thing came nearer to its goal; 1 at success.
+    State (20): the tool relative to its grasp at the object's current position (3, m), the object relative to its goal (3), its
+    up axis (3), its velocity (3), the tool's axes (6) and width in strokes, the maximum lift (m). Reward: metres by which the
+    tool approached its grasp, 5 times those by which the object approached its goal; 1 at success.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class PickPlaceEnv(RobotEnv):
         self.thing = thing
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """A scene, and the goal 10 cm beside the thing."""
+        """Reset to a scene with a goal 10 cm beside the object."""
         import mujoco
 
         rig = self.begin(seed, options)
@@ -67,7 +67,7 @@ class PickPlaceEnv(RobotEnv):
         return self.observed(self._state()), float(reward), done, False, self._info()
 
     def view(self) -> tuple[Vector3, Vector3]:
-        """The thing's first place, from where the gripper comes."""
+        """Camera target: the object's initial position, seen from the gripper's approach side."""
         approach = self.pick.grasp.rotation[:, 0]
         level = np.array([-approach[0], -approach[1], 0.0])
         length = float(np.linalg.norm(level))
@@ -78,7 +78,7 @@ class PickPlaceEnv(RobotEnv):
         return np.asarray(self.rig.data.xpos[self.pick.body])
 
     def _distances(self) -> tuple[float, float]:
-        """Metres from the tool to the grasp, and from the thing to its goal."""
+        """Distance in metres of the tool from the grasp, and of the object from its goal."""
         tool = self.rig.world_from_tool.translation - (self.pick.grasp.translation + self._at - self._start)
         return float(np.linalg.norm(tool)), float(np.linalg.norm(self._at - self._start - self.pick.shift))
 

@@ -1,4 +1,4 @@
-"""The environments by name."""
+"""Registration of the environments by name."""
 
 from gymnasium.envs.registration import register, registry
 
@@ -7,7 +7,7 @@ IDS = {"r2c2r/Open-v0": "r2c2r_core.gym.opening:OpenEnv", "r2c2r/PickPlace-v0": 
 
 
 def register_envs() -> None:
-    """Make them known to gymnasium, once."""
+    """Register the environments with gymnasium, once."""
     for name, target in IDS.items():
         if name not in registry:
             register(id=name, entry_point=target, max_episode_steps=STEPS)

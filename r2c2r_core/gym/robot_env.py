@@ -1,4 +1,4 @@
-"""What both environments share: the gripper in a bundle's scene or one of its variants, its commands, and what it observes."""
+"""Base class of the environments: the gripper in a bundle's scene or one of its variants, actions and observations."""
 
 from pathlib import Path
 from typing import Any, Literal
@@ -17,21 +17,21 @@ from r2c2r_core.robot.rig import STROKE_M, Gripper, gripper_in, pose_of
 from r2c2r_core.robot.view import Surfaces, aimed, look, surfaces_of
 from r2c2r_core.variants.overlay import START
 
-SHIFT_M, TURN_RAD = 0.04, 0.15  # of the tool's target by an action of 1, in a step
-TICKS = 5  # commands a step: 0.05 s
+SHIFT_M, TURN_RAD = 0.04, 0.15  # motion of the tool's target for an action of 1, per step
+TICKS = 5  # commands per step: 0.05 s
 PICTURE = (128, 96)
 Observation = Literal["state", "rgbd"]
 _FIELD_RAD = 1.0
 _FAR_M = 20.0
-_MOST = 100.0  # of any number of the state
-_LEASH_M = 0.06  # between the tool and its target: more, and the base would pull with all its force long after
+_MOST = 100.0  # bound of every state value
+_LEASH_M = 0.06  # maximum distance between tool and target: beyond, the base would pull with full force long after
 
 
-class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: the checker runs without it
-    """An episode starts with the gripper before its goal; see docs/how-to/robots.md for spaces, reward and success.
+class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: the type checker runs without it
+    """Environment that starts with the gripper in front of its goal; see docs/how-to/robots.md for spaces, reward, success.
 
-    `bundle` is a bundle's folder, or a folder that `r2c2r vary` wrote: then each episode takes one of the variants, or the one
-    that `reset(options={"variant": "00003"})` names.
+    `bundle` is a bundle's folder, or an output folder of `r2c2r vary`: then each episode uses a random variant, or the one
+    named in `reset(options={"variant": "00003"})`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012  # gymnasium's own way
@@ -50,7 +50,7 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         self.observation_space = spaces.Dict({"state": state, **_picture_spaces()}) if self._pictures else state
 
     def begin(self, seed: int | None, options: dict[str, Any] | None) -> Gripper:
-        """The scene of the next episode, everything as it starts."""
+        """The scene of the next episode in its initial state."""
         super().reset(seed=seed)
         wanted = (options or {}).get("variant")
         number = int(self.np_random.integers(len(self.scenes)))
@@ -69,7 +69,7 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         return self.rig
 
     def put_before(self, goal: Rigid3, back_m: float) -> None:
-        """The gripper open, `back_m` before a pose, a little aside and turned."""
+        """Place the open gripper `back_m` in front of a pose, with a random offset and rotation."""
         import mujoco
 
         aside = self.np_random.uniform(-0.03, 0.03, 3)
@@ -80,7 +80,7 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         mujoco.mj_forward(self.rig.model, self.rig.data)
 
     def move(self, action: np.ndarray) -> None:
-        """One step: the target shifted and turned in the world, the fingers driven to a width."""
+        """Apply one action: shift and rotate the target in the world, drive the fingers to a width."""
         wanted = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
         turn, angle = wanted[3:6], float(np.linalg.norm(wanted[3:6]))
         rotation = about(turn / angle, TURN_RAD * angle) @ self.target.rotation if angle > 1e-9 else self.target.rotation
@@ -94,7 +94,7 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
             self.rig.step()
 
     def action_to(self, pose: Rigid3, width_m: float) -> np.ndarray:
-        """The action that takes the target to a pose, or as far as one step goes."""
+        """The action that moves the target to a pose, or as far as one step allows."""
         shift = (pose.translation - self.target.translation) / SHIFT_M
         turn = _turn_vector(pose.rotation @ self.target.rotation.T) / TURN_RAD
         length, angle = float(np.linalg.norm(shift)), float(np.linalg.norm(turn))
@@ -102,7 +102,7 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         return np.concatenate(parts).clip(-1.0, 1.0).astype(np.float32)
 
     def observed(self, state: np.ndarray) -> Any:
-        """The state, and what a camera sees where pictures were asked for."""
+        """The observation: the state, with camera images if enabled."""
         flat = np.asarray(state, dtype=np.float32).clip(-_MOST, _MOST)
         if not self._pictures:
             return flat
@@ -115,11 +115,11 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         }
 
     def render(self) -> Any:
-        """The scene in colour, where render_mode asks for it."""
+        """The scene in colour if render_mode is rgb_array, else None."""
         return self._look().rgb if self.render_mode == "rgb_array" else None
 
     def labels(self) -> dict[int, str]:
-        """What the numbers in `segmentation` are called; -1 is nothing."""
+        """Body names by number in `segmentation`; -1 is background."""
         return {body: self.rig.model.body(body).name for body in range(self.rig.model.nbody)}
 
     @property
@@ -136,7 +136,7 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         return look(self._surfaces, self.rig.model, self.rig.data, camera, camera_from_world)
 
     def view(self) -> tuple[Vector3, Vector3]:
-        """Where the camera looks, and the level direction it looks from."""
+        """Camera target, and the horizontal direction from it to the camera."""
         raise NotImplementedError
 
 

@@ -1,4 +1,4 @@
-"""A policy without learning for both environments: the commands of the gripper's certificate, as actions."""
+"""Scripted policy for both environments: the commands of the gripper's certificate, as actions."""
 
 from collections.abc import Iterator
 from itertools import islice
@@ -17,7 +17,7 @@ _MOST_STEPS = 60  # to the pose from which the commands start
 
 
 def scripted_actions(env: RobotEnv) -> Iterator[np.ndarray]:
-    """One action a step from the state `env` is in after a reset; env is the unwrapped one."""
+    """Actions, one per step, from the state of `env` after a reset; `env` is the unwrapped environment."""
     if isinstance(env, OpenEnv):
         start = env.way.opens.world_from_tool(env.travel, env.way.opens.starts, BACK_M)
         wide_m = env.way.opens.wide_m
