@@ -1,4 +1,4 @@
-"""What people write down for r2c2r: prompts, overrides, settings, and the manifest that comes back, each described once.
+"""Models of the JSON documents: prompts, overrides, settings, requests, and the manifest.
 
-The command line and the app read through these models, and `r2c2r schema` prints them as JSON Schema.
+The command line and the app read documents through these models, and `r2c2r schema` prints them as JSON Schema.
 """

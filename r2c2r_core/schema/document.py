@@ -1,4 +1,4 @@
-"""A document of JSON checked against its model; the first thing wrong becomes one line: place, found, expected."""
+"""Validation of a JSON document against its model; the first error becomes one line: place, found, expected."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar, get_args
@@ -8,7 +8,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from r2c2r_core.errors import InputError
 
-_SHOWN = 60  # characters of what was found
+_SHOWN = 60  # maximum characters of a shown value
 
 
 class Document(BaseModel):
@@ -29,7 +29,7 @@ AnyDocument = TypeVar("AnyDocument", bound=BaseModel)
 
 
 def checked(model: type[AnyDocument], document: Any, where: str, failure: type[InputError], *, hint: str) -> AnyDocument:
-    """The document as its model; `where` names it. Raises `failure`, with `hint` where the model does not know better."""
+    """The validated document; `where` names it. Raises `failure`, with `hint` unless the model gives its own."""
     try:
         return model.model_validate(document)
     except ValidationError as error:
@@ -39,20 +39,20 @@ def checked(model: type[AnyDocument], document: Any, where: str, failure: type[I
 
 
 def _said(model: type[BaseModel], document: Any, error: ErrorDetails) -> tuple[str, str]:
-    """What was found and where, and what was expected."""
+    """The two parts of an error line: place and value found, and value expected."""
     place, context = _place(document, error["loc"]), error.get("ctx", {})
     if error["type"] == "unknown_key":
         return f"unknown key '{context['key'][:_SHOWN]}' in {place}", f"expected {', '.join(context['known'])}"
     if error["type"] == "missing":
         return f"{place} lacks '{error['loc'][-1]}'", _expected(model, error["loc"])
-    if error["type"] == "value_error":  # a rule of our own, in its own words
+    if error["type"] == "value_error":  # a custom rule, with its own message
         return f"{place}: {context['error']}", _expected(model, error["loc"])
     rule = error["msg"].removeprefix("Input should ").removeprefix("be ")
     return f"{place} is {_brief(error['input'])}", _expected(model, error["loc"]) + f" ({rule})"
 
 
 def _place(document: Any, path: tuple[int | str, ...]) -> str:
-    """`objects.drawer_1.points[2].x`: an entry of a list by its name where it has one. Branches of a union are no place."""
+    """Path such as `objects.drawer_1.points[2].x`, with named list entries by name; branches of a union are omitted."""
     place, at = "", document
     for step in path:
         if isinstance(at, Mapping) and step in at:
@@ -65,7 +65,7 @@ def _place(document: Any, path: tuple[int | str, ...]) -> str:
 
 
 def _expected(model: type[BaseModel], path: tuple[int | str, ...]) -> str:
-    """What the last field on the path is said to be."""
+    """The expected value: description of the last field on the path."""
     said, at = "", model
     for step in path:
         if isinstance(step, str) and (field := at.model_fields.get(step)) is not None:

@@ -1,4 +1,4 @@
-"""manifest.json of a bundle: where every number in it comes from. The writer is export/manifest.py."""
+"""Model of a bundle's manifest.json: the provenance of every number. The writer is export/manifest.py."""
 
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -38,7 +38,7 @@ class ManifestJointSource(Document):
 
 
 class ManifestBlocker(Document):
-    """What keeps a joint from opening all the way."""
+    """An obstacle that keeps a joint from opening completely."""
 
     name: str = Field(description="an object, or another joint")
     kind: Literal["thing", "joint"] = Field(description="thing or joint")
@@ -54,7 +54,7 @@ class ManifestState(Document):
 
 
 class ManifestInside(Document):
-    """What was seen behind an open front, clear lengths in m; null where it was not seen."""
+    """Clear interior lengths in m, observed behind an open front; null where not observed."""
 
     depth_m: float | None = Field(description="from the back of the closed front to the face of the rear board")
     width_m: float | None = Field(description="between the sides")
@@ -91,7 +91,7 @@ class ManifestRange(Document):
 
 
 class ManifestJointRanges(Document):
-    """Of one joint."""
+    """Randomisation ranges of one joint."""
 
     damping: ManifestRange = Field(description="N m s/rad or N s/m")
     friction: ManifestRange = Field(description="N m or N")
@@ -100,7 +100,7 @@ class ManifestJointRanges(Document):
 
 
 class ManifestObjectRanges(Document):
-    """Of one object."""
+    """Randomisation ranges of one object."""
 
     mass_kg: ManifestRange = Field(description="of all its links; scale them together")
     friction: ManifestRange = Field(description="of its surfaces")
@@ -117,7 +117,7 @@ class ManifestRoom(Document):
 
 
 class ManifestLabels(Document):
-    """What a link or a handle means; the same labels stand in every format."""
+    """Semantic labels of a link or a handle, the same in every format."""
 
     category: str = Field(description="of its object, as a person called it")
     part: Literal["body", "door", "drawer", "sliding_door", "handle"] = Field(description="what it is to the object")
@@ -125,7 +125,7 @@ class ManifestLabels(Document):
 
 
 class ManifestHandle(Document):
-    """What a hand opens a joint with, closed, in the world; its frame is a gripper's that holds it (x, y, z below)."""
+    """Handle of a closed joint, in the world; its frame is that of a gripper grasping it (x, y, z below)."""
 
     name: str = Field(description="of the site in scene.xml, the prim in scene.usda, the node in scene.glb")
     kind: HandleKind = Field(description="bar (room behind it), knob (solid down to the front) or push (nothing to hold)")
@@ -181,7 +181,7 @@ class ManifestCandidate(Document):
 
 
 class ManifestChoice(Document):
-    """Which candidate was taken."""
+    """The chosen candidate."""
 
     candidate: str = Field(description="the candidate's id")
     by: str = Field(description="consensus or person")
@@ -278,7 +278,7 @@ class ManifestObject(Document):
 
 
 class ManifestContradiction(Document):
-    """What cannot be true at once of what was clicked."""
+    """A contradiction between prompts."""
 
     rule: ContradictionRule = Field(description="what kind of contradiction")
     objects: list[str] = Field(min_length=1, description="names of those concerned")

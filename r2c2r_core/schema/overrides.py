@@ -1,4 +1,4 @@
-"""overrides.json: what a person corrected. Bounds keep a slip of the keyboard from filling the memory."""
+"""Model of overrides.json, the manual corrections. Bounds keep a typing error from exhausting memory."""
 
 from typing import Annotated, Any, TypeAlias, cast
 
@@ -11,11 +11,11 @@ from r2c2r_core.schema.document import Document
 from r2c2r_core.schema.prompts import MOST_FRAMES, MOST_OBJECTS, Version
 
 MOST_BATCHES = 20  # of further candidates
-LARGEST_M, SMALLEST_M = 10.0, 0.001  # of a thing in a kitchen
-FARTHEST_M = 1000.0  # from the recording's origin, as readers believe it
+LARGEST_M, SMALLEST_M = 10.0, 0.001  # of an object in a kitchen
+FARTHEST_M = 1000.0  # from the recording's origin, the readers' own limit
 FULL_TURN = 6.3  # rad, or m: no door turns further, no drawer slides as far
 _MOST_REJECTED, _MOST_WALLS, MOST_JOINTS, MOST_MARKS = 1000, 100, 100, 1000
-_RIGID = 0.03  # what rounding to two decimals does to a rotation
+_RIGID = 0.03  # error of a rotation rounded to two decimals
 
 
 def _is_direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -85,7 +85,7 @@ Marks: TypeAlias = Annotated[list[MarkedState], Field(max_length=MOST_MARKS)]
 
 
 class ObjectCorrections(Document):
-    """What a person corrected about one object; absent keys and null are computed."""
+    """Manual corrections of one object; absent keys and null are computed."""
 
     candidate: str | None = Field(
         default=None, min_length=1, max_length=4000, description="a candidate's id, or a mesh file relative to this file"
@@ -109,7 +109,7 @@ class ObjectCorrections(Document):
     colour: Colour | None = Field(default=None, description=COLOUR_SAID)
 
     def override(self, candidate: str | None) -> ObjectOverride:
-        """The noun of the pipeline, with the candidate as the caller found it."""
+        """The pipeline's ObjectOverride, with the candidate as resolved by the caller."""
         lower, upper = self.joint_limits or (None, None)
         return ObjectOverride(
             candidate=candidate,
@@ -129,7 +129,7 @@ class ObjectCorrections(Document):
 
 
 class SceneCorrections(Document):
-    """What a person said about the room; absent keys and null are computed."""
+    """Manual corrections of the room; absent keys and null are computed."""
 
     up: Direction | None = Field(default=None, description="three numbers: the direction up, in the capture frame")
     floor: Coordinate | None = Field(
@@ -157,7 +157,7 @@ class OverridesFile(Document):
     @model_validator(mode="before")
     @classmethod
     def _by_name(cls, value: Any) -> Any:
-        """prompts.json lists its objects; the same habit is accepted here."""
+        """Accept a list of objects, as in prompts.json."""
         listed = value.get("objects") if isinstance(value, dict) else None
         if not isinstance(listed, list):
             return value
@@ -169,7 +169,7 @@ class OverridesFile(Document):
         return {**value, "objects": named}
 
     def room(self, objects: dict[str, ObjectOverride]) -> Overrides:
-        """The noun of the pipeline, with its objects."""
+        """The pipeline's Overrides, with its objects."""
         scene = self.scene
         return Overrides(
             objects=objects,

@@ -1,4 +1,4 @@
-"""prompts.json: which objects there are, and where a person clicked or drew them."""
+"""Model of prompts.json: the objects, with their clicks, fronts, masks and crop boxes."""
 
 from typing import Annotated, Any, Literal
 
@@ -19,9 +19,9 @@ MOST_PAINTED_PX = 4_000_000_000  # of all masks of a file: some 6000 at the size
 FARTHEST_M = 1000  # no scan reaches farther
 SMALLEST_FRONT_M, LARGEST_FRONT_M = 0.02, 10.0
 SMALLEST_CROP_M = 0.01
-_SQUARE_COS = 0.001  # by which a crop box's edges may miss a right angle
-_SQUARE_M = 0.002  # by which a drawn rectangle's corners may miss it
-_OVER_M = 0.002  # by which a handle may reach over its front
+_SQUARE_COS = 0.001  # maximum cosine between a crop box's edges
+_SQUARE_M = 0.002  # tolerance of a drawn rectangle's corners
+_OVER_M = 0.002  # maximum overhang of a handle over its front
 LONGEST = 60  # characters of a name: a mesh's file name holds it twice, and file systems end at 255 bytes
 
 
@@ -32,7 +32,7 @@ def _shows(text: str) -> str:
 
 
 def _whole(value: Any) -> Any:
-    if type(value) is not int:  # True and 1.0 equal 1, and would pass for it
+    if type(value) is not int:  # True and 1.0 equal 1, and would be accepted
         raise ValueError(f"found {value!r}"[:60])
     return value
 
@@ -108,7 +108,7 @@ class PromptsFileFront(Document):
         return self
 
     def drawn(self) -> DrawnFront:
-        """The noun of the pipeline."""
+        """The pipeline's DrawnFront."""
         handle = DrawnHandle(**self.handle.model_dump()) if isinstance(self.handle, PromptsFileHandle) else self.handle
         corners = tuple((x, y, z) for x, y, z in self.corners_m)
         return DrawnFront(corners_capture=corners, handle=handle, hinge=self.hinge)
@@ -126,7 +126,7 @@ class PromptsFileMask(Document):
 
     @model_validator(mode="after")
     def _whole_frame(self) -> "PromptsFileMask":
-        if self.width * self.height > MOST_MASK_PX:  # some bytes of runs stand for any number of pixels
+        if self.width * self.height > MOST_MASK_PX:  # a few bytes of runs can encode any number of pixels
             raise ValueError(f"a mask of {self.width} x {self.height} found, at most {MOST_MASK_PX} pixels expected")
         if sum(self.runs) != self.width * self.height:
             raise ValueError(f"runs of {sum(self.runs)} pixels found, {self.width} x {self.height} expected")
@@ -139,7 +139,7 @@ class PromptsFileMask(Document):
 
 
 class PromptsFileFrame(Document):
-    """What was said of an object in one frame."""
+    """The corrected state of an object in one frame."""
 
     frame: int = Field(ge=0, lt=MOST_FRAMES, description="a whole number: the frame's number in the recording")
     mask: PromptsFileMask | None = Field(description="its mask there, which stands; null: it is not visible there")
@@ -169,7 +169,7 @@ class PromptsFileCrop(Document):
         return self
 
     def drawn(self) -> CropBox:
-        """The noun of the pipeline."""
+        """The pipeline's CropBox."""
         x, y, z = self.corner_m
         return CropBox(corner_capture=(x, y, z), edges_capture=tuple((x, y, z) for x, y, z in self.edges_m))
 
@@ -219,7 +219,7 @@ class PromptsFile(Document):
         return self
 
     def prompts(self) -> Prompts:
-        """The noun of the pipeline."""
+        """The pipeline's Prompts."""
         return Prompts(
             objects=tuple(
                 ObjectPrompt(

@@ -1,4 +1,4 @@
-"""request.json: what a worker computes. The app writes it beside a project's work folder."""
+"""Model of request.json, a worker's input. The app writes it beside a project's work folder."""
 
 from typing import Any
 

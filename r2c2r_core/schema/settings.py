@@ -1,4 +1,4 @@
-"""Settings: dataclasses whose fields say what they mean and what they may be, and the JSON that sets them."""
+"""Settings: dataclasses whose fields declare meaning and bounds, and their JSON documents."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
 from r2c2r_core.errors import InputError
 from r2c2r_core.tuning import Changes, Number, modules_with_numbers, params_of
 
-if TYPE_CHECKING:  # stages declare settings without paying for its import
+if TYPE_CHECKING:  # stages declare settings without the cost of importing it
     from pydantic import BaseModel
 
 _HINT = "see `r2c2r schema config`"
@@ -16,18 +16,18 @@ Settings = TypeVar("Settings")
 
 
 def setting(default: Any, meaning: str, **bounds: float) -> Any:
-    """A field of a dataclass of settings: its default, its meaning with its unit, and bounds (gt, ge, lt, le)."""
+    """A field of a settings dataclass: default, meaning with unit, and bounds (gt, ge, lt, le)."""
     return dataclasses.field(default=default, metadata={"description": meaning, **bounds})
 
 
 def tuned_numbers(room: str) -> Any:
-    """A field of a dataclass of settings: the tuned numbers of a package of the core, where a run sets others."""
+    """A field of a settings dataclass: changed tuned numbers of a package of the core."""
     meaning = 'an object: {"module": {"number": value}}, tuned numbers of the modules of this stage'
     return dataclasses.field(default_factory=dict, metadata={"description": meaning, "room": room})
 
 
 def with_settings(defaults: Settings, document: Any, where: str) -> Settings:
-    """The defaults with what `document` sets, at any depth; raises InputError naming the setting."""
+    """The defaults updated by `document` at any depth; raises InputError naming the setting."""
     from r2c2r_core.schema.document import checked
 
     of: Any = type(defaults)
@@ -36,9 +36,9 @@ def with_settings(defaults: Settings, document: Any, where: str) -> Settings:
 
 @cache
 def settings_model(of: Any, *, with_numbers: bool = False) -> "type[BaseModel]":
-    """A dataclass of settings as a document in which everything may be left out.
+    """Model of a settings dataclass in which everything is optional.
 
-    `with_numbers` says every tuned number in it: for whom it is published. To read one, only the modules named are imported.
+    `with_numbers` lists every tuned number, for publication; for reading, only the modules in the document are imported.
     """
     from pydantic import Field, create_model
 
@@ -61,13 +61,13 @@ def settings_model(of: Any, *, with_numbers: bool = False) -> "type[BaseModel]":
         if field.default_factory is dataclasses.MISSING:
             rules["default"] = field.default
         else:
-            rules["default_factory"] = field.default_factory  # of no interest: only what is given is taken over
+            rules["default_factory"] = field.default_factory  # irrelevant: only given values are used
         fields[field.name] = (kind, Field(**rules))
     return create_model(of.__name__, __base__=Document, __doc__=of.__doc__, **fields)
 
 
 def _loose(hint: Any) -> Any:
-    """The type, as JSON writes it: it has lists, no tuples."""
+    """The type as read from JSON, which has lists instead of tuples."""
     from typing import Annotated, get_origin
 
     from pydantic import Strict
@@ -76,7 +76,7 @@ def _loose(hint: Any) -> Any:
 
 
 def _every_number(room: str) -> "type[BaseModel]":
-    """The tuned numbers of a package, by module."""
+    """Model of all tuned numbers of a package, by module."""
     from pydantic import Field, create_model
 
     from r2c2r_core.schema.document import Document
@@ -92,7 +92,7 @@ def _every_number(room: str) -> "type[BaseModel]":
 
 
 def _changes(room: str, given: Mapping[str, Any], where: str) -> Changes:
-    """The numbers that are given, by module, each checked by its module."""
+    """The given numbers by module, each validated by its module's model."""
     return {name: _checked_numbers(f"{room}.{name}", values, where) for name, values in given.items()}
 
 
