@@ -25,6 +25,6 @@ def backup(options: argparse.Namespace) -> int:
 
 
 def described(moved: Any) -> str:
-    """Sizes in words."""
+    """Text with the sizes of a backup."""
     files = f"{moved.files} files of {moved.projects} projects, {moved.files_bytes / 1e6:.1f} MB"
     return f"database {moved.database_bytes / 1e6:.1f} MB, {files}"

@@ -40,7 +40,7 @@ def evaluate(options: argparse.Namespace) -> int:
 
 
 def _against(bundle: Path, name: str, folder: str) -> "Evaluation":
-    """A bundle against the truth of a data set."""
+    """Evaluation of a bundle against the truth of a data set."""
     from r2c2r_core.evaluate.arti4d import evaluate_arti4d
 
     if name != "arti4d":

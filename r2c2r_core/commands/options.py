@@ -1,4 +1,4 @@
-"""What the commands share: how one is added, values with a meaning, the JSON file beside what is printed."""
+"""Shared parts of the commands: registration, argument types, JSON output."""
 
 import argparse
 import importlib
@@ -22,12 +22,12 @@ Command = Callable[[argparse.Namespace], int]
 Parsers = Any  # what ArgumentParser.add_subparsers returns: argparse has no public name for it
 
 _LARGEST_FACTOR = 10_000.0
-_LEAST_SIDE_PX, _MOST_SIDE_PX = 64, 4096  # of a synthetic recording: a phone's videos end at 3840
+_LEAST_SIDE_PX, _MOST_SIDE_PX = 64, 4096  # of a synthetic recording: a phone's videos are at most 3840 wide
 DATA = Path(os.environ.get("R2C2R_DATA", Path.home() / ".local" / "share" / "r2c2r"))
 
 
 def add_command(parsers: Parsers, name: str, command: Command) -> argparse.ArgumentParser:
-    """A command whose help is its docstring; --debug may stand before or after its name."""
+    """Add a command with its docstring as help; --debug may come before or after its name."""
     text = (command.__doc__ or "").strip()
     added: argparse.ArgumentParser = parsers.add_parser(name, help=text, description=text)
     added.set_defaults(command=command)
@@ -36,27 +36,27 @@ def add_command(parsers: Parsers, name: str, command: Command) -> argparse.Argum
 
 
 def add_data(parser: argparse.ArgumentParser) -> None:
-    """--data: where the web app keeps its projects."""
+    """Add --data: the project folder of the web app."""
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the projects (default: %(default)s)")
 
 
 def add_data_folder(parser: argparse.ArgumentParser) -> None:
-    """DATA: the same folder, for commands that are about it."""
+    """Add DATA: the same folder as a positional argument."""
     parser.add_argument("folder", type=Path, nargs="?", default=DATA, metavar="DATA", help="data folder (default: %(default)s)")
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
-    """--json: the same findings for a program."""
+    """Add --json: a file for the findings as JSON."""
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON too")
 
 
 def add_strict(parser: argparse.ArgumentParser) -> None:
-    """--strict: a scene that may not be what was filmed is not good enough."""
+    """Add --strict: also fail on doubtful likeness to the recording."""
     parser.add_argument("--strict", action="store_true", help="exit 1 also where the likeness is doubtful or failed")
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
-    """--depth-scale, --register-depth: what mends a recording that `r2c2r info` finds fault with."""
+    """Add --depth-scale and --register-depth: remedies for faults reported by `r2c2r info`."""
     parser.add_argument(
         "--depth-scale", type=factor, metavar="FACTOR", help="multiply the recorded depth, such as 0.1 (`r2c2r info` names it)"
     )
@@ -66,7 +66,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def with_reading(config: "IngestConfig", options: argparse.Namespace) -> "IngestConfig":
-    """The configuration with what those options say."""
+    """The configuration updated by those options."""
     said: dict[str, Any] = {"register_depth": True} if options.register_depth else {}
     if options.depth_scale is not None:
         said["depth_scale"] = options.depth_scale
@@ -85,7 +85,7 @@ def factor(text: str) -> float:
 
 
 def whole(least: int, most: int) -> Callable[[str], int]:
-    """Reads a whole number of that range."""
+    """Parser of a whole number in the range."""
 
     def read(text: str) -> int:
         if not re.fullmatch(r"[+-]?\d{1,18}", text) or not least <= int(text) <= most:
@@ -95,7 +95,7 @@ def whole(least: int, most: int) -> Callable[[str], int]:
     return read
 
 
-seed = whole(0, 2**31 - 1)  # what every generator of random numbers here takes
+seed = whole(0, 2**31 - 1)  # range accepted by all random generators
 port = whole(0, 65535)  # 0: any free one
 
 
@@ -109,23 +109,23 @@ def size(text: str) -> tuple[int, int]:
 
 
 def existing(path: Path) -> Path:
-    """A file or folder that is there."""
+    """An existing file or folder."""
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError) as error:
         raise InputError(f"{path}: no such file or folder", hint="check the path") from error
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}", hint="check the path") from error
-    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # a pipe would be waited for
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # reading a pipe would block
         raise InputError(f"{path}: {kind_of_file(mode)}", hint="give a file or a folder")
     return path
 
 
 def write_json(path: Path, document: dict[str, Any]) -> None:
-    """A document for a program, whole or not at all."""
+    """Write a JSON document atomically."""
     write_atomically(path, (json.dumps(document, indent=1) + "\n").encode())
 
 
 def web_module(name: str) -> Any:
-    """A module of the web half, by name: the core never imports it (architecture: never r2c2r_core -> app)."""
+    """A module of the web app, by name, as the core never imports it (architecture: never r2c2r_core -> app)."""
     return importlib.import_module(f"app.{name}")

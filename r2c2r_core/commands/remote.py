@@ -1,4 +1,4 @@
-"""`r2c2r remote`: a server somewhere else, by an API token."""
+"""`r2c2r remote`: use of a remote server with an API token."""
 
 import argparse
 import os
@@ -47,7 +47,7 @@ def remote(options: argparse.Namespace) -> int:
     token = os.environ.get("R2C2R_TOKEN", "")
     if not options.server:
         raise InputError("no server is named", hint="--server https://kitchens.example, or R2C2R_SERVER")
-    if not token:  # an argument would be seen by everybody on the machine
+    if not token:  # an argument would be visible to all users of the machine
         raise InputError("R2C2R_TOKEN is not set", hint="r2c2r token add NAME prints a token, on the server's machine")
     _ACTIONS[options.what](Server(options.server, token), options)
     return 0

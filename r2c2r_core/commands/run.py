@@ -78,11 +78,11 @@ def write_bundle(
     masks: Path | None = None,
     strict: bool = False,
 ) -> bool:
-    """Reconstruct, say what came out, and copy the bundle there; whether it is certified and complete.
+    """Reconstruct, print a summary, and copy the bundle to `destination`; returns whether it is certified and complete.
 
     With `strict` its likeness must have passed too.
 
-    `tools` are names of backends by seam: segmenter, generator, matcher; `fixtures` wins over the configuration's.
+    `tools` are names of backends by seam: segmenter, generator, matcher; `fixtures` overrides the configuration's.
     """
     from r2c2r_core.config import ReconstructConfig
     from r2c2r_core.disk import explained_io
@@ -131,7 +131,7 @@ def write_bundle(
 
 
 def _warn(capture: Path, doubts: "Doubts") -> None:
-    """One line about an unusable recording; raises CaptureError where nothing can come of it."""
+    """Warn about an unusable recording in one line; raises CaptureError where no result is possible."""
     first, *others = doubts.reasons
     if doubts.hopeless:
         raise CaptureError(f"{capture}: {first}", hint="see `r2c2r info`")
@@ -161,7 +161,7 @@ def _write_masks(reconstruction: Any, folder: Path) -> None:
 
 
 def _summary(reconstruction: Any) -> str:
-    """Object, category, dimensions, joint, mask frames, placement rms, warnings."""
+    """Table of object, category, dimensions, joint, mask frames, placement RMS and warnings."""
     tracks = {track.name: track for track in reconstruction.tracks}
     placements = {placement.object_name: placement for placement in reconstruction.placements}
     rows = []

@@ -37,7 +37,7 @@ def _listed(title: str, names: Mapping[str, str]) -> str:
 
 
 def add_size(parser: argparse.ArgumentParser) -> None:
-    """How long and how large the recording is."""
+    """Add options for the length and the image size of the recording."""
     parser.add_argument("--frames", type=whole(1, 10_000), default=180, help="of the recording (default: %(default)s)")
     parser.add_argument("--size", type=size, default=(960, 720), metavar="WxH", help="of its pictures in px (default: 960x720)")
 
@@ -54,7 +54,7 @@ def sample(options: argparse.Namespace) -> int:
 def write_recording(
     out: Path, *, frames: int, size: tuple[int, int], seed: int = 0, opened: bool = False, choice: Choice = SEEDS_OWN
 ) -> None:
-    """The recording, its truth and its prompts; their paths are printed."""
+    """Write the recording, its truth and its prompts, and print their paths."""
     from r2c2r_core.disk import explained_io
     from r2c2r_core.synthetic.stage import write_sample
 

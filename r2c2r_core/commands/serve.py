@@ -27,7 +27,7 @@ def add(parsers: Parsers) -> None:
 
 
 def add_address(parser: argparse.ArgumentParser) -> None:
-    """Where the app listens."""
+    """Add options for the app's address."""
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=port, default=8000, help="port to listen on (default: %(default)s)")
 

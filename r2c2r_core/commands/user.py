@@ -43,7 +43,7 @@ def user(options: argparse.Namespace) -> int:
 
 
 def _password() -> str:
-    """Asked for twice on a terminal, else the first line of standard input."""
+    """A password, prompted for twice on a terminal, else the first line of standard input."""
     if not sys.stdin.isatty():
         return sys.stdin.readline().rstrip("\n")
     password = getpass.getpass("password: ")
