@@ -14,8 +14,8 @@ from r2c2r_core.model.track import MaskTrack
 def coco_document(frames: Sequence[Frame], tracks: Sequence[MaskTrack], picture: str) -> dict[str, Any]:
     """All masks of all objects. `picture` is the pattern of the pictures' names, such as "images/{:06d}.jpg".
 
-    An image's id is its frame's number; an annotation carries its object's name and the mask's confidence beside what COCO
-    asks for. Categories are numbered from 1 in the order of their names.
+    An image's id is its frame's number; an annotation has its object's name and the mask's confidence in addition to COCO's
+    fields. Categories are numbered from 1 in the order of their names.
     """
     categories = sorted({track.category for track in tracks})
     annotations: list[dict[str, Any]] = []
@@ -52,7 +52,7 @@ def coco_document(frames: Sequence[Frame], tracks: Sequence[MaskTrack], picture:
 
 
 def run_lengths(mask: Mask) -> list[int]:
-    """Lengths of the runs of equal pixels, column by column, the first of zeros (it may be 0)."""
+    """Run lengths of equal pixels, column by column, the first of zeros (it may be 0)."""
     flat = mask.T.reshape(-1)
     ends = np.flatnonzero(flat[1:] != flat[:-1]) + 1
     lengths = np.diff(np.concatenate([[0], ends, [len(flat)]]))

@@ -1,4 +1,4 @@
-"""A reconstruction as a dataset for others to measure generation and alignment on (paper §3).
+"""Export of a reconstruction as a dataset for benchmarks of generation and alignment (paper §3).
 
 DIR/
 ├── manifest.json                    below; written last, so a folder without it is unfinished
@@ -7,7 +7,7 @@ DIR/
 ├── images/<frame:06d>.jpg           colour, byte for byte as recorded
 ├── depth/<frame:06d>.png            16 bit, steps of 0.25 mm, 0 unknown, at the sensor's resolution, never filled
 └── objects/<name>/
-    ├── object.json                  category, candidates, the chosen one, its pose, how firmly it is held and by what
+    ├── object.json                  category, candidates, the chosen one, its pose with uncertainty and evidence
     ├── masks/<frame:06d>.png        0 or 255, at colour resolution
     ├── candidates/<id>.glb          closed textured meshes, each in an arbitrary frame and unit of its own (`mesh`)
     ├── matches.npz                  n keypoint matches of photos with renders of the chosen candidate: frame_index (n,),
@@ -48,7 +48,7 @@ _PICTURE = "images/{:06d}.jpg"
 
 
 class LabelledObject(NamedTuple):
-    """What a reconstruction knows of one object; what failed or was not reached is None."""
+    """Results of a reconstruction for one object; failed or missing ones are None."""
 
     track: MaskTrack
     candidates: CandidateSet | None
@@ -56,7 +56,7 @@ class LabelledObject(NamedTuple):
 
 
 class StoredFrames(NamedTuple):
-    """Where a frame's recorded pictures lie, by Frame.index."""
+    """Paths of a frame's recorded images, by Frame.index."""
 
     colour: Callable[[int], Path]  # JPEG
     depth: Callable[[int], Path]  # 16 bit PNG, steps of 0.25 mm
@@ -140,7 +140,7 @@ def _write_object(item: LabelledObject, folder: Path) -> None:
 
 
 def _placed(item: LabelledObject) -> tuple[MeshAsset, Placement] | None:
-    """The placed candidate. A pose of a candidate that a later run made anew under another name belongs to nothing."""
+    """The placed candidate with its placement; None without one, or if a later run has replaced the candidate."""
     if item.candidates is None or item.placement is None:
         return None
     found = [c for c in item.candidates.candidates if c.candidate_id == item.placement.candidate_id]
@@ -195,7 +195,7 @@ def _placement_entry(placement: Placement) -> dict[str, Any]:
 
 
 def _spread_entry(spread: Spread) -> dict[str, Any]:
-    """One standard deviation of turn (degrees), shift (metres) and scale (share), and the axes they are largest along."""
+    """Standard deviations of rotation (degrees), translation (metres) and scale (share), and the axes of the largest ones."""
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in asdict(spread).items()}
 
 
@@ -226,7 +226,7 @@ def _write_json(path: Path, document: dict[str, Any]) -> None:
 
 
 def _finite(value: Any) -> Any:
-    """JSON values: what is not a finite number becomes null, for JSON has no NaN."""
+    """JSON values with non-finite numbers as null, since JSON has no NaN."""
     if isinstance(value, dict):
         return {str(key): _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
