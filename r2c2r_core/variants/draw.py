@@ -1,4 +1,4 @@
-"""What is different in a variant: drawn at random from what the bundle says it does not know, and from stated ranges."""
+"""Random sampling of variants from the bundle's uncertainties and from fixed ranges."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from r2c2r_core.variants.textures import TEXTURES
 
 GUESSED = 0.02
 """Standard deviation, share of a side, where it was inferred or a category's default: own choice, 12 mm of 0.6 m."""
-LEAST_MEASURED = 0.001  # where the bundle names no spread of its own
+LEAST_MEASURED = 0.001  # where the bundle gives no spread
 MOST_SIGMAS = 2.0
-MASS = (0.8, 1.25)  # times; own choice: boards of one size weigh 600 to 800 kg/m3
-DAMPING = (0.5, 2.0)  # times; own choice: within it every joint still comes to rest
-FRICTION = (0.5, 2.0)  # times the joint's dry friction, own choice
+MASS = (0.8, 1.25)  # factor; own choice: boards of one size weigh 600 to 800 kg/m3
+DAMPING = (0.5, 2.0)  # factor; own choice: within it every joint still comes to rest
+FRICTION = (0.5, 2.0)  # factor on the joint's dry friction, own choice
 SURFACE = (0.3, 0.7)  # sliding friction of surfaces: wood and laminate in friction tables
-AJAR, AJAR_MOST = 0.2, 0.3  # how many joints stand open at first, and how far, of their travel
-SHIFT_M = 0.25  # of a free thing on its support, at most
-TINT = 0.12  # of each colour channel
-RETEXTURED = 0.5  # share of variants whose fronts get a procedural surface
+AJAR, AJAR_MOST = 0.2, 0.3  # fraction of joints initially ajar, and maximum opening as a fraction of their travel
+SHIFT_M = 0.25  # maximum shift of a free object on its support
+TINT = 0.12  # relative change of each colour channel
+RETEXTURED = 0.5  # fraction of variants whose fronts get a procedural surface
 
 KIND_OF = {
     "counter": "stone",
@@ -33,30 +33,30 @@ KIND_OF = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """What is different of one object."""
+    """Variation of one object."""
 
     name: str
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of width, depth, height; the front stays, and the underside
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of width, depth, height; the front and the underside are fixed
     mass: float = 1.0
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
     texture: str | None = None  # of TEXTURES; None: the scan's own
-    shift_m: tuple[float, float] = (0.0, 0.0)  # of a free thing, level
+    shift_m: tuple[float, float] = (0.0, 0.0)  # of a free object, horizontal
     turn_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variation:
-    """What is different of a scene."""
+    """Variation of a scene."""
 
     changes: tuple[Change, ...]
-    damping: Mapping[str, float]  # times, by joint
+    damping: Mapping[str, float]  # factor, by joint
     friction: Mapping[str, float]
-    ajar: Mapping[str, float]  # share of its travel at which a joint stands at first
+    ajar: Mapping[str, float]  # initial opening of a joint as a fraction of its travel
     surface: float
 
 
 def draw(rng: np.random.Generator, objects: Sequence[Mapping[str, Any]]) -> Variation:
-    """One variation of the objects of a manifest."""
+    """A random variation of the objects of a manifest."""
     fronts = _finish(rng, "wood") if rng.random() < RETEXTURED else (None, _tint(rng))
     stone = _finish(rng, "stone") if rng.random() < RETEXTURED else (None, _tint(rng))
     changes = tuple(_change(rng, entry, fronts, stone) for entry in objects)
@@ -89,7 +89,7 @@ def _change(rng: np.random.Generator, entry: Mapping[str, Any], fronts: Finish, 
 
 
 def _scale(rng: np.random.Generator, entry: Mapping[str, Any]) -> tuple[float, float, float]:
-    """Sides times 1 give or take their standard deviation, at most two of them; a free thing keeps its shape."""
+    """Normally distributed scale of each side about 1, within two standard deviations; a free object keeps its shape."""
     spread = (entry["placement"] or {}).get("spread") or {}
     measured = max(spread.get("scale") or 0.0, LEAST_MEASURED)
     sources = entry["dimension_source"]
@@ -112,5 +112,5 @@ def _tint(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 def _times(rng: np.random.Generator, ends: tuple[float, float]) -> float:
-    """Log-uniform."""
+    """A log-uniform factor between the ends."""
     return float(np.exp(rng.uniform(*np.log(ends))))

@@ -1,4 +1,4 @@
-"""Whether a variant is fit: it loads, stands free of contact, its joints meet nothing, its things stand on something."""
+"""Validity tests of a variant: it loads without collisions, joints sweep freely, and free objects are supported."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
@@ -10,14 +10,14 @@ import numpy as np
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, free_bodies, joint_names, movers_of, touches
 from r2c2r_core.variants.draw import Variation
 
-_POSITIONS = 7  # of each joint's sweep: as many as a door's edge needs not to jump over a board
-_DROP_M = 0.02  # below a thing's foot, within which its support is
+_POSITIONS = 7  # per joint sweep: enough that a door's edge does not jump over a board
+_DROP_M = 0.02  # maximum distance of a support below an object's base
 
 
 def colliders_of(root: ET.Element, folder: Path) -> Any:
-    """The compiled variant without what is only seen; raises ValueError where MuJoCo cannot.
+    """The compiled variant without visuals; raises ValueError where MuJoCo cannot compile it.
 
-    `folder` is the bundle's: the meshes are read from there.
+    `folder` is the bundle's folder, from which the meshes are read.
     """
     import mujoco
 
@@ -41,7 +41,7 @@ def colliders_of(root: ET.Element, folder: Path) -> Any:
 
 
 def start_of(model: Any, variation: Variation) -> np.ndarray:
-    """Joint positions (qpos) with the joints ajar that stand so."""
+    """Initial joint positions (qpos), with the variation's joints ajar."""
     qpos = np.array(model.qpos0)
     for name, share in variation.ajar.items():
         joint = model.joint(name)
@@ -50,7 +50,7 @@ def start_of(model: Any, variation: Variation) -> np.ndarray:
 
 
 def unfit(model: Any, start: Mapping[str, float]) -> str | None:
-    """Why the variant is rejected; None where it is fit. `start` holds the positions of joints that stand ajar."""
+    """Reason why the variant is rejected; None if it is valid. `start` are the positions of joints that are ajar."""
     import mujoco
 
     scratch, free = mujoco.MjData(model), free_bodies(model)
@@ -69,12 +69,12 @@ def unfit(model: Any, start: Mapping[str, float]) -> str | None:
 
 
 def _resting(bodies: tuple[int, int], free: set[int], depth_m: float) -> bool:
-    """Of a thing on its support: two bodies of which one is free, barely in one another."""
+    """Whether an overlap is that of a free object resting on its support: one body is free, the depth small."""
     return len(set(bodies) & free) == 1 and depth_m <= 2 * ALLOWED_PENETRATION_M
 
 
 def _stands(model: Any, data: Any, body: int) -> bool:
-    """Whether something lies below the thing's foot, under its middle and a third of the way to its sides."""
+    """Whether something lies below the object's base, under its middle and a third of the way to its sides."""
     import mujoco
 
     geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body and model.geom_contype[g]]

@@ -1,4 +1,4 @@
-"""A variation as MJCF: scene.xml again with other numbers, its meshes and textures those of the bundle beside it."""
+"""A variation as MJCF: scene.xml with changed values, sharing the meshes and textures of the bundle beside it."""
 
 import copy
 import xml.etree.ElementTree as ET
@@ -8,14 +8,14 @@ import numpy as np
 
 from r2c2r_core.variants.draw import Change, Variation
 
-BASE, SURFACES = "../base", "../textures"  # from a variant's file
-START = "start"  # the keyframe in which some joints stand ajar
+BASE, SURFACES = "../base", "../textures"  # relative to a variant's file
+START = "start"  # the initial keyframe, with some joints ajar
 
 
 def varied(scene: ET.Element, variation: Variation, halves: Mapping[str, np.ndarray], links: Mapping[str, str]) -> ET.Element:
     """The document of one variant.
 
-    `halves` holds half of each object's (width, depth, height) in m, `links` the object of each body by the body's name.
+    `halves` maps objects to half their (width, depth, height) in m, `links` maps body names to objects.
     """
     root = copy.deepcopy(scene)
     changes = {change.name: change for change in variation.changes}
@@ -39,7 +39,7 @@ def varied(scene: ET.Element, variation: Variation, halves: Mapping[str, np.ndar
 
 
 def add_start(root: ET.Element, qpos: np.ndarray) -> None:
-    """The keyframe with which the variant starts; the bundle's own keyframes say other numbers and go."""
+    """Add the variant's initial keyframe and remove the bundle's own, whose values no longer apply."""
     for old in root.findall("keyframe"):
         root.remove(old)
     keyframe = ET.SubElement(root, "keyframe")
@@ -49,7 +49,7 @@ def add_start(root: ET.Element, qpos: np.ndarray) -> None:
 def _vary_body(root: ET.Element, body: ET.Element, change: Change, half: np.ndarray, top: bool) -> None:
     scale = np.array(change.scale)
     if top:
-        # the front and the underside stay where they are: the origin is the box's centre
+        # the front and the underside are fixed: the origin is the box's centre
         moved = np.array([0.0, (scale[1] - 1) * half[1], (scale[2] - 1) * half[2]])
         position, quat = _numbers(body, "pos"), _numbers(body, "quat")
         turned = _turned(quat, change.turn_rad)
@@ -80,12 +80,12 @@ def _vary_body(root: ET.Element, body: ET.Element, change: Change, half: np.ndar
         if site.get("pos") is not None:
             site.set("pos", _text(_numbers(site, "pos") * scale))
         if site.get("type") == "box":
-            turn = _matrix(_numbers(site, "quat"))  # of axes in another order
+            turn = _matrix(_numbers(site, "quat"))  # a permutation of axes
             site.set("size", _text(_numbers(site, "size") * (np.abs(turn.T) @ scale)))
 
 
 def _dress(root: ET.Element, geom: ET.Element, change: Change) -> None:
-    """The scan's texture tinted, or a procedural one put over it."""
+    """Tint the scan's texture, or replace it by a procedural one."""
     if change.texture is not None:
         geom.set("material", f"{change.name}_surface")
     else:
@@ -119,13 +119,13 @@ def _scale_mesh(root: ET.Element, name: str, scale: np.ndarray) -> None:
 
 
 def _scale_inertial(inertial: ET.Element, scale: np.ndarray, mass: float) -> None:
-    """The mass times `mass` and the volume's factor; the inertia as of a body stretched so (second moments times squares)."""
+    """Scale the mass by `mass` and the volume factor, and the second moments by the squared scale of each axis."""
     inertial.set("pos", _text(_numbers(inertial, "pos") * scale))
     factor = mass * float(np.prod(scale))
     _multiply(inertial, "mass", factor)
     xx, yy, zz, xy, xz, yz = _numbers(inertial, "fullinertia")
     full = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    moments = 0.5 * np.trace(full) * np.eye(3) - full  # of mass, about the planes
+    moments = 0.5 * np.trace(full) * np.eye(3) - full  # second moments of mass about the coordinate planes
     moments *= factor * np.outer(scale, scale)
     full = np.trace(moments) * np.eye(3) - moments
     inertial.set("fullinertia", _text([full[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]))
@@ -155,7 +155,7 @@ def _text(values: object) -> str:
 
 
 def _turned(quat_wxyz: np.ndarray, angle: float) -> np.ndarray:
-    """A turn about the world's z after the rotation."""
+    """The rotation followed by a turn about the world's z axis."""
     c, s = np.cos(angle / 2), np.sin(angle / 2)
     w, x, y, z = quat_wxyz
     return np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])

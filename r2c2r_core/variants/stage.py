@@ -1,4 +1,4 @@
-"""Variants of a bundle for training: each a small MJCF beside one copy of the bundle, whose meshes and textures all share."""
+"""Variants of a bundle for training: small MJCF files that share the meshes and textures of one copy of the bundle."""
 
 import json
 import shutil
@@ -24,41 +24,41 @@ from r2c2r_core.variants.textures import write_textures
 from r2c2r_core.variants.wall import WALL, write_wall
 
 VARIANTS_VERSION = 1
-CERTIFIED = 20  # variants, at random, that the whole simulation certificate looks at
-NOT_VARIED = ("arm", "gripper", "pictures")  # of the bundle: what was seen in it, which variants do not repeat
-_ATTEMPTS = 40  # at one variant, each drawn anew
+CERTIFIED = 20  # number of random variants that undergo the complete simulation tests
+NOT_VARIED = ("arm", "gripper", "pictures")  # result folders of the bundle that are not copied
+_ATTEMPTS = 40  # maximum draws per variant
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variants:
-    """What was made."""
+    """The written variants."""
 
     folder: Path
     names: tuple[str, ...]
-    rejected: dict[str, int]  # why, and how many draws
-    certified: dict[str, bool]  # of the ones that were looked at wholly
+    rejected: dict[str, int]  # number of rejected draws by reason
+    certified: dict[str, bool]  # results of the completely tested ones
 
     @property
     def wall(self) -> Path:
-        """The picture of the first of them."""
+        """Picture of the first variants."""
         return self.folder / "wall.jpg"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Base:
-    """The bundle that is varied."""
+    """The bundle to be varied."""
 
     folder: Path
     scene: ET.Element
     objects: tuple[dict[str, Any], ...]
-    halves: dict[str, np.ndarray]  # of each object's sides
+    halves: dict[str, np.ndarray]  # half the sides of each object
     links: dict[str, str]  # object by body
 
 
 def make_variants(bundle: Path, count: int, seed: int, folder: Path, *, progress: Progress = SILENT) -> Variants:
-    """Write `count` variants of a bundle to a new folder; the same bundle and seed give the same ones.
+    """Write `count` variants of a bundle to a new folder; deterministic for a bundle and a seed.
 
-    Raises BundleError on a bundle without what is needed, and StageError where no draw in 40 is fit.
+    Raises BundleError on an incomplete bundle, and StageError where none of 40 draws is valid.
     """
     if folder.exists() and any(folder.iterdir()):
         raise InputError(f"{folder}: is not empty", hint="name a new folder")
@@ -116,7 +116,7 @@ def _copied(bundle: Path, folder: Path) -> Base:
 
 
 def _fit_variant(base: Base, seed: int, index: int) -> tuple[Variation, ET.Element, list[str]]:
-    """The first fit draw, and why the ones before it were none."""
+    """The first valid draw, and the reasons why earlier ones were rejected."""
     reasons: list[str] = []
     for attempt in range(_ATTEMPTS):
         variation = draw(np.random.default_rng([seed, index, attempt]), base.objects)
@@ -139,7 +139,7 @@ def _passes(scene: Path) -> bool:
 
 
 def _described(variation: Variation) -> dict[str, Any]:
-    """What was varied, rounded as for a reader."""
+    """The variation as JSON values, rounded for reading."""
     return json.loads(json.dumps(asdict(variation)), parse_float=lambda text: round(float(text), 5))
 
 

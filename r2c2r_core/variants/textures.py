@@ -1,4 +1,4 @@
-"""Procedural surfaces, a file each that all variants share: wood, stone."""
+"""Procedural wood and stone textures, one file each, shared by all variants."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ SIZE_PX = 256
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Procedural:
-    """One surface: its kind and its colours, dark and light, RGB 0..255."""
+    """A procedural texture: kind, dark and light colour (RGB 0..255)."""
 
     kind: Literal["wood", "stone"]
     dark: tuple[int, int, int]
@@ -36,7 +36,7 @@ TEXTURES = {
 
 
 def write_textures(folder: Path) -> None:
-    """One PNG each; the same bytes every time."""
+    """Write one PNG per texture, with reproducible bytes."""
     folder.mkdir(parents=True, exist_ok=True)
     for number, (name, texture) in enumerate(TEXTURES.items()):
         picture = drawn(texture, np.random.default_rng(number))
@@ -44,7 +44,7 @@ def write_textures(folder: Path) -> None:
 
 
 def drawn(texture: Procedural, rng: np.random.Generator) -> Image:
-    """Grain along the rows' normal for wood, grains and veins for stone."""
+    """The texture image: grain along the rows' normal for wood, grains and veins for stone."""
     noise = rng.normal(size=(SIZE_PX, SIZE_PX)).astype(np.float32)
     if texture.kind == "wood":
         share = _even(cv2.GaussianBlur(noise, (0, 0), sigmaX=1.2, sigmaY=24, borderType=cv2.BORDER_REFLECT))
@@ -55,6 +55,6 @@ def drawn(texture: Procedural, rng: np.random.Generator) -> Image:
 
 
 def _even(noise: np.ndarray) -> np.ndarray:
-    """Stretched to 0..1."""
+    """Noise stretched to 0..1 between its 1 % and 99 % quantiles."""
     low, high = np.quantile(noise, (0.01, 0.99))
     return np.asarray(((noise - low) / (high - low)).clip(0, 1))

@@ -18,7 +18,7 @@ _FIELD_RAD = 0.8
 
 
 def write_wall(scenes: Sequence[Path], path: Path) -> None:
-    """The scenes as they start, four in a row, as a JPEG."""
+    """Write the scenes' initial states, four in a row, as a JPEG."""
     pictures = [picture_of(scene) for scene in scenes]
     pictures += [np.full_like(pictures[0], 255)] * (-len(pictures) % _COLUMNS)
     rows = [np.concatenate(pictures[k : k + _COLUMNS], axis=1) for k in range(0, len(pictures), _COLUMNS)]
@@ -26,7 +26,7 @@ def write_wall(scenes: Sequence[Path], path: Path) -> None:
 
 
 def picture_of(scene: Path) -> Image:
-    """One scene as it starts, from where its own camera looks."""
+    """One scene in its initial state, from its own camera."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_path(str(scene))
