@@ -1,8 +1,8 @@
-"""A program in an empty folder and without network: `python -m r2c2r_core.alone MODULE [ARGUMENT...]`.
+"""Runs a program in an empty folder without network: `python -m r2c2r_core.alone MODULE [ARGUMENT...]`.
 
-Decoders of other people's files run so: what a file makes them open by a relative path or an address is not there. The program
-is started from here because Linux lets only a process of one thread leave its namespaces (unshare(2)), and importing numpy
-starts threads. Paths among the arguments are absolute; pipes that were open stay.
+Used for decoders of untrusted files, which then cannot open relative paths or network addresses. The program is started
+from here because Linux lets only a single-threaded process leave its namespaces (unshare(2)), and importing numpy starts
+threads. Paths among the arguments are absolute; open pipes are inherited.
 """
 
 import ctypes
@@ -18,7 +18,7 @@ _CLONE_NEWNET = 0x40000000
 
 
 def main(arguments: list[str]) -> None:
-    """Run the module as a program; where the system keeps the network, it goes on with it."""
+    """Run the module as a program; it keeps the network where the system does not allow leaving it."""
     leave_network()
     with tempfile.TemporaryDirectory(prefix="r2c2r-alone-") as folder:
         os.chdir(folder)
@@ -27,10 +27,10 @@ def main(arguments: list[str]) -> None:
 
 
 def leave_network() -> bool:
-    """Move this process, which has one thread, to a network of nothing; False where the system does not let it.
+    """Move this single-threaded process to an empty network namespace; False where the system does not allow it.
 
-    Root leaves it alone and keeps its rights to files. Anybody else needs a namespace of users for it, in which what they
-    own stays theirs.
+    Root needs only the network namespace and keeps its file permissions. Other users also need a user namespace, in which
+    they keep the ownership of their files.
     """
     if not sys.platform.startswith("linux"):
         return False
@@ -39,7 +39,7 @@ def leave_network() -> bool:
 
 
 def network_can_be_left() -> bool:
-    """Whether programs started from here are without network, tried in a process of its own."""
+    """Whether programs started from here have no network, tested in a separate process."""
     tried = "import sys; from r2c2r_core.alone import leave_network; sys.exit(not leave_network())"
     return subprocess.run([sys.executable, "-c", tried], check=False, capture_output=True).returncode == 0
 

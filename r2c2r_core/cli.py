@@ -1,4 +1,4 @@
-"""The `r2c2r` command: reads the arguments, hands over to one of `commands/`, and turns failures into one line.
+"""The `r2c2r` command: parses arguments, calls one of `commands/`, and prints failures as one line.
 
 Exit codes: 0 done, 1 the work failed or a check fell short, 2 wrong usage or unreadable input, 143 ended by SIGTERM.
 Errors are one line on stderr; a traceback only with --debug. Results go to stdout, progress to stderr.
@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on small matrices its threads double the CPU bill
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on small matrices its threads double the CPU time
 
 from r2c2r_core import __version__
 from r2c2r_core.errors import R2C2RError
@@ -26,12 +26,12 @@ STOPPED = "r2c2r: stopped; finished stages are kept, the same command goes on"
 
 
 class Terminated(BaseException):
-    """SIGTERM came: what is open is closed and what is temporary removed on the way out."""
+    """SIGTERM was received; unwinding closes open resources and removes temporary files."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Parse, run one command, and turn failures into one line and an exit code."""
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a file's name need not be text: it is shown, whatever it is
+    """Parse arguments, run one command, and turn failures into one line and an exit code."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a file's name need not be valid text, and is shown anyway
         sys.stdout.reconfigure(errors="backslashreplace")
     options = argparse.Namespace(debug=False)
     try:
@@ -50,7 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(STOPPED, file=sys.stderr)
         return 128 + signal.SIGTERM
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader of our output left; say no more
+        os.dup2(
+            os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()
+        )  # the reader of our output has closed the pipe: write no more
         return 1
     except OSError as error:
         if options.debug:
@@ -66,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 1
-    except Exception as error:  # the last line of defence: whatever it was, a person gets one line
+    except Exception as error:  # the last line of defence: any error gives one line
         if options.debug:
             traceback.print_exc()
         found = shown(" ".join(f"{type(error).__name__}: {error}".split()))[:300]
@@ -76,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _ended_by_sigterm() -> Iterator[None]:
-    """SIGTERM unwinds what is under way, as an interrupt does; a second one ends the process at once."""
+    """Context in which SIGTERM unwinds the stack like an interrupt; a second one ends the process at once."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -93,7 +95,7 @@ def _ended_by_sigterm() -> Iterator[None]:
 
 
 def _commands() -> tuple[Any, ...]:
-    """The commands in the order of the help; imported here, so that an interrupt meanwhile is one line too."""
+    """The commands in the order of the help; imported here, so that an interrupt during import also gives one line."""
     from r2c2r_core.commands import (
         backup,
         check,
@@ -142,7 +144,7 @@ def _commands() -> tuple[Any, ...]:
 
 
 def _way_out(number: int | None) -> str:
-    """The next step after a failure of the system, by its errno."""
+    """Hint for a system error, by its errno."""
     if number == errno.ENAMETOOLONG:
         return "use a shorter name"
     if number in (errno.EACCES, errno.EPERM, errno.EROFS):
@@ -151,7 +153,7 @@ def _way_out(number: int | None) -> str:
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The parser of the command line, with every command that is installed."""
+    """The command-line parser, with all installed commands."""
     parser = argparse.ArgumentParser(prog="r2c2r", description="One RGB-D scan of a kitchen in, a scene that opens out.")
     parser.add_argument("--version", action="version", version=f"r2c2r {__version__}")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")

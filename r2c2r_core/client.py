@@ -1,4 +1,4 @@
-"""A server from a program: upload a recording, click, run, wait, download, with an API token and the standard library.
+"""Client of a server: upload a recording, click, run, wait, download, with an API token and the standard library.
 
     server = Server("https://kitchens.example", token)
     project = server.upload(Path("kitchen.r3d"))
@@ -8,7 +8,7 @@
     server.wait(project)
     server.download(project, Path("kitchen.zip"))
 
-A change whose answer gets lost is sent again under the same Idempotency-Key, and is made once.
+A change whose answer is lost is sent again under the same Idempotency-Key, and is applied once.
 """
 
 import contextlib
@@ -30,17 +30,17 @@ from r2c2r_core.progress import SILENT, Progress
 
 T = TypeVar("T")
 
-PIECE_BYTES = 8 * 2**20  # sent at a time: what is lost when a connection breaks
-TIMEOUT_S = 120.0  # without a byte; a server looks at a recording before it answers
-TRIES = 5  # of what may pass: no connection, 429, 502, 503, 504
-PAUSE_S = 1.0  # before the second try, then twice as long each time
+PIECE_BYTES = 8 * 2**20  # upload piece: the amount lost when a connection breaks
+TIMEOUT_S = 120.0  # without receiving a byte; a server examines a recording before it answers
+TRIES = 5  # for transient failures: no connection, 429, 502, 503, 504
+PAUSE_S = 1.0  # before the second try, doubled each time
 ASK_EVERY_S = 1.0
 ENDED = ("done", "failed", "cancelled")
 _PASSING = (429, 502, 503, 504)
 
 
 class Refused(R2C2RError):
-    """The server says no; `status` is HTTP's, `current` what it holds now where that is why."""
+    """The server refused the request; `status` is HTTP's, `current` the server's current value on a conflict."""
 
     def __init__(self, message: str, *, hint: str, status: int = 500, current: Any = None) -> None:
         super().__init__(message, hint=hint)
@@ -53,7 +53,7 @@ class _Answer(Protocol):
 
 
 class Server:
-    """One server; raises Refused for what it refuses, EnvironmentProblem when nobody answers."""
+    """One server; raises Refused for refused requests, EnvironmentProblem when it does not answer."""
 
     def __init__(self, address: str, token: str) -> None:
         parts = urllib.parse.urlsplit(address)
@@ -66,12 +66,12 @@ class Server:
         self._opener = urllib.request.build_opener(_OwnHostOnly)
 
     def projects(self) -> list[dict[str, Any]]:
-        """Those the token's person sees, last touched first."""
+        """The projects visible to the token's user, most recently changed first."""
         found: list[dict[str, Any]] = self._json("GET", "/api/projects")
         return found
 
     def upload(self, recording: Path, name: str | None = None, progress: Progress = SILENT) -> str:
-        """A new project of a recording, or of a project's file; its id. One that broke off before goes on where it stopped."""
+        """Upload a recording or a project's file as a new project and return its id; resumes an interrupted upload."""
         with explained_io(recording):
             facts = recording.stat()
         about = {"file_name": recording.name, "size": facts.st_size, "name": name, "modified": facts.st_mtime}
@@ -85,16 +85,16 @@ class Server:
         return str(self._json("POST", f"{where}/finish")["id"])
 
     def click(self, project: str, prompts: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Add the objects of a prompts.json; one whose name is taken gets these clicks instead of its own."""
+        """Add the objects of a prompts.json; clicks of an existing object with the same name are replaced."""
         found: list[dict[str, Any]] = self._json("POST", f"{_of(project)}/prompts.json", dict(prompts))
         return found
 
     def run(self, project: str, *, seed: int = 0, **tools: str) -> int:
-        """Reconstruct from what the project holds now; the number of the job. `tools` are backends by seam."""
+        """Start a reconstruction of the project's current state and return the job's number. `tools` are backends by seam."""
         return int(self._json("POST", f"{_of(project)}/run", {"seed": seed, **tools})["id"])
 
     def wait(self, project: str, progress: Progress = SILENT) -> dict[str, Any]:
-        """The project's newest job, once it is done; raises StageError with the server's reason when it is not."""
+        """Wait for the project's newest job and return it; raises StageError with the server's reason if it failed."""
         asked = urllib.parse.urlencode({"project": project, "limit": 1})
         while True:
             jobs = self._json("GET", f"/api/jobs?{asked}")
@@ -110,7 +110,7 @@ class Server:
             time.sleep(ASK_EVERY_S)
 
     def download(self, project: str, destination: Path, version: int | None = None, progress: Progress = SILENT) -> int:
-        """Write a version of the bundle, the newest unless one is named, whole or not at all; returns its number."""
+        """Write a version of the bundle atomically, by default the newest, and return its number."""
         found = {bundle["version"]: bundle for bundle in self._json("GET", f"{_of(project)}/bundles")}
         version = max(found, default=0) if version is None else version
         if version not in found:
@@ -119,12 +119,12 @@ class Server:
         return version
 
     def export(self, project: str, destination: Path, *, recording: bool = False, progress: Progress = SILENT) -> None:
-        """Write the project as one file, which `upload` to another server makes a project of; whole or not at all."""
+        """Write the project atomically as one file, from which `upload` to another server makes a project."""
         asked = urllib.parse.urlencode({"recording": "true" if recording else "false"})
         self._fetch(f"{_media(project)}/project.zip?{asked}", destination, None, progress)
 
     def _fetch(self, path: str, destination: Path, size: int | None, progress: Progress) -> None:
-        """Write what lies at the path; of how many bytes, where that is known before."""
+        """Write the content at the path; `size` in bytes where known beforehand."""
         part, wanted = destination.with_name(f"{destination.name}.part"), progress.for_stage("download")
         try:
             self._ask("GET", path, lambda answer: _write(answer, part, size, wanted))
@@ -134,13 +134,13 @@ class Server:
             part.unlink(missing_ok=True)
 
     def _begun(self, about: Mapping[str, Any]) -> dict[str, Any] | None:
-        """An upload of the same file that stopped."""
+        """An unfinished upload of the same file, or None."""
         same = ("file_name", "size", "modified")
         unfinished = self._json("GET", "/api/uploads")
         return next((each for each in unfinished if all(each[key] == about[key] for key in same)), None)
 
     def _send_piece(self, where: str, at: int, piece: bytes) -> int:
-        """How far the upload is after it; a server that holds more or less than we thought says where to go on."""
+        """Send a piece and return the new offset; on a mismatch, the offset at which the server continues."""
         try:
             headers = {"Upload-Offset": str(at), "Content-Type": "application/offset+octet-stream"}
             self._ask("PATCH", where, _all, piece, headers)
@@ -163,7 +163,7 @@ class Server:
         content: bytes | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> T:
-        """What `take` makes of the answer; what may pass is asked again."""
+        """Result of `take` on the answer, with retries of transient failures."""
         given = {"Authorization": f"Bearer {self._token}", "User-Agent": "r2c2r", **(headers or {})}
         if method == "POST":
             given["Idempotency-Key"] = secrets.token_urlsafe(24)
@@ -185,10 +185,10 @@ class Server:
 
 
 class _OwnHostOnly(urllib.request.HTTPRedirectHandler):
-    """A bundle may lie at another host, whose address is its own key: our token is not for it."""
+    """Drops the token on redirects to another host, e.g. of a bundle at a pre-signed address."""
 
     def redirect_request(self, req: Any, fp: Any, code: int, msg: str, headers: Any, newurl: str) -> Any:
-        """The request at the other place."""
+        """The redirected request."""
         further = super().redirect_request(req, fp, code, msg, headers, newurl)
         if further is not None and urllib.parse.urlsplit(newurl)[:2] != urllib.parse.urlsplit(req.full_url)[:2]:
             further.remove_header("Authorization")
@@ -204,7 +204,7 @@ def _media(project: str) -> str:
 
 
 def _refusal(error: urllib.error.HTTPError) -> Refused:
-    """What the server says, in its words; a proxy before it says something else."""
+    """The Refused error of a response, with the server's own message, or a generic one for a proxy's response."""
     said: Any = None
     with contextlib.suppress(ValueError, OSError), error:
         said = json.loads(error.read(2**16))
@@ -225,7 +225,7 @@ def _all(answer: _Answer) -> bytes:
 
 
 def _write(answer: _Answer, part: Path, size: int | None, progress: Progress) -> None:
-    """The whole of it; what breaks off is an OSError, as a broken connection is."""
+    """Write the complete answer; a truncated one raises OSError, like a broken connection."""
     at = 0
     with explained_io(part):
         handle = part.open("wb")

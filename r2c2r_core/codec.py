@@ -1,4 +1,4 @@
-"""Nouns on disk: one zip per noun, holding JSON for the structure and one member per array. No pickle, no code."""
+"""Serialisation of nouns: one zip per noun, with JSON for the structure and one member per array. No pickle, no code."""
 
 import dataclasses
 import io
@@ -21,7 +21,7 @@ Classes = Mapping[str, type]
 
 
 def encode_noun(noun: object, header: Mapping[str, Any], more: tuple[type, ...] = ()) -> bytes:
-    """A dataclass of the model, or of `more`, with a small JSON header, as the bytes of a zip."""
+    """Zip bytes of a dataclass of the model, or of `more`, with a small JSON header."""
     blobs: list[tuple[str, bytes]] = []
     structure = {"header": dict(header), "noun": _encode(noun, blobs, _named(more))}
     buffer = io.BytesIO()
@@ -41,7 +41,7 @@ def decode_noun(content: bytes, more: tuple[type, ...] = ()) -> tuple[Any, dict[
 
 
 def decode_header(path_or_file: Any) -> dict[str, Any]:
-    """Only the header of a stored noun, without its arrays."""
+    """The header of a stored noun, without reading its arrays."""
     with zipfile.ZipFile(path_or_file) as archive:
         header: dict[str, Any] = json.loads(archive.read("noun.json"))["header"]
         return header

@@ -18,7 +18,7 @@ from r2c2r_core.warp.stage import WarpConfig
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KitchenConfig:
-    """What all stages know of kitchens (r2c2r_core/kitchen)."""
+    """Knowledge of kitchens shared by all stages (r2c2r_core/kitchen)."""
 
     params: Changes = tuned_numbers("kitchen")
 
@@ -46,7 +46,7 @@ class ReconstructConfig:
 
     @property
     def numbers(self) -> Changes:
-        """The tuned numbers that are set, by module path."""
+        """The changed tuned numbers, by module path."""
         sections = {stage.name: getattr(self, stage.name) for stage in fields(self)}
         own = {room: getattr(section, "params", {}) for room, section in sections.items()}
         return {f"{room}.{module}": values for room, params in own.items() for module, values in params.items()}

@@ -1,4 +1,4 @@
-"""What goes wrong with disks, in one line each, and who may read what is on them."""
+"""Disk errors as one-line messages, path checks, and file permissions."""
 
 import errno
 import os
@@ -8,13 +8,13 @@ from pathlib import Path
 
 from r2c2r_core.errors import EnvironmentProblem, InputError
 
-_SHOWN = 200  # characters of a path that cannot be
+_SHOWN = 200  # maximum characters of an invalid path in a message
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 @contextmanager
 def explained_io(path: Path) -> Iterator[None]:
-    """Turn a full disk or a forbidden folder into EnvironmentProblem: one line with the next step."""
+    """Context that turns a full disk or a forbidden folder into EnvironmentProblem: one line with the next step."""
     try:
         yield
     except OSError as error:
@@ -26,7 +26,7 @@ def explained_io(path: Path) -> Iterator[None]:
 
 
 def resolved(path: Path) -> Path:
-    """The absolute path, links followed; raises InputError where no file can be: a circle of links, a NUL, too long a name."""
+    """The absolute path with links resolved; raises InputError on impossible paths: cyclic links, a NUL, too long a name."""
     try:
         found = path.expanduser().resolve()
         os.lstat(found)
@@ -39,18 +39,18 @@ def resolved(path: Path) -> Path:
 
 
 def is_below(path: Path, folder: Path) -> bool:
-    """Whether a path, links followed, stays in the folder; what leads nowhere does not."""
+    """Whether a path with links resolved stays in the folder; False for unresolvable paths."""
     try:
         return path.resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError, ValueError):  # RuntimeError: a circle of links, before Python 3.13
+    except (OSError, RuntimeError, ValueError):  # RuntimeError: cyclic links, before Python 3.13
         return False
 
 
 def keep_private(folder: Path, marker: str) -> None:
-    """From here on what this process and its workers write is for its owner alone, and so is the folder.
+    """Restrict the folder, and all files that this process and its workers write from now on, to their owner.
 
-    A folder that was there is closed too where it is empty or holds `marker`: any other may be more than ours.
-    Raises EnvironmentProblem where the folder cannot be made.
+    An existing folder is restricted only if it is empty or contains `marker`, as any other may also serve other purposes.
+    Raises EnvironmentProblem where the folder cannot be created.
     """
     os.umask(0o077)
     try:
@@ -59,13 +59,13 @@ def keep_private(folder: Path, marker: str) -> None:
         if names and marker not in names:
             return
         for path in (folder, *folder.glob(f"{marker}*")):
-            with suppress(PermissionError):  # somebody else's: `r2c2r doctor` says so
+            with suppress(PermissionError):  # another user's: `r2c2r doctor` reports it
                 path.chmod(path.stat().st_mode & 0o700)
     except OSError as error:
         raise EnvironmentProblem(f"{folder}: {error.strerror}", hint="choose another folder with --data") from error
 
 
 def open_to_others(path: Path) -> str | None:
-    """The mode of a file or folder as chmod writes it, when others of this machine may use it; None where they may not."""
+    """The mode of a file or folder in chmod's notation if other users have access; None if they have none."""
     mode = path.stat().st_mode & 0o777
     return f"{mode:o}" if mode & 0o077 else None

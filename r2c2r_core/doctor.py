@@ -1,4 +1,4 @@
-"""`r2c2r doctor`: what this machine can do, and the command that mends what it cannot."""
+"""`r2c2r doctor`: capabilities of this machine, and commands that fix missing ones."""
 
 import ctypes.util
 import shutil
@@ -29,12 +29,12 @@ class MachineFinding:
     detail: str
 
     def to_json(self) -> dict[str, str]:
-        """As a JSON table."""
+        """The finding as a JSON object."""
         return asdict(self)
 
 
 def examine_machine(data_dir: Path) -> list[MachineFinding]:
-    """System libraries, backends with their licences, loaders, GPU, default port, free disk, privacy."""
+    """Findings on system libraries, backends with their licences, loaders, GPU, default port, free disk, privacy."""
     return [
         MachineFinding("python", "ok", sys.version.split()[0]),
         _system_libraries(),
@@ -50,7 +50,7 @@ def examine_machine(data_dir: Path) -> list[MachineFinding]:
 
 
 def missing_libraries() -> list[str]:
-    """Libraries Open3D needs and this machine lacks."""
+    """Names of libraries that Open3D needs and this machine lacks."""
     if not sys.platform.startswith("linux"):
         return []
     return [name for name in OPEN3D_LIBRARIES if ctypes.util.find_library(name) is None]
@@ -81,7 +81,7 @@ def _backends() -> list[MachineFinding]:
 
 
 def _plugins() -> list[MachineFinding]:
-    """What other packages add, a line each; one that does not load says why."""
+    """One finding per plug-in, with the reason if it does not load."""
     from r2c2r_core.export.writers.table import Format
     from r2c2r_core.ingest.readers.protocol import Reader
     from r2c2r_core.kitchen.category import Category
@@ -137,7 +137,7 @@ def _disk(data_dir: Path) -> MachineFinding:
 
 
 def _privacy(data_dir: Path) -> MachineFinding:
-    """Whether others of this machine may look into the data folder."""
+    """Finding on access of other users to the data folder."""
     mode = open_to_others(data_dir) if data_dir.exists() else None
     if mode:
         return MachineFinding("data folder", "problem", f"others may use it ({mode}): chmod go= {data_dir}")
@@ -145,7 +145,7 @@ def _privacy(data_dir: Path) -> MachineFinding:
 
 
 def _decoders() -> MachineFinding:
-    """Whether what decodes uploads of the app is cut off from the network."""
+    """Finding on network isolation of the decoders of uploads."""
     if network_can_be_left():
         return MachineFinding("decoders", "ok", "uploads are decoded without network")
     detail = "uploads are decoded with the network in reach: this system lets no process leave it (unshare, Linux only)"

@@ -1,7 +1,7 @@
-"""The one reader of JSON that a person or another program gives: bounded, regular, unambiguous, else one line that says why.
+"""Strict JSON reader for untrusted documents: bounded size, regular files, unambiguous values, one-line errors.
 
-JSON's own rules leave open what a repeated key, NaN, a lone surrogate or a number of 5,000 digits means, and nesting as deep
-as the sender likes ends Python's parser; here each is refused before anything is computed from it (RFC 8259, sections 4-9).
+JSON leaves the meaning of repeated keys, NaN, lone surrogates or numbers of 5,000 digits open, and unbounded nesting crashes
+Python's parser; all of these are refused before anything is computed from them (RFC 8259, sections 4-9).
 """
 
 import json
@@ -19,7 +19,7 @@ from r2c2r_core.errors import InputError
 
 MOST_BYTES = 64 * 2**20  # an hour of poses is half of it
 MOST_DEEP = 64  # the deepest of our own formats has 8
-_LONGEST_NUMBER = 40  # characters; 17 digits tell every double apart
+_LONGEST_NUMBER = 40  # characters; 17 digits distinguish every double
 _STRINGS = re.compile(rb'"[^"\\]*+(?:\\.?[^"\\]*+)*+(?:"|\Z)', re.DOTALL)  # possessive, and the last may lack its end: linear
 
 
@@ -29,7 +29,7 @@ def read_json(path: Path, failure: type[InputError] = InputError, *, hint: str) 
 
 
 def read_bounded(path: Path, failure: type[InputError] = InputError, *, hint: str) -> bytes:
-    """The content of a regular file of at most 64 MiB; a pipe would be waited for, a device never ends. Raises `failure`."""
+    """The content of a regular file of at most 64 MiB; a pipe would block, a device never ends. Raises `failure`."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError as error:
@@ -55,10 +55,10 @@ def read_bounded(path: Path, failure: type[InputError] = InputError, *, hint: st
 def parse_json(
     content: bytes | str, where: str, failure: type[InputError] = InputError, *, hint: str, lenient: bool = False
 ) -> Any:
-    """The document in JSON that `where` names. Raises `failure`.
+    """The parsed JSON document; `where` names it. Raises `failure`.
 
-    `lenient`, for what other people's apps write into recordings: NaN and infinities stay (lost tracking), the last of a
-    repeated key counts, and whole numbers become floats, of any length.
+    `lenient`, for recordings of other apps: NaN and infinities are kept (lost tracking), the last of a repeated key counts,
+    and whole numbers of any length become floats.
     """
 
     def refuse(found: str) -> InputError:
@@ -88,7 +88,7 @@ def parse_json(
 
 
 def kind_of_file(mode: int) -> str:
-    """What lies at a path, in words, from its mode."""
+    """Kind of a file in words, from its mode."""
     kinds: tuple[tuple[Callable[[int], bool], str], ...] = (
         (stat.S_ISREG, "a file"),
         (stat.S_ISDIR, "a folder"),
@@ -99,7 +99,7 @@ def kind_of_file(mode: int) -> str:
 
 
 class _Refused(Exception):  # not a ValueError: those are the parser's own
-    """A value that JSON allows and we do not."""
+    """A value that JSON allows but this reader does not."""
 
 
 def _strict_rules() -> dict[str, Any]:
@@ -138,12 +138,12 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _encodable(document: Any) -> None:
-    """Raise UnicodeEncodeError for text that no file can hold."""
+    """Raise UnicodeEncodeError for text that cannot be encoded."""
     json.dumps(document, ensure_ascii=False).encode()
 
 
 def _depth(content: bytes) -> int:
-    """How deep brackets nest, outside of strings."""
+    """Nesting depth of brackets outside of strings."""
     if content.count(b"[") + content.count(b"{") <= MOST_DEEP:
         return 0
     bare = np.frombuffer(_STRINGS.sub(b"", content), np.uint8)

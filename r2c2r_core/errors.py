@@ -1,4 +1,4 @@
-"""Every failure a caller may meet.
+"""Exception hierarchy.
 
 R2C2RError
 ├── InputError            what the person gave cannot be used (exit 2)
@@ -32,7 +32,7 @@ class R2C2RError(Exception):
 
 
 class InputError(R2C2RError):
-    """What the person gave cannot be used."""
+    """The user's input cannot be used."""
 
     exit_code = 2
 

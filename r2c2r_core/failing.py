@@ -1,4 +1,4 @@
-"""What the computing of one object may end in without ending it for the others, and how that is told."""
+"""Isolation of failures of single objects, and their one-line messages."""
 
 import logging
 from collections.abc import Iterator
@@ -11,13 +11,13 @@ from r2c2r_core.errors import PromptError, R2C2RError, StageError
 _log = logging.getLogger(__name__)
 
 OBJECT_FAILS = (StageError, PromptError, ValueError, ArithmeticError, LookupError, RuntimeError, cv2.error)
-"""What one object's measurements may end in (LinAlgError is a ValueError, Qhull's a RuntimeError); anything else is wrong for
-all: a programming error, a full disk, a missing backend, a person who cancelled."""
+"""Errors that concern only one object (LinAlgError is a ValueError, Qhull's a RuntimeError); anything else concerns all: a
+programming error, a full disk, a missing backend, cancellation by the user."""
 
 
 @contextmanager
 def apart(stage: str, name: str, failures: dict[str, str]) -> Iterator[None]:
-    """What computes one object: what it may end in is recorded by the object's name, and ends nothing else."""
+    """Context of one object's computation: its failure is recorded under the object's name and does not propagate."""
     try:
         yield
     except OBJECT_FAILS as error:
@@ -26,7 +26,7 @@ def apart(stage: str, name: str, failures: dict[str, str]) -> Iterator[None]:
 
 @contextmanager
 def spared(what: str, said: list[str]) -> Iterator[None]:
-    """A step that all go through, at the place of one of them: what it may end in is said there, and the rest goes on.
+    """Context of an optional step: its failure is recorded and the computation continues.
 
     `said` gets one line, "what: why".
     """
@@ -38,7 +38,7 @@ def spared(what: str, said: list[str]) -> Iterator[None]:
 
 
 def record(stage: str, name: str, error: Exception, failures: dict[str, str], where: str = "") -> None:
-    """One line for a person; the traceback of what nobody foresaw (`where`, from another process) goes to the log."""
+    """Record one line for the user, and log the traceback of unexpected errors (`where`, from another process)."""
     failures[name] = failure_line(stage, name, error)
     if isinstance(error, R2C2RError):
         _log.warning("%s: %s: %s", stage, name, error)
@@ -47,7 +47,7 @@ def record(stage: str, name: str, error: Exception, failures: dict[str, str], wh
 
 
 def failure_line(stage: str, name: str, error: Exception) -> str:
-    """One line for a person."""
+    """The failure as one line for the user."""
     if isinstance(error, R2C2RError):
         return f"{stage}: {error}"
     return f"{stage}: {name}: {_in_words(error)}; see the log, or leave it out"

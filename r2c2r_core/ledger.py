@@ -1,7 +1,7 @@
-"""What a run has computed and may use again: keys, stored nouns, failures of single objects, and where to stop.
+"""Cached execution of stages: content keys, stored nouns, failures of single objects, and where to stop.
 
-A stage is a plain function of a module: its inputs, then `progress`. What it gives is kept under a key that follows from the
-stage's source and its inputs, so whoever calls it says what the result depends on by saying what it is made from.
+A stage is a plain function of a module: its inputs, then `progress`. Its result is stored under a key derived from the
+stage's source and its inputs, so the arguments of the call define the dependencies of the result.
 """
 
 import logging
@@ -24,13 +24,13 @@ T = TypeVar("T")
 Stage = Literal["ingest", "segment", "generate", "align", "synthesize", "warp", "export"]
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
-_STANDS_ON = {"generate": ("align",)}  # the placing of candidates is given to it
+_STANDS_ON = {"generate": ("align",)}  # it calls the placement of candidates
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where a noun is stored."""
+    """Storage location of a noun."""
 
     root: Path
     stage: str
@@ -39,9 +39,9 @@ class _Place:
 
 
 class Kept(Generic[T]):
-    """A value and the key that says what it was made from; an empty key: nothing depends on it.
+    """A value with the content key of its inputs; with an empty key, nothing depends on it.
 
-    One that is stored goes to another process by its place: it is read there when it is asked for.
+    A stored value is passed to another process by location and read there on first use.
     """
 
     __slots__ = ("_value", "key", "place")
@@ -67,39 +67,39 @@ class Kept(Generic[T]):
 
 
 def aside(value: T) -> Kept[T]:
-    """An input that does not change what comes out: a folder to keep things in, what an earlier run made."""
+    """An input that does not affect the result: a cache folder, an earlier run's output."""
     return Kept(value, "")
 
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """An input that is made once a process, for all objects: `make` of these inputs, and `progress`."""
+    """An input computed once per process for all objects: `make` of these inputs, and `progress`."""
 
     make: Callable[..., Any]
     inputs: tuple[Any, ...]
 
     @property
     def key(self) -> str:
-        """As of what it is made from."""
+        """Content key of its inputs."""
         return content_key(_keys(self.inputs))
 
 
 class Reached(Exception):  # a signal, not an error
-    """The stage the caller asked for is done."""
+    """The stage requested by the caller is done."""
 
 
 @dataclass(slots=True)
 class Ledger:
-    """Runs stages against a workspace, computing only what is not there yet."""
+    """Runs stages against a workspace, computing only missing results."""
 
     work: Workspace
     progress: Progress
     until: Stage = "export"
     pool: Pool = field(default_factory=lambda: Pool(1))
-    seconds: dict[str, float] = field(default_factory=dict)  # by stage: what its results took when they were computed
+    seconds: dict[str, float] = field(default_factory=dict)  # by stage: computation time of its results
     failures: dict[str, str] = field(default_factory=dict)  # by object: one line
-    only: Collection[str] | None = None  # objects of the last stage to compute, others are left; None: all of every stage
-    left: list[str] = field(default_factory=list)  # objects of the last stage that are not there and were left
+    only: Collection[str] | None = None  # objects to compute in the last stage; None: all objects of every stage
+    left: list[str] = field(default_factory=list)  # objects of the last stage that are missing and were skipped
 
     def one(
         self,
@@ -109,7 +109,7 @@ class Ledger:
         name: str = "scene",
         span: tuple[float, float] = (0.0, 1.0),
     ) -> Kept[T]:
-        """The stage's single result, computed when its inputs changed; `span` is its share of the stage's work."""
+        """The stage's single result, computed if its inputs changed; `span` is its fraction of the stage's progress."""
         progress = self._begin(stage).part(*span)
         kept = self._once(self._job(stage, name, compute, inputs), progress)
         progress.at(1.0, "done")
@@ -118,9 +118,9 @@ class Ledger:
     def each(
         self, stage: Stage, compute: Callable[..., T], names: Collection[str], *inputs: Any, alone: bool = False
     ) -> dict[str, Kept[T]]:
-        """The stage's result for every object; an object that fails is left out and recorded, the others go on.
+        """The stage's result for every object; a failed object is recorded and left out, the others continue.
 
-        Of an input that is a mapping each object is given its own. `alone`: in this process, whatever the pool.
+        From an input that is a mapping, each object gets its own entry. `alone`: in this process, regardless of the pool.
         """
         progress = self._begin(stage)
         names = [name for name in names if not self.only or name in self.only]
@@ -133,12 +133,12 @@ class Ledger:
         return {name: results[name] for name in names if name in results}
 
     def stored(self, stage: Stage, compute: Callable[..., T], name: str, *inputs: Any) -> T | None:
-        """What an earlier run made of the object with these inputs, when nothing has taken its place yet."""
+        """An earlier run's result for the object with these inputs, unless overwritten since; else None."""
         found = self.work.find(stage, name, self._job(stage, name, compute, _own(name, inputs)).key)
         return None if found is None else found[0]
 
     def decide(self, stage: Stage, choose: Callable[..., T], items: Mapping[str, Kept[Any]], *inputs: Any) -> dict[str, T]:
-        """Quick decisions on a stage's results, kept nowhere, with the same treatment of failures."""
+        """Quick decisions on a stage's results, not stored, with the same handling of failures."""
         results: dict[str, T] = {}
         for name, item in items.items():
             with apart(stage, name, self.failures):
@@ -146,7 +146,7 @@ class Ledger:
         return results
 
     def _without_left(self, stage: Stage, missing: "dict[str, _Job]") -> "dict[str, _Job]":
-        """What this run is to compute of what is not there."""
+        """The missing jobs that this run computes; the others of its last stage are recorded as left."""
         if self.only is None:
             return missing
         wanted = {name: job for name, job in missing.items() if stage == self.until and name in self.only}
@@ -165,7 +165,7 @@ class Ledger:
         return results
 
     def _side_by_side(self, jobs: "dict[str, _Job]", progress: Progress) -> dict[str, Kept[Any]]:
-        """In the pool; what all share is prepared first, so that the workers find on disk what takes long."""
+        """Run jobs in the pool; shared inputs are prepared first, so that the workers find them on disk."""
         opening, rest = progress.part(0.0, 0.3), progress.part(0.3, 1.0)
         shared = {input.key: input for job in jobs.values() for input in job.inputs if isinstance(input, Shared)}
         for input in shared.values():
@@ -210,31 +210,31 @@ class Ledger:
 
 @dataclass(frozen=True, slots=True)
 class _Job:
-    """One noun to be made: where it will be stored, and of what."""
+    """One noun to compute: storage location, function and inputs."""
 
     root: Path
     stage: Stage
     name: str
     compute: Callable[..., Any]
     inputs: tuple[Any, ...]
-    numbers: Mapping[str, Any]  # tuned numbers that the run sets, by module, of the stage and what it stands on
+    numbers: Mapping[str, Any]  # changed tuned numbers, by module, of the stage and its dependencies
 
     @property
     def key(self) -> str:
-        """Of the stage's source, of the geometry and nouns it stands on, of its tuned numbers, and of the inputs."""
+        """Content key of the stage's source, its dependencies, its tuned numbers and the inputs."""
         source = source_key(*_rooms(self.stage), "model")
         return content_key(self.stage, self.name, self.compute.__name__, source, self.numbers, _keys(self.inputs))
 
 
 def _rooms(stage: str) -> tuple[str, ...]:
-    """The packages whose code and numbers decide what a stage makes."""
+    """The packages whose code and numbers determine a stage's result."""
     return (stage, *_STANDS_ON.get(stage, ()), "kitchen", "geometry")
 
 
 def store_noun(job: _Job, *, progress: Progress) -> None:
-    """Make a noun in a worker process, and store it."""
+    """Compute a noun in a worker process, and store it."""
     if not any(isinstance(item, Shared) for item in job.inputs):
-        _opened.cache_clear()  # the stage that shared it is over: a prepared recording takes half a gigabyte
+        _opened.cache_clear()  # the stage that shared it has ended: a prepared recording takes half a gigabyte
     with tuning({type(params): params for params in job.numbers.values()}):
         _compute(Workspace(job.root), job, progress)
 
@@ -244,12 +244,12 @@ def _compute(work: Workspace, job: _Job, progress: Progress) -> tuple[Any, float
 
 
 def _own(name: str, inputs: tuple[Any, ...]) -> tuple[Any, ...]:
-    """The inputs of one object: of a mapping, what is its own."""
+    """The inputs of one object: its own entry from each mapping."""
     return tuple(item[name] if isinstance(item, Mapping) else item for item in inputs)
 
 
 def _keys(inputs: Any) -> Any:
-    """What the inputs are made from, for content_key."""
+    """The inputs with stored values replaced by their keys, for content_key."""
     if isinstance(inputs, Kept | Shared):
         return inputs.key
     if isinstance(inputs, tuple | list):
@@ -271,7 +271,7 @@ def _value(item: Any, progress: Progress) -> Any:
     return item
 
 
-@lru_cache(maxsize=4)  # the recording, and what belongs to the object at hand
+@lru_cache(maxsize=4)  # the recording, and nouns of the current object
 def _stored(place: _Place) -> Any:
     found = Workspace(place.root).find(place.stage, place.name, place.key)
     if found is None:
@@ -293,7 +293,7 @@ def _opened(once: "_Once") -> Any:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Once:
-    """A shared input, known by its key, and who hears about its making."""
+    """A shared input, hashed by its key, with the progress of its computation."""
 
     shared: Shared
     progress: Progress

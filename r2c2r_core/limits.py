@@ -1,6 +1,6 @@
-"""What a worker process may use: one that wants more ends with one line, and nothing else on the machine does.
+"""Resource limits of a worker process: exceeding them ends only that process, with a one-line error.
 
-Memory is counted as heap and private maps (RLIMIT_DATA): address space alone costs nothing.
+Memory counts heap and private maps (RLIMIT_DATA), as address space alone costs nothing.
 """
 
 import math
@@ -12,16 +12,16 @@ import psutil
 from r2c2r_core.errors import EnvironmentProblem
 
 MEMORY_VARIABLE, HOURS_VARIABLE = "R2C2R_WORKER_MEMORY_GB", "R2C2R_WORKER_HOURS"
-_SHARE = 0.9  # of the machine's memory, for what we compute ourselves
+_SHARE = 0.9  # of the machine's memory, for our own computations
 _LEAST_BYTES = 1 << 30
 _HOURS = 48.0  # of processor time; a kitchen of an hour's recording takes a tenth of that
 
 
 def limit_this_process(*, memory_bytes: int | None = None, cpu_s: int | None = None, file_bytes: int | None = None) -> None:
-    """Bound this process's memory, processor seconds and largest file, and leave no core file behind.
+    """Limit this process's memory, processor seconds and file size, and disable core files.
 
-    None is the machine's: nine tenths of its memory, two days of processor time, files of any size. What the environment
-    says (R2C2R_WORKER_MEMORY_GB, R2C2R_WORKER_HOURS) counts instead of the machine's.
+    None is the machine's limit: nine tenths of its memory, two days of processor time, files of any size. The environment
+    (R2C2R_WORKER_MEMORY_GB, R2C2R_WORKER_HOURS) overrides the machine's limits.
     """
     wanted = {
         resource.RLIMIT_DATA: max(memory_bytes or _machine_memory(), _LEAST_BYTES),
@@ -36,12 +36,12 @@ def limit_this_process(*, memory_bytes: int | None = None, cpu_s: int | None = N
 
 
 def free_memory(share: float) -> int:
-    """That share of the memory that is free now, in bytes; no more than the machine's workers may use."""
+    """A fraction of the currently free memory, in bytes, at most the limit of the machine's workers."""
     return min(int(psutil.virtual_memory().available * share), _machine_memory())
 
 
 def memory_met() -> EnvironmentProblem:
-    """What a worker says that met its limit of memory."""
+    """The error of a worker that reached its memory limit."""
     most = resource.getrlimit(resource.RLIMIT_DATA)[0]
     amount = "than there is" if most == resource.RLIM_INFINITY else f"than the {most / 1e9:.1f} GB that it may use"
     hint = f"correct what is oversized, keep fewer frames (ingest.most_frames), or allow more with {MEMORY_VARIABLE}"
@@ -53,7 +53,7 @@ def _machine_memory() -> int:
 
 
 def _said(variable: str, default: float) -> float:
-    """A positive number of the environment; the default where it says none."""
+    """A positive number from the environment, or the default."""
     try:
         value = float(os.environ.get(variable, ""))
     except ValueError:

@@ -1,4 +1,4 @@
-"""overrides.json: what a person corrected. An input saved beside the recording; absent keys are computed."""
+"""Reading of overrides.json, the manual corrections saved beside the recording; absent keys are computed."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +26,7 @@ def overrides_from(document: Any, path: Path) -> Overrides:
 
 
 def with_drawn_hinges(overrides: Overrides, prompts: Prompts) -> Overrides:
-    """The corrections, and the hinge sides of drawn fronts where no correction says otherwise."""
+    """The corrections with the hinge sides of drawn fronts added where not corrected."""
     drawn = {item.name: item.front.hinge for item in prompts.objects if item.front is not None and item.front.hinge is not None}
     said = {name: overrides.of(name) for name in drawn}
     hinges = {name: replace(said[name], hinge=said[name].hinge or side) for name, side in drawn.items()}
@@ -34,7 +34,7 @@ def with_drawn_hinges(overrides: Overrides, prompts: Prompts) -> Overrides:
 
 
 def _found(candidate: str | None, folder: Path) -> str | None:
-    """The mesh file where there is one of that name, else the candidate's id."""
+    """Path of the mesh file if it exists, else the candidate's id."""
     if candidate is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""READ FIRST: one recording and a few clicks in, an articulated scene out."""
+"""READ FIRST: the pipeline from one recording and a few clicks to an articulated scene."""
 
 import logging
 from collections.abc import Collection, Mapping
@@ -37,7 +37,7 @@ from r2c2r_core.tuning import changed, tuning
 from r2c2r_core.warp.stage import fit_meshes
 from r2c2r_core.workspace import Workspace, content_key, file_key
 
-OBJECT_STAGES: tuple[Stage, ...] = ("segment", "generate", "align")  # that go object by object
+OBJECT_STAGES: tuple[Stage, ...] = ("segment", "generate", "align")  # stages that run per object
 
 _log = logging.getLogger(__name__)
 
@@ -65,14 +65,14 @@ class Request:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a run gave. `reconstruction` and `certificate` are None when it was asked to stop before the export."""
+    """Result of a run. `reconstruction` and `certificate` are None if it stopped before the export, as requested."""
 
     reconstruction: Reconstruction | None
     certificate: Certificate | None
-    computed: tuple[str, ...]  # "stage/object" of what was computed rather than found
+    computed: tuple[str, ...]  # "stage/object" of results computed rather than loaded
     failures: dict[str, str]  # object -> one line
-    seconds: dict[str, float]  # by stage: what its results took when they were computed
-    left: tuple[str, ...] = ()  # objects that the last stage lacks, of a run of some objects
+    seconds: dict[str, float]  # by stage: computation time of its results
+    left: tuple[str, ...] = ()  # objects missing in the last stage, for a run of some objects
 
 
 def reconstruct(
@@ -86,11 +86,11 @@ def reconstruct(
 ) -> Outcome:
     """Turn one RGB-D recording into an articulated scene; the bundle is `work.bundle`.
 
-    Objects are computed side by side in `workers` processes (0: as many as cores and memory allow); 1 starts none.
+    Objects are computed in parallel in `workers` processes (0: as many as cores and memory allow); 1 starts none.
 
-    With `only` the run computes these objects of the stage `until`, one of OBJECT_STAGES whose earlier stages are done, and
-    other processes may compute others beside it. With none at all it makes what they share, and says what is left to compute.
-    The run of all that comes after them finds what they stored. Raises InputError for a stage or an object that is none.
+    With `only` the run computes these objects of the stage `until`, one of OBJECT_STAGES whose earlier stages are done, while
+    other processes may compute others. With an empty `only` it computes the shared inputs, and reports the remaining objects.
+    A later run of all objects reuses the stored results. Raises InputError for an unknown stage or object.
     """
     reconstruction, certificate = None, None
     if only is not None:
@@ -123,7 +123,7 @@ def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
         require_tools(request)
 
     capture = read_room(request, run)
-    if run.until != "ingest":  # a recording may be looked at before anyone clicked
+    if run.until != "ingest":  # a recording may be ingested before there are prompts
         check_prompts(capture.value, request.prompts)
     tracks = segment_objects(request, run, capture)
     masks = {name: track.value for name, track in tracks.items()}
@@ -166,7 +166,7 @@ def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
 
 
 def read_room(request: Request, run: Ledger) -> Kept[Capture]:
-    """The recording, decoded once, and levelled: what a person says of the room moves it and reads nothing again."""
+    """The levelled recording, decoded once; corrections of the room move it without decoding it again."""
     config, source = request.config.ingest, Kept(request.source, recording_key(request.source))
     frames = run.work.store(content_key(source_key("ingest"), source.key, config))
     scan = run.one("ingest", read_recording, source, aside(frames), config, name="recording", span=(0.0, 0.95))
@@ -176,13 +176,13 @@ def read_room(request: Request, run: Ledger) -> Kept[Capture]:
 
 
 def require_tools(request: Request) -> None:
-    """Raise where a chosen tool is not there: known at once, not after minutes of reading."""
+    """Raise if a chosen tool is not available, before minutes of reading."""
     SEGMENTERS.require(request.tools.segmenter, request.config.segment.weights)
     CARCASSES.require(request.config.synthesize.fixtures)
 
 
 def doubts_about(request: Request, work: Workspace, *, progress: Progress = SILENT) -> Doubts:
-    """What the doctor holds against the recording, to be said before anything is computed; reads it if nobody has."""
+    """The doctor's doubts about the recording, before any computation; ingests the recording if necessary."""
     require_tools(request)
     with work.locked(), tuning(changed(request.config.numbers)):
         run = Ledger(work, progress, "ingest")
@@ -197,7 +197,7 @@ def recording_key(source: Path) -> str:
     return content_key(file_key(source), beside) if beside else file_key(source)
 
 
-DISPUTED = "disputed-clicks"  # with a hyphen: no object is called so, and Workspace.names leaves it out
+DISPUTED = "disputed-clicks"  # with a hyphen: not a valid object name, and omitted by Workspace.names
 
 
 def segment_objects(request: Request, run: Ledger, capture: Kept[Capture]) -> dict[str, Kept[MaskTrack]]:
@@ -214,10 +214,10 @@ def segment_objects(request: Request, run: Ledger, capture: Kept[Capture]) -> di
 def generate_objects(
     request: Request, run: Ledger, capture: Kept[Capture], tracks: Mapping[str, Kept[MaskTrack]]
 ) -> dict[str, Kept[CandidateSet]]:
-    """Every object's candidates. Where the chosen generator fails on one, the weight-free one stands in, with a warning.
+    """Candidates of every object. Where the chosen generator fails, the weight-free one replaces it, with a warning.
 
-    The failure is not stored, so that the next run asks the chosen generator again. A mesh given by a person joins the
-    candidates that are there, and so do further ones that a person asked for: nothing is generated anew for them.
+    The failure is not stored, so that the next run tries the chosen generator again. Uploaded meshes and further candidates
+    requested by the user are added to the existing candidates, which are not generated again.
     """
     said, generator = request.overrides, request.tools.generator
     given = {name: _uploads(said, name) for name in tracks}
@@ -249,7 +249,7 @@ def place_objects(
     candidates: Mapping[str, Kept[CandidateSet]],
     choices: Mapping[str, CandidateSet],
 ) -> dict[str, Kept[Placement]]:
-    """Every chosen candidate in the room; only another choice places it anew."""
+    """Placement of every chosen candidate; recomputed only for another choice."""
     chosen = {name: choice.chosen_id for name, choice in choices.items()}
     alone = MATCHERS.get(request.tools.matcher).alone
     return run.each("align", place_candidate, chosen, capture, tracks, candidates, chosen, _placer(request), alone=alone)
@@ -276,7 +276,7 @@ def _earlier(
     name: str,
     plan: Plan,
 ) -> tuple[Plan, CandidateSet] | None:
-    """What an earlier run stored of the candidates that the plan only adds to."""
+    """Stored candidates of an earlier run to which the plan only adds, with their plan; else None."""
     for step in plan.steps(bool(_uploads(request.overrides, name))):
         placer = _placer(request) if step.places else None
         found = run.stored("generate", make_candidates, name, capture, tracks, step, (), placer, aside(None))

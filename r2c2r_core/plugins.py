@@ -1,4 +1,4 @@
-"""What other packages add, by entry points: nothing here is edited, and what is broken there ends no run.
+"""Plug-ins of other packages, by entry points: no edits here, and a broken plug-in does not stop a run.
 
 | group              | what an entry point names                                                                |
 |--------------------|------------------------------------------------------------------------------------------|
@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Plugin:
-    """One entry point: what it names once loaded, or why it cannot be used."""
+    """One entry point: its loaded value, or the reason why it cannot be used."""
 
     group: Group
     name: str
@@ -36,18 +36,18 @@ class Plugin:
 
 
 def added(group: Group, kind: type[T]) -> tuple[T, ...]:
-    """What other packages add to a table, each of the kind the table holds; what is broken is left out (see `plugins`)."""
+    """Valid entries of type `kind` that other packages add to a table; broken ones are left out (see `plugins`)."""
     return tuple(plugin.value for plugin in plugins(group, kind) if isinstance(plugin.value, kind))
 
 
 def plugins(group: Group, kind: type) -> tuple[Plugin, ...]:
-    """Every entry point of a group, in one order everywhere; one that names something else than a `kind` is at fault."""
+    """All entry points of a group in a deterministic order; one whose value is not a `kind` is marked as faulty."""
     return tuple(_of_kind(plugin, kind) for plugin in _loaded(group))
 
 
 @cache
 def plugin_key(group: Group) -> str:
-    """A digest of the code that a group's entry points name, so that a changed plug-in computes anew; empty without any."""
+    """Digest of the code of a group's entry points, so that a changed plug-in invalidates results; empty without any."""
     entries = _found(group)
     if not entries:
         return ""
@@ -60,7 +60,7 @@ def plugin_key(group: Group) -> str:
 
 
 def forget() -> None:
-    """Look for entry points anew: packages were installed or removed while this process runs."""
+    """Clear the cache of entry points, after packages were installed or removed while this process runs."""
     _loaded.cache_clear()
     plugin_key.cache_clear()
 
@@ -77,7 +77,7 @@ def _loaded(group: Group) -> tuple[Plugin, ...]:
 def _load(group: Group, entry: EntryPoint) -> Plugin:
     try:
         return Plugin(group, entry.name, _package(entry), entry.load())
-    except Exception as error:  # another's code may raise anything: its line says so, and the run goes on without it
+    except Exception as error:  # foreign code may raise anything: it is reported, and the run continues without it
         fault = " ".join(f"{entry.value} does not load: {type(error).__name__}: {error}".split())
         return Plugin(group, entry.name, _package(entry), None, fault)
 
@@ -93,7 +93,7 @@ def _package(entry: EntryPoint) -> str:
 
 
 def _sources(entry: EntryPoint) -> Iterator[Path]:
-    """The files of the top-level package or module that an entry point names; nothing of it is imported."""
+    """The files of an entry point's top-level package or module, without importing it."""
     spec = importlib.util.find_spec(entry.module.partition(".")[0])
     if spec is None:
         return

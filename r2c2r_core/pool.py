@@ -1,7 +1,7 @@
-"""Worker processes that compute side by side: `python -m r2c2r_core.pool FD` is one, and FD its socket to who started it.
+"""Pool of worker processes: `python -m r2c2r_core.pool FD` is one worker, with FD its socket to the parent process.
 
-A worker lives as long as its pool: importing takes it a second or two, and what its tasks share stays with it. It ends when the
-pool closes its end of the socket, or whoever held it died.
+A worker lives as long as its pool, as importing takes a second or two, and its tasks share cached inputs. It ends when the
+pool closes its end of the socket, or the parent process dies.
 """
 
 import os
@@ -22,8 +22,8 @@ import psutil
 from r2c2r_core.errors import Cancelled, EnvironmentProblem
 from r2c2r_core.progress import SILENT, Progress
 
-WORKER_BYTES = 1500 << 20  # of a process: 1.1 GB were seen at its peak, on samples of 180 and of 600 frames alike
-_POLL_S = 0.2  # between looks at whether the person cancelled
+WORKER_BYTES = 1500 << 20  # memory per process: the measured peak was 1.1 GB, on samples of 180 and of 600 frames alike
+_POLL_S = 0.2  # interval of checks for cancellation
 
 
 class Task(NamedTuple):
@@ -34,7 +34,7 @@ class Task(NamedTuple):
 
 
 class Failed(NamedTuple):
-    """What a task raised, and where, for the log."""
+    """The exception of a task, with its traceback for the log."""
 
     error: Exception
     where: str
@@ -45,14 +45,14 @@ class WorkerLost(RuntimeError):
 
 
 def usual_workers() -> int:
-    """As many as there are cores for this process, and room in memory."""
+    """Default number of workers: limited by the available cores and memory."""
     room = psutil.virtual_memory().available // WORKER_BYTES
     return int(max(1, min(len(os.sched_getaffinity(0)), room)))
 
 
 @dataclass(slots=True, eq=False)
 class Pool:
-    """Up to `workers` processes, started when there is work for them."""
+    """Up to `workers` processes, started on demand."""
 
     workers: int
     _idle: list["_Worker"] = field(default_factory=list)
@@ -66,9 +66,9 @@ class Pool:
             worker.end()
 
     def run(self, tasks: Mapping[str, Task], progress: Progress = SILENT) -> Iterator[tuple[str, Any | Failed]]:
-        """Every task's name and what it gave or Failed, as they end; raises Cancelled. One that ends its process has failed.
+        """Each task's name and its result or Failed, in order of completion; raises Cancelled. A crashed process is a failure.
 
-        The first ones, as many as there are processes, begin at the call; the others while the caller asks for results.
+        The first tasks, one per process, start at the call; the others while the caller iterates over the results.
         """
         waiting = list(tasks.items())
         self._begin(waiting)
@@ -102,7 +102,7 @@ class Pool:
 
 
 class _Worker:
-    """One process, from the side of the pool."""
+    """The pool's handle of one process."""
 
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
@@ -117,12 +117,12 @@ class _Worker:
         self.name = ""
 
     def begin(self, name: str, task: Task) -> None:
-        """Give it something to do; it is idle."""
+        """Send a task to the idle worker."""
         self.name = name
         self.channel.send(task)
 
     def answer(self) -> tuple[Any, ...]:
-        """("at", share, text), ("done", value), ("failed", error, where); of a process that is gone ("lost", error, where)."""
+        """("at", share, text), ("done", value), ("failed", error, where), or ("lost", error, where) of a dead process."""
         try:
             answer: tuple[Any, ...] = self.channel.recv()
         except (EOFError, OSError):
@@ -133,14 +133,14 @@ class _Worker:
         return answer
 
     def end(self) -> None:
-        """At once: what it is at is stored whole or not at all."""
+        """Kill the process at once, which is safe as results are stored atomically."""
         self.channel.close()
         self._process.kill()
         self._process.wait()
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Do what comes through the socket, one task after another, until it is closed."""
+    """Run the tasks received through the socket, one after another, until it is closed."""
     for number in (signal.SIGINT, signal.SIGTERM):  # they reach the whole process group: the pool decides
         signal.signal(number, signal.SIG_IGN)
     channel = Connection(int(arguments[0]))
@@ -158,11 +158,11 @@ def _answer(task: Task, progress: Progress) -> tuple[Any, ...]:
         return "done", task.function(*task.arguments, progress=progress)
     except Cancelled:
         raise
-    except Exception as error:  # the edge of a task: judged by who gave it
+    except Exception as error:  # the edge of a task: handled by the caller
         where = traceback.format_exc()
         try:
             pickle.loads(pickle.dumps(error))
-        except Exception:  # an exception of a library that does not travel
+        except Exception:  # a library's exception that cannot be pickled
             error = RuntimeError(f"{type(error).__name__}: {error}")
         return "failed", error, where
 

@@ -14,9 +14,9 @@ Report = Callable[[str, float, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where a stage reports, and asks whether to go on.
+    """Channel for a stage's progress reports and cancellation checks.
 
-    `span` maps the caller's fraction of the stage onto 0..1, so that nested work reports without knowing its place.
+    `span` maps the caller's fraction onto the stage's 0..1, so that nested work reports without knowing its position.
     """
 
     report: Report | None = None
@@ -25,14 +25,14 @@ class Progress:
     span: tuple[float, float] = field(default=(0.0, 1.0))
 
     def at(self, fraction: float, text: str = "") -> None:
-        """Report a fraction 0..1 of this span; raises Cancelled when the person asked to stop."""
+        """Report a fraction 0..1 of this span; raises Cancelled when the user has cancelled."""
         self.check()
         if self.report is not None:
             low, high = self.span
             self.report(self.stage, low + (high - low) * min(max(fraction, 0.0), 1.0), text)
 
     def check(self) -> None:
-        """Raise Cancelled when the person asked to stop; reports nothing."""
+        """Raise Cancelled when the user has cancelled; reports nothing."""
         if self.is_cancelled is not None and self.is_cancelled():
             raise Cancelled(f"{self.stage or 'work'}: cancelled")
 

@@ -1,4 +1,4 @@
-"""Backends by name: "module:Class" strings, loaded on first use, so that importing costs nothing; and where weights lie."""
+"""Registry of backends by name ("module:Class" strings, loaded on first use), and location of their weights."""
 
 import importlib
 import importlib.util
@@ -14,64 +14,64 @@ from r2c2r_core.plugins import Group, added
 T = TypeVar("T")
 
 LicenceClass = Literal["open", "restricted"]  # restricted: gated, non-commercial, or bound to a field of use
-MODEL_FILES = ("config.json", "*.safetensors")  # how transformers keeps a model
+MODEL_FILES = ("config.json", "*.safetensors")  # the files of a transformers model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
-    """What a learned backend loads: a folder or a hub id that the person names, else the usual id."""
+    """Weights of a learned backend: a folder or a hub id named by the user, else the default id."""
 
     usual: str  # a hub id
-    variable: str  # of the environment; names a folder or another hub id
-    gated: bool = False  # the hub asks to accept a licence first
-    holds: tuple[str, ...] = MODEL_FILES  # patterns of files that make a folder such a model
+    variable: str  # environment variable that names a folder or another hub id
+    gated: bool = False  # the hub requires accepting a licence first
+    holds: tuple[str, ...] = MODEL_FILES  # patterns of files that identify such a model's folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Backend:
-    """One line of a stage's table."""
+    """One row of a stage's table of backends."""
 
     name: str
     target: str  # "module:Class"
     extra: str | None = None  # the extra of pyproject.toml that brings its libraries
     needs: tuple[str, ...] = ()  # modules that must be importable
-    install: str = ""  # how to get them where no extra and no plain name does
+    install: str = ""  # how to install them where neither an extra nor a plain name suffices
     weights: Weights | None = None
-    server: str = ""  # variable of the environment that names its server, where it works elsewhere
+    server: str = ""  # environment variable that names its server, for a remote backend
     licence: str = "Apache-2.0 (this project)"
     licence_class: LicenceClass = "open"
     summary: str = ""
 
     @property
     def alone(self) -> bool:
-        """Whether one process has to do all: each would load the weights again, or wait for the same server."""
+        """Whether a single process must do all the work, as each would load the weights or wait for the same server."""
         return self.weights is not None or bool(self.server)
 
 
 @dataclass(frozen=True, slots=True)
 class Registry(Generic[T]):
-    """The backends of one seam, all of them a T; the first one needs no extra and is the default."""
+    """The backends of one seam, all of type T; the first needs no extra and is the default."""
 
     seam: str
     own: tuple[Backend, ...]
-    protocol: type = object  # T at run time: what a backend has to offer; its abstract methods are asked for
-    setting: str = "segment.weights"  # where a configuration names the weights
+    protocol: type = object  # T at run time; a backend must have its abstract methods
+    setting: str = "segment.weights"  # the setting that names the weights
     group: Group | None = None  # of entry points, by which other packages add to it
 
     @property
     def backends(self) -> tuple[Backend, ...]:
-        """The project's own, then those that other packages add; a name that is taken stays whose it is."""
+        """The project's own backends, then those of other packages; an added one cannot replace an existing name."""
         taken = {backend.name for backend in self.own}
         further = added(self.group, Backend) if self.group is not None else ()
         return (*self.own, *(backend for backend in further if backend.name not in taken))
 
     @property
     def default(self) -> str:
-        """Name of the backend used when nobody chose one."""
+        """Name of the backend used by default."""
         return self.own[0].name
 
     def get(self, name: str) -> Backend:
-        """The table's line called `name`; raises InputError naming the choices."""
+        """The backend called `name`; raises InputError naming the choices."""
         for backend in self.backends:
             if backend.name == name:
                 return backend
@@ -120,7 +120,7 @@ class Registry(Generic[T]):
     def load(self, name: str, **options: Any) -> T:
         """A new instance of the backend; raises BackendUnavailable with the extra to install or the weights to fetch.
 
-        A backend with weights takes their folder as `weights`. One that is not what the seam asks for is refused here.
+        A backend with weights gets their folder as `weights`. One that does not satisfy the seam's protocol is refused here.
         """
         folder = self.require(name, options.pop("weights", ""))
         if folder is not None:
@@ -128,7 +128,7 @@ class Registry(Generic[T]):
         return self._class_of(name)(**options)
 
     def _class_of(self, name: str) -> Callable[..., T]:
-        """What the backend's line names, if it has every method of the protocol."""
+        """The backend's class, checked to have every method of the protocol; raises BackendUnavailable."""
         target = self.get(name).target
         module_name, _, class_name = target.partition(":")
         found = getattr(importlib.import_module(module_name), class_name, None)
@@ -158,7 +158,7 @@ def find_weights(named: str, holds: tuple[str, ...] = MODEL_FILES) -> Path | Non
 
 
 def hub_cache() -> Path:
-    """Where Hugging Face's tools keep what they downloaded (HF_HUB_CACHE, HF_HOME, else the user's cache folder)."""
+    """Download cache of Hugging Face's tools (HF_HUB_CACHE, HF_HOME, else the user's cache folder)."""
     home = os.environ.get("HF_HOME") or Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "huggingface"
     return Path(os.environ.get("HF_HUB_CACHE") or Path(home) / "hub").expanduser()
 

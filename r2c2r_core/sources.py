@@ -1,4 +1,4 @@
-"""The version of code: digests of its source, so that nothing computed by other code is used again."""
+"""Source digests as code versions, so that results of other code versions are not reused."""
 
 import hashlib
 from functools import cache
@@ -19,14 +19,14 @@ _ADDED_TO: dict[str, Group] = {
 
 
 def source_key(*rooms: str) -> str:
-    """A digest of every file of these packages of the core, and of the plug-ins that add to them."""
+    """Digest of all files of these core packages, and of the plug-ins that add to them."""
     further = [key for room in rooms if (key := plugin_key(_ADDED_TO[room]) if room in _ADDED_TO else "")]
     return hashlib.sha256("".join((_own_key(rooms), *further)).encode()).hexdigest()[:16] if further else _own_key(rooms)
 
 
 @cache
 def _own_key(rooms: tuple[str, ...]) -> str:
-    """A digest of every file of these packages: code, and what it copies into a bundle."""
+    """Digest of all files of these packages: code, and files copied into a bundle."""
     package = Path(__file__).parent
     digest = hashlib.sha256()
     for folder in rooms:
@@ -36,6 +36,6 @@ def _own_key(rooms: tuple[str, ...]) -> str:
 
 
 def source_files(package: Path) -> list[Path]:
-    """The files of a package, what the interpreter compiled and what an editor hides aside."""
+    """The files of a package, except compiled and hidden ones."""
     files = (path for path in package.rglob("*") if path.is_file())
     return sorted(p for p in files if not any(part[0] == "." or part == "__pycache__" for part in p.relative_to(package).parts))

@@ -1,4 +1,4 @@
-"""What the command line prints: progress on stderr, tables."""
+"""Command-line output: progress on stderr, tables, certificates."""
 
 import contextlib
 import math
@@ -16,7 +16,7 @@ from r2c2r_core.texts import shown
 
 @contextlib.contextmanager
 def show_progress() -> Iterator[Progress]:
-    """A live line on a terminal; one line per step when piped."""
+    """Progress display: a live line on a terminal, one line per step when piped."""
     reporter = _Live() if sys.stderr.isatty() else _Lines()
     try:
         yield Progress(reporter.report)
@@ -25,7 +25,7 @@ def show_progress() -> Iterator[Progress]:
 
 
 def table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Aligned plain-text columns; what a terminal would obey is shown instead."""
+    """Aligned plain-text columns, with control characters escaped."""
     cells = [[" ".join(shown(cell).split("\n")) for cell in row] for row in [titles, *rows]]
     widths = [max(len(row[k]) for row in cells) for k in range(len(titles))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells]
@@ -33,7 +33,7 @@ def table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def certificate_text(certificate: Certificate) -> str:
-    """The certificate for a person at a terminal."""
+    """The certificate as text for a terminal."""
     joints = [(j.joint, f"{1000 * j.deepest_penetration_m:.2f}", f"{100 * j.travel_reached:.0f}") for j in certificate.joints]
     lines = [
         table(("joint", "deepest mm", "travel %"), joints) if joints else "no joints",
@@ -48,7 +48,7 @@ def certificate_text(certificate: Certificate) -> str:
 
 
 def verdict(certificate: Certificate) -> str:
-    """Both verdicts in a line: whether the scene moves as it should, and whether it looks like what was filmed."""
+    """Both verdicts in a line: simulation, and likeness to the recording."""
     likeness = certificate.likeness
     look_at = f" (look at {', '.join(name for name, _ in likeness.doubts)})" if likeness.doubts else ""
     state = "FAILED" if likeness.state == "failed" else likeness.state
@@ -56,19 +56,19 @@ def verdict(certificate: Certificate) -> str:
 
 
 def _speed(loader: LoaderResult) -> str:
-    """How many steps a second it took here, in one world and in many at once."""
+    """Step rates measured here, for one world and for many in parallel."""
     return "".join(f"; {speed:.0f} steps/s in {worlds} world{'s' * (worlds > 1)}" for worlds, speed in loader.steps_per_s)
 
 
 def gripper_text(certificate: GripperCertificate) -> str:
-    """The gripper's certificate for a person at a terminal."""
+    """The gripper's certificate as text for a terminal."""
     (opened, joints), (moved, things) = certificate.share("joint"), certificate.share("thing")
     said = f"the gripper opens and closes {opened} of {joints} joints and moves {moved} of {things} free things"
     return shown("\n".join([*_grips("gripper at", certificate.grips), said]))
 
 
 def arm_text(certificate: ArmCertificate) -> str:
-    """The arm's certificate for a person at a terminal."""
+    """The arm's certificate as text for a terminal."""
     places = [
         f"stand {number} at x {stand.x_m:.1f}, y {stand.y_m:.1f} m, lifted {stand.lift_m:.1f} m, for {', '.join(joints)}"
         for number, (stand, joints) in enumerate(certificate.places.items(), 1)
@@ -126,7 +126,7 @@ class _Lines:
         self.last = ("", "")
 
     def report(self, stage: str, fraction: float, text: str) -> None:
-        step = (stage, text.rstrip("0123456789/ "))  # counting up is not a new step
+        step = (stage, text.rstrip("0123456789/ "))  # a changed count is not a new step
         if step != self.last:
             self.last = step
             sys.stderr.write(f"{stage} {100 * fraction:.0f} % {shown(text)}".rstrip() + "\n")

@@ -1,7 +1,7 @@
-"""Text of others: what in it a terminal, a page or a file name would obey instead of show.
+"""Sanitising of untrusted text: escaping of control characters, and valid object names.
 
-Control characters (C0 without tab and new line, C1), overrides of the writing direction (bidirectional embeddings,
-overrides and isolates: Unicode TR 9, 2.1-2.5) and lone surrogates, which no file or database can hold.
+Escaped are control characters (C0 without tab and new line, C1), bidirectional controls (embeddings, overrides and
+isolates: Unicode TR 9, 2.1-2.5) and lone surrogates, which no file or database can store.
 """
 
 import re
@@ -10,15 +10,15 @@ OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud80
 
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-"""A name that every format takes: USD prims, and Isaac's importers, refuse a leading digit, the others any other character."""
+"""A name valid in every format: USD prims and Isaac's importers refuse a leading digit, the others any other character."""
 
 
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[0-9]|lpt[0-9])")
-"""What Windows keeps for devices: it unpacks no folder of that name, and an object's files lie in one of its own."""
+"""Device names reserved by Windows, which unpacks no folder of that name, while each object's files lie in its own folder."""
 
 
 def name_fault(text: str) -> str:
-    """What keeps an object from being called that in every format and file system, after "it"; empty: nothing."""
+    """Reason why an object's name is invalid in some format or file system, as a phrase after "it"; empty if it is valid."""
     if DEVICE.fullmatch(text):
         return "is a device of Windows, which unpacks no folder of that name"
     if text[:1].isdecimal():
@@ -27,11 +27,11 @@ def name_fault(text: str) -> str:
 
 
 def identifier(text: str) -> str:
-    """An object's name made of a text; "object" where nothing of it can stay."""
+    """A valid object name made from a text; "object" where no character remains."""
     plain = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_") or "object"
     return f"item_{plain}" if name_fault(plain) else plain
 
 
 def shown(text: str) -> str:
-    """The text with the code of each such character in its place."""
+    """The text with each such character replaced by its escaped code."""
     return OBEYED.sub(lambda found: f"\\u{ord(found.group()):04x}", text)

@@ -1,4 +1,4 @@
-"""The same work on many items, on all cores of this process: numpy, OpenCV and whoever waits leave the interpreter free."""
+"""Parallel map on threads, since numpy, OpenCV and blocking calls release the GIL."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -11,13 +11,13 @@ A = TypeVar("A")
 B = TypeVar("B")
 
 
-_AHEAD = 2  # results a thread that wait for the caller, at most: each may be megabytes
+_AHEAD = 2  # maximum pending results per thread, as each may be megabytes
 
 
 def in_threads(work: Callable[[A], B], items: Iterable[A]) -> Iterator[B]:
-    """The results in order; what is not begun is dropped when the caller stops asking.
+    """The results in order; tasks not yet started are cancelled when the caller stops iterating.
 
-    Tuned numbers hold in the threads as they do here.
+    The threads use the caller's tuned numbers.
     """
     context = copy_context()
     threads = min(4, cpu_count() or 1)

@@ -14,7 +14,7 @@ import sys
 import traceback
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on small matrices its threads double the CPU bill
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: on small matrices its threads double the CPU time
 
 from r2c2r_core.config import config_from
 from r2c2r_core.disk import resolved
@@ -57,7 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
         met = memory_met() if isinstance(error, MemoryError) else _system_said(error)
         _say(error={"kind": type(met).__name__, "message": met.message, "hint": met.hint})
         return met.exit_code
-    except Exception as error:  # the edge of a job: the traceback goes to the log, one line to the person
+    except Exception as error:  # the edge of a job: the traceback goes to the log, one line to the user
         traceback.print_exc(file=sys.stderr)
         _say(error={"kind": type(error).__name__, "message": f"unexpected: {error}", "hint": "see the job's log"})
         return 1
@@ -72,7 +72,7 @@ def _system_said(error: OSError) -> EnvironmentProblem:
 
 
 def read_request(path: Path) -> Request:
-    """The request in a file; source, prompts and overrides may be relative to its folder."""
+    """The request read from a file; source, prompts and overrides may be relative to its folder."""
     hint = 'expected {"source": …, "prompts": …}'
     request = checked(RequestFile, read_json(path, hint=hint), str(path), InputError, hint=hint)
     overrides = path.parent / request.overrides

@@ -1,14 +1,14 @@
-"""A reconstruction on disk: where each noun lies, under which key, and whether it can be used again.
+"""A reconstruction on disk: location and key of each noun, and whether it can be reused.
 
 WORKDIR/
-├── capture/<key>/                               frames, normalised (ingest/store.py); the key says what they were read from
-├── cache/                                       what a segmenter prepared
+├── capture/<key>/                               frames, normalised (ingest/store.py); the key identifies their source
+├── cache/                                       a segmenter's prepared data
 ├── nouns/<stage>/<name>.noun                    one file per stage and object, written atomically
-├── seconds.json                                 what each stage took
+├── seconds.json                                 duration of each stage
 └── bundle.zip                                   the result
 
 A noun's key is the hash of its stage's version and configuration and of its inputs' keys, so a changed setting or click
-re-runs exactly what depends on it, and a crash resumes where it stopped.
+re-runs exactly its dependents, and a run resumes where a crash stopped it.
 """
 
 import contextlib
@@ -38,30 +38,30 @@ _UNREADABLE = (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile)
 
 
 class Workspace:
-    """The folder of one reconstruction, made by what is first written to it: who only looks makes none."""
+    """The folder of one reconstruction, created by the first write, not by reading."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        self.computed: list[str] = []  # "stage/name" of what this process computed rather than found
+        self.computed: list[str] = []  # "stage/name" of nouns computed by this process rather than loaded
 
     def store(self, key: str) -> Path:
-        """Folder of the normalised frames that were read with this key."""
+        """Folder of the normalised frames with this key."""
         return self.root / "capture" / key
 
     @property
     def frames(self) -> Path:
-        """Folder of the frames of the capture stored last."""
+        """Folder of the frames of the last stored capture."""
         return frames_folder(self.root)
 
     def keep_frames(self, key: str) -> None:
-        """Drop the frames of every other reading: no noun stands for them any more."""
+        """Delete the frames of all other keys, which no noun refers to any more."""
         for path in self.store("").iterdir():
             if path.name != key:
                 shutil.rmtree(path, ignore_errors=True)
 
     @property
     def cache(self) -> Path:
-        """Folder a segmenter may use for what it prepared."""
+        """Cache folder of a segmenter."""
         return self.root / "cache"
 
     @property
@@ -70,11 +70,11 @@ class Workspace:
         return self.root / "bundle.zip"
 
     def keep_seconds(self, seconds: Mapping[str, float]) -> None:
-        """Store what each stage took: here and not in the bundle, whose bytes depend on its inputs alone."""
+        """Store the duration of each stage, here and not in the bundle, whose bytes depend on its inputs only."""
         write_atomically(self.root / "seconds.json", json.dumps({k: round(v, 3) for k, v in seconds.items()}).encode())
 
     def seconds(self) -> dict[str, float]:
-        """What each stage of the last finished run took; empty where none did."""
+        """Duration of each stage of the last finished run; empty without one."""
         try:
             return {str(stage): float(taken) for stage, taken in json.loads((self.root / "seconds.json").read_bytes()).items()}
         except (OSError, ValueError, TypeError, AttributeError):
@@ -85,7 +85,7 @@ class Workspace:
         return noun_path(self.root, stage, name)
 
     def once(self, stage: str, name: str, key: str, compute: Callable[[], T]) -> tuple[T, float]:
-        """The stored noun when its key matches, else the computed one, stored; with the seconds its computation took."""
+        """The stored noun if its key matches, else computed and stored; with the seconds its computation took."""
         found = self.find(stage, name, key)
         if found is not None:
             return found
@@ -97,7 +97,7 @@ class Workspace:
         return noun, seconds
 
     def find(self, stage: str, name: str, key: str) -> tuple[Any, float] | None:
-        """The stored noun and its seconds, when its key matches; one that is damaged, or lacks a frame, counts as absent."""
+        """The stored noun and its seconds if its key matches; a damaged one, or one that lacks a frame, counts as absent."""
         path = self.noun_path(stage, name)
         try:
             if decode_header(path)["key"] != key:
@@ -108,7 +108,7 @@ class Workspace:
             return None
 
     def load_latest(self, stage: str, name: str) -> Any | None:
-        """The stored noun whatever its key (for looking at, never for computing on); None when there is none."""
+        """The stored noun regardless of its key (for display, never for computation); None without one."""
         path = self.noun_path(stage, name)
         try:
             noun, header = decode_noun(path.read_bytes())
@@ -117,14 +117,14 @@ class Workspace:
         return self._attached(noun, header)
 
     def load_bare(self, stage: str, name: str) -> Any | None:
-        """`load_latest` without a capture's images: its cameras alone need none of what reads those."""
+        """`load_latest` without a capture's images, for code that needs only its cameras."""
         try:
             return decode_noun(self.noun_path(stage, name).read_bytes())[0]
         except _UNREADABLE:
             return None
 
     def names(self, stage: str) -> list[str]:
-        """Names of the objects a stage has stored nouns of; a name with a hyphen is of what it made for all of them."""
+        """Names of the objects with stored nouns of a stage; names with a hyphen are results for all objects, and omitted."""
         return sorted(path.stem for path in (self.root / "nouns" / stage).glob("*.noun") if "-" not in path.stem)
 
     def save(self, stage: str, name: str, noun: object, header: dict[str, Any]) -> None:
@@ -135,14 +135,14 @@ class Workspace:
         write_atomically(self.noun_path(stage, name), encode_noun(noun, header))
 
     def forget(self, stage: str, name: str) -> None:
-        """Drop a stored noun, so that it is computed again."""
+        """Delete a stored noun, so that it is computed again."""
         self.noun_path(stage, name).unlink(missing_ok=True)
 
     @contextlib.contextmanager
     def locked(self, parts: Collection[str] = ()) -> Iterator[None]:
-        """Hold the workspace against a second run, or these parts of it ("stage/name"), beside whom others may hold others.
+        """Lock the workspace, or only these parts of it ("stage/name"), while other processes may lock other parts.
 
-        Raises EnvironmentProblem when another process is at work on it, or on one of the parts.
+        Raises EnvironmentProblem when another process has locked it, or one of the parts.
         """
         with explained_io(self.root), contextlib.ExitStack() as opened:
             self.root.mkdir(parents=True, exist_ok=True)
@@ -169,17 +169,17 @@ class Workspace:
 
 
 def _byte_of(part: str) -> int:
-    """The byte of the file of locks that stands for the part; none has to be there."""
+    """Byte offset in the lock file that represents the part; it need not exist."""
     return int.from_bytes(hashlib.sha256(part.encode()).digest()[:7])
 
 
 def noun_path(root: Path, stage: str, name: str) -> Path:
-    """File of one noun below a workspace, which need not be there."""
+    """File of one noun below a workspace; it need not exist."""
     return root.joinpath("nouns", stage, f"{name}.noun")
 
 
 def frames_folder(root: Path) -> Path:
-    """Folder of the frames of the capture stored last below a workspace; `capture` itself where none is stored."""
+    """Folder of the frames of the last stored capture below a workspace; `capture` itself without one."""
     try:
         header = decode_header(noun_path(root, "ingest", "scene"))
     except _UNREADABLE:
@@ -188,7 +188,7 @@ def frames_folder(root: Path) -> Path:
 
 
 def content_key(*parts: object) -> str:
-    """A short hash of configurations, inputs and other keys; equal parts give equal keys."""
+    """Short hash of configurations, inputs and other keys; equal parts give equal keys."""
     return hashlib.sha256(json.dumps(_plain(parts), sort_keys=True).encode()).hexdigest()[:32]
 
 
@@ -202,9 +202,9 @@ def file_key(path: Path) -> str:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that readers see the old one or the new one, never half of it.
+    """Write a file atomically, so that readers see either the old or the new content.
 
-    Threads and processes may write the same file at once: the last one stays.
+    Threads and processes may write the same file at once: the last one wins.
     """
     with explained_io(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -212,7 +212,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Write a file into a folder that is there, as write_atomically does; raises OSError."""
+    """Write a file atomically into an existing folder; raises OSError."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.tmp")
     try:
         temporary.write_bytes(content)
@@ -222,7 +222,7 @@ def replace_file(path: Path, content: bytes) -> None:
 
 
 def _plain(value: Any) -> Any:
-    if value is None or type(value) in (str, int, float, bool):  # most of what is asked; a subclass may be NumPy's
+    if value is None or type(value) in (str, int, float, bool):  # the most common types; a subclass may be NumPy's
         return value
     if is_dataclass(value) and not isinstance(value, type):
         return _plain(asdict(value))
@@ -230,7 +230,7 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, np.generic):
         return value.item()
-    if isinstance(value, bytes):  # a packed mask's
+    if isinstance(value, bytes):  # of a packed mask
         return hashlib.sha256(value).hexdigest()
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
