@@ -1,4 +1,4 @@
-"""Archives that people send: looked at before anything in them is believed. Nothing is ever unpacked onto the disk."""
+"""Validation of uploaded archives before they are read. Nothing is unpacked to disk."""
 
 import stat
 import zipfile
@@ -65,7 +65,7 @@ def _refuse_unsafe(members: list[zipfile.ZipInfo], packed: int, max_bytes: int, 
 
 
 def _refuse_two_of_a_name(members: list[zipfile.ZipInfo]) -> None:
-    """Two files of one name: readers differ in which of them they take."""
+    """Refuse two files with the same name, as readers differ in which one they use."""
     seen: set[str] = set()
     for member in members:
         if member.filename in seen:
@@ -74,7 +74,7 @@ def _refuse_two_of_a_name(members: list[zipfile.ZipInfo]) -> None:
 
 
 def _refuse_large_directory(path: Path, max_files: int) -> None:
-    """Look at the end record by hand: parsing a hostile table of contents costs memory before it can be refused."""
+    """Check the end record by hand, as parsing a hostile table of contents costs memory before it can be refused."""
     size = path.stat().st_size
     with path.open("rb") as handle:
         handle.seek(max(size - 66_000, 0))
@@ -94,11 +94,11 @@ def _refuse_large_directory(path: Path, max_files: int) -> None:
 
 
 def entries_at_most(path: Path, start: int) -> int:
-    """How many entries a table of contents in the file's bytes from `start` on can have: each begins with its mark."""
+    """Upper bound on the entries of a table of contents in the file from byte `start`, by counting entry signatures."""
     mark, found, kept = b"PK\x01\x02", 0, b""
     with path.open("rb") as handle:
         handle.seek(start)
         while piece := handle.read(READ_BYTES):
             found += (kept + piece).count(mark)
-            kept = (kept + piece)[-3:]  # a mark that is cut in two; too short for one that was counted
+            kept = (kept + piece)[-3:]  # a signature split between pieces; too short to contain a counted one
     return found

@@ -1,4 +1,4 @@
-"""`r2c2r backup` and `r2c2r restore`: the data folder carried away, and back.
+"""`r2c2r backup` and `r2c2r restore`: copies of the data folder.
 
 A backup is one database file, or a folder with that file and the projects' files. Neither command deletes anything.
 """
@@ -18,12 +18,12 @@ from r2c2r_core.disk import keep_private, resolved
 from r2c2r_core.errors import InputError
 from r2c2r_core.progress import SILENT, Progress
 
-LEFT_OUT = {"previews"}  # of a project's folder: made again when somebody looks
+LEFT_OUT = {"previews"}  # subfolders of a project: recreated on demand
 
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """What a backup or a restore moved."""
+    """Amounts copied by a backup or a restore."""
 
     database_bytes: int
     projects: int
@@ -48,16 +48,16 @@ def backup(data_dir: Path, target: Path, *, progress: Progress = SILENT) -> Move
         copy_rows(settings, target)
         return Moved(target.stat().st_size, 0, 0, 0)
     part = target.with_name(f".{target.name}.part")
-    copy_rows(settings, part / DATABASE)  # first: what it names is there, for files come before their rows
+    copy_rows(settings, part / DATABASE)  # first: files are written before their rows, so all files named in it exist
     moved = _copy_missing(_projects(settings), part / "projects", files, progress.part(0.1, 1.0))
     part.rename(target)
     return Moved((target / DATABASE).stat().st_size, *moved)
 
 
 def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> Moved:
-    """Put a backup's database in place, and those of its files that are missing; what is there stays.
+    """Replace the database by a backup's, and add missing files; existing files are kept.
 
-    The database that was there is kept in backups/. Raises EnvironmentProblem while a server runs on the folder.
+    The replaced database is kept in backups/. Raises EnvironmentProblem while a server runs on the folder.
     """
     settings, source = Settings(data_dir=resolved(data_dir)), source.expanduser().absolute()
     database = source / DATABASE if source.is_dir() else source
@@ -84,7 +84,7 @@ def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> Mov
 
 
 def _require_rows(settings: Settings) -> int:
-    """Bytes that the database file takes, 0 for a Postgres; raises InputError where there is none."""
+    """Size of the database file in bytes, 0 for a Postgres; raises InputError where there is none."""
     if settings.postgres:
         return 0
     if not settings.database.is_file():
@@ -98,7 +98,7 @@ def _projects(settings: Settings) -> Path:
 
 
 def _keep_replaced(settings: Settings) -> None:
-    """Move the database away with what SQLite keeps beside it: damaged or not, somebody may want to look into it."""
+    """Move the database away with SQLite's companion files, as even a damaged one may be needed later."""
     kept = settings.data_dir / "backups" / f"replaced-{time.strftime('%Y%m%d-%H%M%S')}"
     for path in settings.data_dir.glob(f"{DATABASE}*"):
         kept.mkdir(parents=True, exist_ok=True)
@@ -106,7 +106,7 @@ def _keep_replaced(settings: Settings) -> None:
 
 
 def _copy_missing(source: Path, target: Path, there: int, progress: Progress) -> tuple[int, int, int]:
-    """Copy files that are not there, of `there` bytes in all; of how many projects, how many they are, and their bytes."""
+    """Copy missing files from `there` bytes in total; returns numbers of projects and files, and bytes copied."""
     projects, files, size = set(), 0, 0
     for path in source.rglob("*"):
         progress.at(size / max(there, 1), f"copying files {files}")
@@ -118,7 +118,7 @@ def _copy_missing(source: Path, target: Path, there: int, progress: Progress) ->
         place.parent.mkdir(parents=True, exist_ok=True)
         try:
             shutil.copy2(path, part)
-        except FileNotFoundError:  # the server works meanwhile: it was replaced or deleted
+        except FileNotFoundError:  # replaced or deleted by the running server
             continue
         part.rename(place)
         projects.add(parts[0])

@@ -1,4 +1,4 @@
-"""`r2c2r check-data`: whether the database and the files agree, both ways, and who may read them."""
+"""`r2c2r check-data`: consistency of the database and the files in both directions, and file permissions."""
 
 import hashlib
 import tempfile
@@ -24,14 +24,14 @@ from r2c2r_core.progress import SILENT, Progress
 
 @dataclass(frozen=True, slots=True)
 class DataFinding:
-    """One thing that is not as it should be."""
+    """One inconsistency of the data folder."""
 
     what: str  # damaged | missing | unknown | outdated | open
     where: str
     detail: str
 
     def to_json(self) -> dict[str, str]:
-        """As a JSON table."""
+        """The finding as a JSON object."""
         return asdict(self)
 
 
@@ -41,7 +41,7 @@ def check_data(data_dir: Path, *, progress: Progress = SILENT) -> list[DataFindi
     Raises InputError where there is no data folder or no database in it, DatabaseUnusable for one that cannot be read.
     """
     settings = Settings(data_dir=resolved(data_dir))
-    if settings.postgres:  # a file beside it would be of before the rows were moved
+    if settings.postgres:  # a file beside it would predate the move of the rows
         raise InputError("the rows are in a Postgres, and check-data looks into a file", hint="r2c2r db check")
     if not settings.data_dir.is_dir():
         raise InputError(f"{data_dir}: no such folder", hint="name the data folder")
@@ -61,7 +61,7 @@ def check_data(data_dir: Path, *, progress: Progress = SILENT) -> list[DataFindi
 
 @contextmanager
 def _newest_tables(database: Path, revision: str) -> Iterator[Path]:
-    """The database itself, or where it is of an older revision a copy of it that was brought to the newest."""
+    """The database itself, or for an older revision a migrated copy."""
     if revision == revisions()[-1]:
         yield database
         return
@@ -98,7 +98,7 @@ def _damage(database: Path) -> Iterator[DataFinding]:
 
 
 def _missing(session: Session, settings: Settings, progress: Progress) -> Iterator[DataFinding]:
-    """Files that rows tell of and that are not there, or are not what the rows say."""
+    """Findings on files named in rows that are missing or differ."""
     for project in progress.each(session.exec(select(Project)).all(), "files of project"):
         files = project_files(settings.data_dir, project.id, project.work_path)
         named = [("recording", Path(project.source_path))] if project.source_path else []
@@ -142,7 +142,7 @@ def _description(session: Session, project: Project, files: ProjectFiles) -> Ite
 
 
 def _unknown(session: Session, settings: Settings) -> Iterator[DataFinding]:
-    """Files that no row tells of."""
+    """Findings on files that no row names."""
     projects, uploads = set(session.exec(select(Project.id))), set(session.exec(select(Upload.id)))
     for folder in (settings.data_dir / "projects").glob("*"):
         half_made = project_files(settings.data_dir, folder.name).half_made

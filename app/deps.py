@@ -1,4 +1,4 @@
-"""What a route is given: the running app as the person who asks may use it. The type says which role a route needs."""
+"""FastAPI dependencies: the running app, with the role that a route needs in the type."""
 
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
@@ -12,7 +12,7 @@ from app.services.context import Context
 
 
 def context_for(role: Role) -> Callable[[Request], Awaitable[Context]]:
-    """The running app's engine, queue and viewer, for someone of that role; Forbidden for anyone less."""
+    """Dependency on the running app for users with at least that role; Forbidden for others."""
 
     async def get_context(request: Request) -> Context:
         context: Context = replace(request.app.state.context, person=request.state.person)
@@ -24,7 +24,7 @@ def context_for(role: Role) -> Callable[[Request], Awaitable[Context]]:
 
 
 async def running_app(request: Request) -> Context:
-    """The running app, for someone who has not signed in."""
+    """The running app, without sign-in."""
     context: Context = request.app.state.context
     return context
 

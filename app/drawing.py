@@ -1,4 +1,4 @@
-"""Pictures of a mesh for a person's eyes, drawn without a graphics card."""
+"""CPU renderings of a mesh for display."""
 
 from collections.abc import Callable
 
@@ -12,19 +12,19 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.mesh import TexturedMesh
 
 SIZE = 320
-TURNS = 24  # pictures of a turntable, side by side from left to right
+TURNS = 24  # number of turntable pictures, side by side from left to right
 TURN_SIZE = 240
-_MARK, _FADED = np.array([235.0, 95.0, 20.0]), 0.2  # RGB of what differs, and how much of its own colour shows through
+_MARK, _FADED = np.array([235.0, 95.0, 20.0]), 0.2  # RGB of marked points, and the fraction of their own colour kept
 _AZIMUTH, _ELEVATION = np.deg2rad(-30.0), np.deg2rad(20.0)
 
 
 def mesh_picture(mesh: TexturedMesh, rotation: Matrix3) -> bytes:
-    """The mesh as a PNG with a transparent ground, every candidate from the same side and distance."""
+    """PNG of the mesh on a transparent background, from the same side and distance for every candidate."""
     return cv2.imencode(".png", _drawn(mesh, mesh.vertices @ rotation.T, 0.0, SIZE))[1].tobytes()
 
 
 def turntable(mesh: TexturedMesh, rotation: Matrix3, marked: Callable[[Points], Mask] | None = None) -> bytes:
-    """The mesh from `TURNS` sides, turned about its upright axis; points (n, 3) that are `marked` are in another colour."""
+    """PNG of the mesh from `TURNS` sides about its upright axis; points (n, 3) that are `marked` have another colour."""
     upright_points = mesh.vertices @ rotation.T
     sides = [_drawn(mesh, upright_points, 2 * np.pi * k / TURNS, TURN_SIZE, marked) for k in range(TURNS)]
     return cv2.imencode(".png", np.hstack(sides))[1].tobytes()
@@ -33,7 +33,7 @@ def turntable(mesh: TexturedMesh, rotation: Matrix3, marked: Callable[[Points], 
 def _drawn(
     mesh: TexturedMesh, points: Points, turn_rad: float, size: int, marked: Callable[[Points], Mask] | None = None
 ) -> np.ndarray:
-    """BGRA (size, size, 4) of an upright mesh, turned."""
+    """BGRA (size, size, 4) of an upright mesh, rotated by `turn_rad`."""
     around = Rigid3(cv2.Rodrigues(np.array([0.0, 0.0, turn_rad]))[0])
     vertices = around.apply(unit(points))
     camera = Intrinsics(fx=1.9 * size, fy=1.9 * size, cx=size / 2, cy=size / 2, width=size, height=size)
@@ -60,7 +60,7 @@ def _camera_from_world() -> Rigid3:
 
 
 def _shading(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
-    """Light from the camera, so that shape shows on plain textures."""
+    """Headlight shading, which shows shape on plain textures."""
     dy, dx = np.gradient(np.where(depth > 0, depth, np.nan))
     scale = camera.fx / np.where(depth > 0, depth, 1.0)
     cosine = 1.0 / np.sqrt(1.0 + (dx * scale) ** 2 + (dy * scale) ** 2)
@@ -76,7 +76,7 @@ def textured(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
 
 
 def unit(vertices: np.ndarray) -> np.ndarray:
-    """Centred, with a bounding sphere of radius 1."""
+    """Vertices centred and scaled to a bounding sphere of radius 1."""
     centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     moved = vertices - centre
     return np.asarray(moved / max(float(np.linalg.norm(moved, axis=1).max()), 1e-9))

@@ -1,4 +1,4 @@
-"""Every failure of the web app, and the one place where a failure becomes {kind, message, hint} and a status.
+"""Exception hierarchy of the web app, and its mapping to {kind, message, hint} and HTTP status.
 
 R2C2RError (r2c2r_core.errors)
 ├── AppError
@@ -106,22 +106,22 @@ def kind_of(error: core.R2C2RError) -> tuple[str, int]:
 
 
 def body(kind: str, message: str, hint: str = "", current: Any = None) -> dict[str, Any]:
-    """The one shape of an error."""
+    """The JSON shape of all errors."""
     return {"kind": kind, "message": message, "hint": hint, "current": current}
 
 
 def error_body(error: core.R2C2RError) -> dict[str, Any]:
-    """The error as the API says it."""
+    """The error as an API response body."""
     return body(kind_of(error)[0], error.message, error.hint, getattr(error, "current", None))
 
 
 def told(error: core.R2C2RError) -> dict[str, str]:
-    """The error as one process tells it to another, in JSON."""
+    """The error as JSON for another process."""
     return {"kind": type(error).__name__, "message": error.message, "hint": error.hint}
 
 
 def told_body(told: dict[str, Any]) -> dict[str, Any]:
-    """What another process told of its failure, as the API says it: class names become kinds."""
+    """API response body for an error from another process, with class names mapped to kinds."""
     by_class = {cls.__name__: kind for cls, kind, _ in KINDS}
     kind = str(told.get("kind", "error"))
     known = by_class.get(kind, kind if kind.islower() else "internal")

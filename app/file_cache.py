@@ -1,4 +1,4 @@
-"""What was made of files, kept while they are as they were: bounded by bytes, for entries may be of any size."""
+"""LRU cache of values derived from files, invalidated by modification time and bounded by bytes."""
 
 import os
 import threading
@@ -11,17 +11,17 @@ T = TypeVar("T")
 
 
 class FileCache(Generic[T]):
-    """Safe to use from any thread; two that ask at once may both make it, and one stays."""
+    """Thread-safe cache; two concurrent callers may both compute a value, of which one is kept."""
 
     def __init__(self, most_bytes: int) -> None:
         self._most_bytes, self._bytes = most_bytes, 0
-        self._kept: OrderedDict[Any, tuple[int, int, T]] = OrderedDict()  # changed, bytes, made; the longest unused first
+        self._kept: OrderedDict[Any, tuple[int, int, T]] = OrderedDict()  # mtime, bytes, value; least recently used first
         self._lock = threading.Lock()
 
     def get(self, path: Path | str, make: Callable[[], T], size_of: Callable[[T, int], int], about: Any = None) -> T | None:
-        """What is made of the file, `about` telling apart several things made of it; None where there is no file.
+        """Value made from the file, with `about` distinguishing several values per file; None where there is no file.
 
-        `size_of` says how many bytes are kept, of what was made and from the size of the file.
+        `size_of` gives the bytes of a value, from it and the size of the file.
         """
         try:
             found = os.stat(path)
@@ -39,7 +39,7 @@ class FileCache(Generic[T]):
 
     @property
     def bytes(self) -> int:
-        """What is kept."""
+        """Size of the cache in bytes."""
         return self._bytes
 
     def _keep(self, key: Any, changed: int, size: int, made: T) -> None:

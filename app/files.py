@@ -1,4 +1,4 @@
-"""Where a project's files are, and names that cannot leave their folder."""
+"""Paths of a project's files, and safe file names."""
 
 import contextlib
 import fcntl
@@ -34,17 +34,17 @@ class ProjectFiles:
 
     @property
     def half_made_mark(self) -> Path:
-        """There while an upload is being made this project: until then the folder is the upload's, and goes with it."""
+        """Marker that exists while an upload becomes this project; until then the folder is deleted with the upload."""
         return self.root / "half-made"
 
     @property
     def half_made(self) -> bool:
-        """Whether the folder is still an upload's."""
+        """Whether the folder still belongs to an upload."""
         return self.half_made_mark.exists() and not self.description.exists()
 
     @property
     def description(self) -> Path:
-        """What the project is (services/descriptions.py): by it the folder is known when the database is lost."""
+        """Description of the project (services/descriptions.py), from which it is restored when the database is lost."""
         return self.root / "project.json"
 
     @property
@@ -54,17 +54,17 @@ class ProjectFiles:
 
     @property
     def arriving(self) -> Path:
-        """The newest frame of a sample that is being rendered; gone with the other previews once it was read."""
+        """The newest frame of a sample that is being rendered; deleted with the other previews once it was read."""
         return self.previews / "arriving.jpg"
 
     @property
     def kept_facts(self) -> Path:
-        """What was read from nouns for the browser; may be deleted at any time."""
+        """Cached facts from nouns for the browser; may be deleted at any time."""
         return self.previews / "facts.json"
 
     @property
     def elevations(self) -> Path:
-        """The planes of the scan as fronts are drawn on them, made by the live segmenter; may be deleted at any time."""
+        """Elevations on which fronts are drawn, made by the live segmenter; may be deleted at any time."""
         return self.previews / "elevations"
 
     @property
@@ -74,12 +74,12 @@ class ProjectFiles:
 
     @property
     def proposals(self) -> Path:
-        """What the segmenter proposed without a click; may be deleted at any time."""
+        """The segmenter's proposals without clicks; may be deleted at any time."""
         return self.root / "proposals.json"
 
     @property
     def uploads(self) -> Path:
-        """Meshes people gave as candidates."""
+        """Meshes uploaded as candidates."""
         return self.root / "uploads"
 
     @property
@@ -98,16 +98,16 @@ class ProjectFiles:
         return self.root / "finished-prompts.json"
 
     def request(self, job_id: int) -> Path:
-        """What a job was given: its request.json, with the clicks and corrections of then beside it."""
+        """A job's request.json, with a copy of its clicks and corrections beside it."""
         return self.requests / str(job_id) / "request.json"
 
     @property
     def requests(self) -> Path:
-        """What its jobs were given, a folder each."""
+        """Requests of its jobs, a folder each."""
         return self.root / "requests"
 
     def here(self, path: str) -> Path:
-        """Where a file is that a machine named by a path of its own: what it had in this project's folder is in this one."""
+        """Local path of a file named by another machine's path: paths in the project's folder are mapped to this folder."""
         _, in_project, below = path.partition(f"/projects/{self.root.name}/")
         return self.root / below if in_project else Path(path)
 
@@ -138,34 +138,34 @@ class ProjectFiles:
 
     @property
     def facts(self) -> Path:
-        """What the recording is (facts.json), written when it was read."""
+        """Facts about the recording (facts.json), written when it was read."""
         return self.root / "facts.json"
 
     @property
     def scan_pictures(self) -> tuple[Path, ...]:
-        """Pictures of the fused scan that there may be."""
+        """Existing pictures of the fused scan."""
         return tuple(self.root.glob("scan-*.png"))
 
 
 @dataclass(frozen=True, slots=True)
 class VariantFiles:
-    """Variants of one bundle that were made together; they are whole once there are facts."""
+    """Variants of one bundle that were made together; complete once facts.json exists."""
 
     folder: Path
 
     @property
     def archive(self) -> Path:
-        """All of them, as `r2c2r vary` makes them."""
+        """Archive of all variants, as made by `r2c2r vary`."""
         return self.folder / "variants.zip"
 
     @property
     def wall(self) -> Path:
-        """The first of them, as a picture."""
+        """Picture of the first variants."""
         return self.folder / "wall.jpg"
 
     @property
     def facts(self) -> Path:
-        """How many of which seed, and what was found of them."""
+        """Facts about the variants: number, seed and test results."""
         return self.folder / "facts.json"
 
 
@@ -176,12 +176,12 @@ def project_files(data_dir: Path, project_id: str, work: str | None = None) -> P
 
 
 def receiving(folder: Path, name: str) -> Path:
-    """Where a file is received that nobody can go on sending: left over, it may go."""
+    """Temporary path of an upload that cannot be resumed; a leftover file may be deleted."""
     return folder / f"{_RECEIVED}{name}"
 
 
 def half_received(path: Path) -> bool:
-    """Whether the file is what such a reception left."""
+    """Whether the file is a leftover of such an upload."""
     return path.name.startswith(_RECEIVED)
 
 
@@ -193,7 +193,7 @@ def safe_name(name: str, fallback: str = "recording") -> str:
 
 
 def free_name(folder: Path, name: str) -> Path:
-    """A path in the folder at which nothing is."""
+    """An unused path in the folder."""
     target, number = folder / name, 1
     while target.exists():
         number += 1
@@ -202,7 +202,7 @@ def free_name(folder: Path, name: str) -> Path:
 
 
 def inside(root: Path, *parts: str) -> Path:
-    """The path below `root`; raises Forbidden when it leads out of it, through `..` or a link."""
+    """The path below `root`; raises Forbidden when it leaves it through `..` or a link."""
     base = root.resolve()
     path = base.joinpath(*parts).resolve()
     if not path.is_relative_to(base):
@@ -243,7 +243,7 @@ def folder_bytes(folder: Path) -> int:
 
 
 def delete_folder(folder: Path) -> int:
-    """Delete the folder, at once for whoever writes to it, and say how many bytes that was."""
+    """Delete the folder, atomically for concurrent writers, and return its size in bytes."""
     freed = folder_bytes(folder)
     if folder.is_symlink():
         folder.unlink()
@@ -256,9 +256,9 @@ def delete_folder(folder: Path) -> int:
 
 @contextlib.contextmanager
 def only_server(data_dir: Path) -> Iterator[Callable[[dict[str, Any]], None]]:
-    """Hold the data folder against a second server: two queues on one table would run jobs twice.
+    """Lock the data folder against a second server, as two queues on one table would run jobs twice.
 
-    Gives what says more about this server to others, beside its process id: see running_server.
+    Yields a function that publishes more about this server than its process id: see running_server.
     """
     with (data_dir / "server.lock").open("a+") as handle:
         try:
@@ -279,7 +279,7 @@ def only_server(data_dir: Path) -> Iterator[Callable[[dict[str, Any]], None]]:
 
 
 def running_server(data_dir: Path) -> dict[str, Any] | None:
-    """What the server that holds the data folder says of itself; None when none does, or it is only starting."""
+    """Information published by the server that has locked the data folder; None without one, or while it is starting."""
     try:
         with (data_dir / "server.lock").open() as handle:
             try:
@@ -296,6 +296,6 @@ def _said_in(handle: IO[str]) -> dict[str, Any]:
     handle.seek(0)
     try:
         said = json.loads(handle.read(10_000))
-    except ValueError:  # it is just being written
+    except ValueError:  # it is being written
         return {}
     return said if isinstance(said, dict) else {}

@@ -1,7 +1,7 @@
-"""Heavy work waits here, not in the threads that requests share: one gate for each kind of it, in threads of its own.
+"""Concurrency limits for heavy requests: one gate per kind of work, with its own threads.
 
-Of one person one piece is done at a time, so that a crowd of one's own keeps nobody else waiting for more than that piece;
-and only so many are taken on, what is beyond them is refused with the time to try again.
+Each user has one task running at a time, so that many requests of one user delay others by at most that task; the number of
+queued tasks per user is limited, and further ones are refused with a retry time.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Result = TypeVar("Result")
 
 @dataclass(slots=True)
 class _Asker:
-    """Who asks: how much of theirs is taken on, and their turn."""
+    """State of one requester: accepted tasks, and a lock for the running one."""
 
     taken: int = 0
     turn: anyio.CapacityLimiter = field(default_factory=lambda: anyio.CapacityLimiter(1))
@@ -28,7 +28,7 @@ class Gate:
     """One kind of heavy work. Used on the event loop."""
 
     def __init__(self, what: str, *, at_once: int, each: int, retry_s: int) -> None:
-        """`what` is said where it is refused; `each` is how much of one asker is taken on, done and waiting."""
+        """`what` appears in refusals; `each` is the limit of one requester's running and waiting tasks."""
         self._what, self._each, self._retry_s = what, each, retry_s
         self._threads = anyio.CapacityLimiter(at_once)
         self._askers: dict[str, _Asker] = {}
@@ -36,7 +36,7 @@ class Gate:
     async def run(
         self, who: str, work: Callable[Arguments, Result], *arguments: Arguments.args, **options: Arguments.kwargs
     ) -> Result:
-        """What `work` returns, from a thread of this gate; raises TooMany for what is beyond the asker's share."""
+        """Run `work` in a thread of this gate and return its result; raises TooMany beyond the requester's limit."""
         self.check(who)
         asker = self._askers.setdefault(who, _Asker())
         asker.taken += 1
@@ -49,7 +49,7 @@ class Gate:
                 del self._askers[who]
 
     def check(self, who: str) -> None:
-        """Raise TooMany when nothing more of the asker is taken on now."""
+        """Raise TooMany when the requester has reached the limit."""
         asker = self._askers.get(who)
         if asker is not None and asker.taken >= self._each:
             raise TooMany(
@@ -61,10 +61,10 @@ class Gate:
 
 @dataclass(frozen=True, slots=True)
 class Gates:
-    """Every kind of heavy work that a request waits for."""
+    """Gates of all kinds of heavy requests."""
 
     looks: Gate = field(default_factory=lambda: Gate("looks at files of yours", at_once=2, each=4, retry_s=10))
     views: Gate = field(default_factory=lambda: Gate("requests of yours to the 3D view", at_once=1, each=4, retry_s=2))
     deletions: Gate = field(default_factory=lambda: Gate("deletions of yours", at_once=1, each=8, retry_s=5))
-    # a hash takes 64 MiB for a moment; an address may be that of everybody behind a proxy
+    # a hash briefly takes 64 MiB; one address may be shared by all users behind a proxy
     passwords: Gate = field(default_factory=lambda: Gate("sign-ins from your address", at_once=2, each=30, retry_s=3))

@@ -1,8 +1,8 @@
-"""What happened, told to every open tab: numbered messages in memory, so that a tab that was away can catch up.
+"""Publish-subscribe hub for browser tabs: numbered messages in memory, so that a reconnecting tab can catch up.
 
-A message is encoded once, in ASCII: whatever is in it, no tab's connection can fail of it. What is kept is bounded by bytes.
-Where several servers share a database each has a hub with numbers of its own: what is published at one is carried to the
-others (app.db.channel), and they `hear` it.
+A message is encoded once, in ASCII, so that its content cannot break a tab's connection. The history is bounded by bytes.
+Where several servers share a database, each has a hub with its own numbers: messages published at one are carried to the
+others (app.db.channel), which `hear` them.
 """
 
 import asyncio
@@ -14,9 +14,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-KEPT_BYTES = 16 * 1024 * 1024  # of messages, for tabs that were away; a mask is some kilobytes
+KEPT_BYTES = 16 * 1024 * 1024  # of messages, for reconnecting tabs; a mask is some kilobytes
 WAITING_BYTES = 8 * 1024 * 1024  # of messages waiting for one tab
-PRESENCE_S = 0.2  # who is here is told at most this often: 300 tabs that come at once are a few messages each
+PRESENCE_S = 0.2  # minimum interval of presence updates: 300 tabs that connect at once get a few messages each
 
 Presences = dict[str, list[dict[str, Any]]]  # by project: its tabs' people
 
@@ -33,20 +33,20 @@ class Message:
 
 @dataclass(eq=False, slots=True)
 class Listener:
-    """One tab. `project` is the one it looks at; messages of other projects reach it only when they are about jobs."""
+    """One tab. `project` is the one it shows; from other projects it gets only messages about jobs."""
 
     loop: asyncio.AbstractEventLoop
     project: str | None = None
-    who: str = ""  # the person; nobody's listener is not shown to others
+    who: str = ""  # the user; an anonymous listener is not shown to others
     page: str = ""
     object: int | None = None  # the one it works on
-    sees: Callable[[str | None], bool] = lambda _: True  # whether its person may see a project
+    sees: Callable[[str | None], bool] = lambda _: True  # whether its user may see a project
     tab: str = field(default_factory=lambda: secrets.token_hex(4))
     queue: "asyncio.Queue[str]" = field(default_factory=asyncio.Queue)
     _waiting: int = 0  # bytes
 
     def take(self, message: Message, epoch: str) -> None:
-        """Queue the message; a tab that does not keep up is told to fetch everything anew instead."""
+        """Queue the message; a tab that falls behind is told to reload everything instead."""
         text = message.text
         if self._waiting + len(text) > WAITING_BYTES:
             while not self.queue.empty():
@@ -57,22 +57,22 @@ class Listener:
         self.queue.put_nowait(text)
 
     async def next(self) -> str:
-        """The message that waits longest."""
+        """The oldest waiting message."""
         text = await self.queue.get()
         self._waiting -= len(text)
         return text
 
     def wants(self, message: Message) -> bool:
-        """Whether this tab shows what the message is about."""
+        """Whether the message concerns this tab's content."""
         shown = message.type in ("job", "projects") or message.project == self.project
         return shown and self.sees(message.project)
 
 
 @dataclass(slots=True)
 class Hub:
-    """Safe to publish to from any thread; tabs join, move and leave on their event loop.
+    """Message hub; publishing is thread-safe, while tabs join, move and leave on their event loop.
 
-    `carry` takes what other servers are to hear: of which kind, and what.
+    `carry` is called with messages for other servers: kind and content.
     """
 
     carry: Callable[[str, dict[str, Any]], None] = lambda kind, said: None
@@ -82,22 +82,22 @@ class Hub:
     _listeners: set[Listener] = field(default_factory=set)
     _recent: "deque[Message]" = field(default_factory=lambda: deque())
     _recent_bytes: int = 0
-    _told: dict[tuple[str, int], int] = field(default_factory=dict)  # versions, by what they are of
-    _presence_due: set[str] = field(default_factory=set)  # projects whose people will be told who is here
+    _told: dict[tuple[str, int], int] = field(default_factory=dict)  # newest published versions, by type and number
+    _presence_due: set[str] = field(default_factory=set)  # projects with a scheduled presence update
     _elsewhere: dict[str, Presences] = field(default_factory=dict)  # by server
 
     def publish(self, type: str, project: str | None, **content: Any) -> None:
-        """Number the message, remember it, hand it to every tab that wants it, here and at other servers."""
+        """Number and store the message, and send it to all interested tabs, here and at other servers."""
         self.hear(type, project, content)
         self.carry("message", {"type": type, "project": project, "content": content})
 
     def publish_state(self, type: str, project: str, number: int, version: int, **content: Any) -> None:
-        """The same of how a row is by now; nothing once a newer version of it was told: who stored first may come second."""
+        """Publish a row's current state, unless a newer version was already published, as publications may be reordered."""
         self.hear(type, project, content, (number, version))
         self.carry("message", {"type": type, "project": project, "content": content, "state": (number, version)})
 
     def hear(self, type: str, project: str | None, content: dict[str, Any], state: Sequence[int] | None = None) -> None:
-        """Tell the tabs here; `state` is the number and the version of the row it is about."""
+        """Send a message to the tabs here; `state` is the number and the version of its row."""
         with self._lock:
             if state is not None:
                 number, version = state
@@ -107,7 +107,7 @@ class Hub:
             self._publish(type, project, content)
 
     def start_anew(self) -> None:
-        """Messages were lost: every tab is told to fetch everything anew."""
+        """Tell all tabs to reload everything, as messages were lost."""
         with self._lock:
             self.epoch = secrets.token_hex(8)
             self._recent.clear()
@@ -117,7 +117,7 @@ class Hub:
                 self._hand(listener, self._message("hello", listener.project, hello))
 
     def tell(self, listener: Listener, type: str, **content: Any) -> None:
-        """Say something to one tab alone; it is not remembered."""
+        """Send a message to one tab only, without storing it."""
         with self._lock:
             self._hand(listener, self._message(type, listener.project, content))
 
@@ -129,9 +129,9 @@ class Hub:
         who: str = "",
         sees: Callable[[str | None], bool] = lambda _: True,
     ) -> Listener:
-        """A new listener: hello first (`reset`: it must fetch everything anew), then what it missed after `since`.
+        """A new listener: a hello first (`reset`: it must reload everything), then the messages after `since`.
 
-        One that joins for the first time is told that its project changed: it may have read it before it was heard here.
+        On its first connection it is told that its project changed, as it may have loaded it before subscribing.
         """
         listener = Listener(asyncio.get_running_loop(), project, who, sees=sees)
         with self._lock:
@@ -147,15 +147,15 @@ class Hub:
         return listener
 
     def leave(self, listener: Listener) -> None:
-        """Forget a tab."""
+        """Remove a tab."""
         with self._lock:
             self._listeners.discard(listener)
         self._people_changed(listener.project)
 
     def move(self, listener: Listener, project: str | None, page: str, number: int | None) -> None:
-        """The tab looks at something else; everybody at the projects it comes from and goes to is told.
+        """Record that the tab shows something else, and update presence at its old and new project.
 
-        At another project it is told that this one changed: it may have read it before it was heard here.
+        On a project switch it is told that the new one changed, as it may have loaded it before subscribing.
         """
         with self._lock:
             before = listener.project
@@ -166,7 +166,7 @@ class Hub:
             self._people_changed(told)
 
     def show_out(self, project: str, why: str = "is kept to its members now") -> None:
-        """Tell the tabs at the project whose person does not see it any more: what they show is not theirs to see."""
+        """Notify tabs at the project whose users may not see it any more."""
         with self._lock:
             gone = self._message("gone", project, {"why": why})
             for listener in tuple(self._listeners):
@@ -174,23 +174,23 @@ class Hub:
                     self._hand(listener, gone)
 
     def watched(self, project: str) -> bool:
-        """Whether any tab looks at the project."""
+        """Whether any tab shows the project."""
         with self._lock:
             here = any(listener.project == project for listener in self._listeners)
             return here or any(projects.get(project) for projects in self._elsewhere.values())
 
     @property
     def presences(self) -> Presences:
-        """Who is at which project, of the tabs of this server."""
+        """Users by project, of this server's tabs."""
         with self._lock:
             return self._presences()
 
     def hear_presence(self, server: str, project: str, people: list[dict[str, Any]]) -> None:
-        """Another server's tabs at one project."""
+        """Record another server's tabs at one project."""
         self.hear_presences(server, {**self._elsewhere.get(server, {}), project: people})
 
     def hear_presences(self, server: str, presences: Presences) -> None:
-        """All that another server's tabs are at; nothing, where it is gone."""
+        """Record all presences of another server's tabs; empty if the server is gone."""
         with self._lock:
             before = self._elsewhere.pop(server, {})
             if presences:
@@ -200,13 +200,13 @@ class Hub:
                     self._tell_who_is_at(project)
 
     def tabs_of(self, who: str) -> int:
-        """How many tabs of a person are connected."""
+        """Number of connected tabs of a user."""
         with self._lock:
             return sum(listener.who == who for listener in self._listeners)
 
     @property
     def tabs(self) -> int:
-        """How many tabs are connected."""
+        """Number of connected tabs."""
         with self._lock:
             return len(self._listeners)
 
@@ -239,7 +239,7 @@ class Hub:
             self._hand(listener, message)
 
     def _people_changed(self, project: str | None) -> None:
-        """Tell everybody at the project who is there, once for all changes of a moment."""
+        """Schedule a presence update at the project, coalescing simultaneous changes."""
         if project is not None and project not in self._presence_due:
             self._presence_due.add(project)
             asyncio.get_running_loop().call_later(PRESENCE_S, self._tell_presence, project)
@@ -252,7 +252,7 @@ class Hub:
         self.carry("presence", {"project": project, "people": people})
 
     def _tell_who_is_at(self, project: str) -> None:
-        """Presence is a state, not an event: it is told as it is now, and never told again to a tab that was away."""
+        """Send the current presence, which is a state, not an event, and is not replayed to reconnecting tabs."""
         everywhere = (self._presences(), *self._elsewhere.values())
         people = [person for presences in everywhere for person in presences.get(project, [])]
         message = self._message("presence", project, {"people": people})
@@ -269,7 +269,7 @@ class Hub:
         return found
 
     def _missed(self, since: int | None, epoch: str | None) -> tuple[list[Message], bool]:
-        if since is None or not epoch:  # its first visit: there is nothing it could have missed
+        if since is None or not epoch:  # its first connection: it cannot have missed anything
             return [], True
         if since == self._seq and epoch == self.epoch:
             return [], True
@@ -281,5 +281,5 @@ class Hub:
     def _hand(self, listener: Listener, message: Message) -> None:
         try:
             listener.loop.call_soon_threadsafe(listener.take, message, self.epoch)
-        except RuntimeError:  # its loop is gone
+        except RuntimeError:  # its loop is closed
             self._listeners.discard(listener)

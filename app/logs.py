@@ -1,4 +1,4 @@
-"""The server's log: one JSON object a line where `R2C2R_LOG=json`, with the request and the job that each line is about."""
+"""The server's log: one JSON object per line with `R2C2R_LOG=json`, with the request and the job of each line."""
 
 import json
 import logging
@@ -8,16 +8,16 @@ from contextvars import ContextVar
 
 from r2c2r_core.errors import InputError
 
-REQUEST: ContextVar[str] = ContextVar("r2c2r_request", default="")  # the id that the answer's X-Request-ID says
+REQUEST: ContextVar[str] = ContextVar("r2c2r_request", default="")  # the id in the answer's X-Request-ID
 JOB: ContextVar[int | None] = ContextVar("r2c2r_job", default=None)
 _OWN = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime"}
 
 
 class JsonLines(logging.Formatter):
-    """A record as one line of JSON; what was given as `extra` stands beside the message."""
+    """Formatter of a record as one line of JSON, with `extra` fields beside the message."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The line."""
+        """The record as a line."""
         at = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(record.created)) + f".{int(record.msecs):03d}Z"
         said = {"at": at, "level": record.levelname.lower(), "logger": record.name, "message": record.getMessage()}
         known = {"request": REQUEST.get() or None, "job": JOB.get()}
@@ -29,7 +29,7 @@ class JsonLines(logging.Formatter):
 
 
 def log_as(kind: str) -> None:
-    """Every logger of this process to stderr, from `info` on, as R2C2R_LOG says; raises InputError for no kind of log."""
+    """Send all loggers of this process to stderr from `info` on, in R2C2R_LOG's format; raises InputError if it is unknown."""
     if kind != "json":
         raise InputError(f"R2C2R_LOG {kind[:40]!r}: not json", hint="leave it out for warnings in words")
     handler = logging.StreamHandler(sys.stderr)

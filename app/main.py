@@ -1,4 +1,4 @@
-"""The web app, put together. Importing this module creates nothing."""
+"""Assembly of the web app. Importing this module creates nothing."""
 
 import asyncio
 import errno
@@ -89,7 +89,7 @@ from r2c2r_core.errors import R2C2RError
 _log = logging.getLogger(__name__)
 
 TIDY_S = 30.0
-MOST_BODY_BYTES = 16 * MEBIBYTE  # of what is read at once; routes that store a stream count its bytes themselves
+MOST_BODY_BYTES = 16 * MEBIBYTE  # of bodies read at once; routes that store a stream count its bytes themselves
 ROUTERS = (
     health,
     system,
@@ -131,7 +131,7 @@ def create_app(
     viewer_client: Viewer | None = None,
     traces: TracerProvider | None = None,
 ) -> FastAPI:
-    """The app; what else is given stands in the place of the real processes and of the collector of traces, for tests."""
+    """The app; the optional arguments replace the real processes and the trace collector in tests."""
     static, metrics, traces = shipped("static", "index.html"), Metrics(), traces or open_traces(settings.traces)
 
     @asynccontextmanager
@@ -180,9 +180,9 @@ def create_app(
     return app
 
 
-@cache  # FastAPI builds what a route needs when it is asked for first, and keeps it with the router: some 0.6 s
+@cache  # FastAPI builds a route's dependencies on first use, and caches them with the router: some 0.6 s
 def _api() -> APIRouter:
-    """Every route of the app, with what it may answer instead of its own schema."""
+    """All routes of the app, with their error responses."""
     errors: dict[int | str, dict[str, Any]] = {code: {"model": schemas.ErrorBody} for code in (401, 403, 404, 409, 422, 429)}
     api = APIRouter(responses=errors, max_body_size=MOST_BODY_BYTES)
     for module in ROUTERS:
@@ -193,7 +193,7 @@ def _api() -> APIRouter:
 def _open(
     settings: Settings, commands: Commands, viewer_client: Viewer | None, metrics: Metrics, traces: TracerProvider
 ) -> Context:
-    """Everything that runs: the database, the queue, the live segmenters, the viewer."""
+    """Start all running parts: database, queue, live segmenters, viewer."""
     engine, hub, gates, store = open_engine(settings.rows, busy_s=settings.busy_s), Hub(), Gates(), open_store(settings)
     rows = JobRows(engine, hub, settings, store, FINISHERS, job_ended)
     runner = Runner(rows, settings, commands, metrics.stages, traces)
@@ -242,7 +242,7 @@ def _people(app: FastAPI) -> People:
 
 
 async def _tidy(context: Context) -> None:
-    """Close what nobody looks at any more, in a thread of its own: it may wait for the 3D view."""
+    """Close unused resources, in a separate thread, as this may wait for the 3D view."""
     thread = anyio.CapacityLimiter(1)
     while True:
         await asyncio.sleep(TIDY_S)
@@ -251,7 +251,7 @@ async def _tidy(context: Context) -> None:
                 await anyio.to_thread.run_sync(tidy, context, limiter=thread)
             except errors.Unavailable as error:
                 _log.warning("tidying: %s", error)
-            except Exception:  # a full disk or a locked database now must not end tidying for good
+            except Exception:  # a temporarily full disk or locked database must not end tidying for good
                 _log.exception("tidying")
 
 
@@ -291,7 +291,7 @@ def _tell(context: Context, project: str, number: int) -> None:
 
 
 def _prepare(context: Context, project: str, kind: str) -> None:
-    """Prepare what was just read; whatever is wrong with that is said to who opens Annotate."""
+    """Prepare a newly read recording; errors are shown when Annotate is opened."""
     if kind not in READS_RECORDING or not context.settings.prepare_imports:
         return
     try:
@@ -308,7 +308,7 @@ def _again(context: Context, project: str, number: int, key: str, others: list[i
 
 
 async def let_go(app: FastAPI) -> None:
-    """End what requests wait for, so that a server that stops need not wait for them; it takes no other request after this."""
+    """End all waits of requests, so that a stopping server need not wait; no further requests are accepted."""
     context: Context | None = getattr(app.state, "context", None)
     if context is not None:
         await anyio.to_thread.run_sync(_end_waits, context, limiter=anyio.CapacityLimiter(1))
@@ -320,7 +320,7 @@ def _end_waits(context: Context) -> None:
 
 
 def _close(context: Context) -> None:
-    """First what requests wait for, so that they end too; nothing here waits for a request."""
+    """Close all parts, first those that requests wait for; nothing here waits for a request."""
     _end_waits(context)
     context.live.stop()
     context.runner.stop()
@@ -332,7 +332,7 @@ def _close(context: Context) -> None:
 
 
 def _add_error_handlers(app: FastAPI) -> None:
-    """Every failure leaves in the one shape."""
+    """Register handlers that give all errors the same JSON shape."""
 
     @app.exception_handler(R2C2RError)
     async def known(request: Request, error: R2C2RError) -> JSONResponse:
@@ -367,7 +367,7 @@ def _add_error_handlers(app: FastAPI) -> None:
 
 
 def _in_words(problem: dict[str, Any]) -> str:
-    """What is wrong with a value; of text that was too long its characters, which pydantic calls items."""
+    """Message of a validation error; for too long text it counts characters, which pydantic calls items."""
     if problem["type"] in ("too_long", "string_too_long") and isinstance(problem.get("input"), str):
         return f"{len(problem['input'])} characters, at most {problem['ctx']['max_length']} expected"
     return str(problem["msg"])

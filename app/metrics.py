@@ -1,7 +1,7 @@
-"""What a server counts of its own work, in the text format of Prometheus.
+"""Server metrics in the text format of Prometheus.
 
-https://prometheus.io/docs/instrumenting/exposition_formats/: one histogram for requests, one for the stages of jobs; what is a
-state, such as the length of the queue, is looked up when it is asked for (app.services.metrics).
+https://prometheus.io/docs/instrumenting/exposition_formats/: one histogram for requests, one for the stages of jobs; states,
+such as the length of the queue, are looked up on request (app.services.metrics).
 """
 
 import threading
@@ -16,7 +16,7 @@ STAGE_BOUNDS_S = (1.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0, 14400.0)
 
 @dataclass(slots=True)
 class _Series:
-    """One combination of labels: how often each bound was kept, and the sum of all."""
+    """Series of one label combination: count per bucket, and the sum."""
 
     counts: list[int]
     total_s: float = 0.0
@@ -24,7 +24,7 @@ class _Series:
 
 @dataclass(slots=True)
 class Histogram:
-    """Times by labels; safe from any thread."""
+    """Thread-safe histogram of durations by labels."""
 
     name: str
     help: str
@@ -34,14 +34,14 @@ class Histogram:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def observe(self, seconds: float, *values: str) -> None:
-        """One more, of these values of the labels."""
+        """Add an observation with these label values."""
         with self._lock:
             found = self._series.setdefault(values, _Series([0] * (len(self.bounds_s) + 1)))
             found.counts[bisect_left(self.bounds_s, seconds)] += 1
             found.total_s += seconds
 
     def lines(self) -> Iterator[str]:
-        """In the text format; buckets count what is at most as long."""
+        """Lines of the text format, with cumulative buckets."""
         with self._lock:
             known = [(values, list(series.counts), series.total_s) for values, series in sorted(self._series.items())]
         yield from _head(self.name, self.help, "histogram")
@@ -56,7 +56,7 @@ class Histogram:
 
 @dataclass(slots=True)
 class Metrics:
-    """Of one server, since it started."""
+    """Metrics of one server since its start."""
 
     requests: Histogram = field(
         default_factory=lambda: Histogram(
@@ -71,7 +71,7 @@ class Metrics:
 
 
 def gauge(name: str, help: str, samples: Iterable[tuple[Sequence[tuple[str, str]], float]]) -> Iterator[str]:
-    """A state in the text format: a value for each combination of labels."""
+    """A gauge in the text format: a value for each label combination."""
     yield from _head(name, help, "gauge")
     for labels, value in samples:
         yield _sample(name, labels, value)

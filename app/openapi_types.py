@@ -1,6 +1,6 @@
-"""TypeScript declarations of everything that goes over the wire: `python -m app.openapi_types > static/js/api-types.d.ts`.
+"""TypeScript declarations of the API: `python -m app.openapi_types > static/js/api-types.d.ts`.
 
-Read from the app's OpenAPI document; a test regenerates and compares.
+Generated from the app's OpenAPI document; a test regenerates and compares.
 """
 
 import json
@@ -21,7 +21,7 @@ def declarations(document: dict[str, Any]) -> str:
 
 
 def app_document() -> dict[str, Any]:
-    """The OpenAPI document of the app as it is."""
+    """The app's current OpenAPI document."""
     from app.main import create_app
     from app.settings import Settings
 
@@ -73,7 +73,7 @@ def _answer(operation: dict[str, Any]) -> str:
 
 
 def _type(schema: dict[str, Any]) -> str:
-    """The TypeScript of a JSON schema."""
+    """TypeScript type of a JSON schema."""
     if "$ref" in schema:
         return _shape_name(str(schema["$ref"]).rsplit("/", 1)[-1])
     for union in ("anyOf", "oneOf"):
@@ -106,7 +106,7 @@ def _key(name: str) -> str:
 
 
 def _shape_name(name: str) -> str:
-    """What goes in with defaults left out and comes out with all is two shapes: `Front-Input`, `Front-Output`."""
+    """Type name of a schema; one with defaults has separate input and output shapes: `Front-Input`, `Front-Output`."""
     return name.replace("-", "")
 
 

@@ -1,7 +1,7 @@
-"""One POST to an address that somebody else chose: bounded in time and size, not followed elsewhere, to public addresses alone.
+"""POST to a user-supplied address: bounded in time and size, without redirects, to public addresses only.
 
-The host's addresses are looked up once, each is judged, and one of those is connected to: a name that changes its mind
-between the look and the connection gains nothing.
+The host is resolved once, each address is checked, and one of them is connected to, which prevents DNS rebinding between
+check and connection.
 """
 
 import hashlib
@@ -33,16 +33,16 @@ def networks(text: str) -> tuple[Network, ...]:
 
 
 def signature(secret: str, timestamp: str, content: bytes) -> str:
-    """HMAC-SHA256 of `timestamp.content`, in hexadecimal: an old message cannot be sent anew under another time."""
+    """HMAC-SHA256 of `timestamp.content`, in hexadecimal, so that an old message cannot be replayed with a new time."""
     return hmac.new(secret.encode(), timestamp.encode() + b"." + content, hashlib.sha256).hexdigest()
 
 
 def post(url: str, content: bytes, headers: Mapping[str, str], allowed: Sequence[Network] = ()) -> int:
-    """The status of the answer, whose body is not read. Raises OSError or HTTPException, Forbidden for an address inside."""
+    """Status of the answer, whose body is not read. Raises OSError or HTTPException, Forbidden for a private address."""
     parts = urlsplit(url)
     host, port = parts.hostname or "", parts.port or PORTS[parts.scheme]
     plain = socket.create_connection((_address_of(host, port, allowed), port), timeout=TOTAL_S)
-    ending = threading.Timer(TOTAL_S, _end, (plain,))  # who answers a byte at a time has no more time than others
+    ending = threading.Timer(TOTAL_S, _end, (plain,))  # a slow trickle of bytes does not extend the time limit
     ending.start()
     try:
         made = ssl.create_default_context().wrap_socket(plain, server_hostname=host) if parts.scheme == "https" else plain

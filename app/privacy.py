@@ -1,4 +1,4 @@
-"""Where things lie on the server is the admins' business: messages to others name a file, not the way to it."""
+"""Removal of server paths from messages, as only admins may see them; file names are kept."""
 
 import re
 import tempfile
@@ -8,7 +8,7 @@ from app.settings import Settings
 
 
 def without_places(text: str, settings: Settings) -> str:
-    """The text with the server's folders left out of its paths."""
+    """The text with the server's folders removed from its paths."""
     places = {
         settings.data_dir,
         *settings.roots,

@@ -1,4 +1,4 @@
-"""A worker process that speaks JSON lines, in a process group of its own, so that stopping it stops its children too."""
+"""A worker process with a JSON-lines protocol, in its own process group, so that stopping it stops its children too."""
 
 import contextlib
 import json
@@ -22,27 +22,27 @@ Line = dict[str, Any]
 
 
 class Lines:
-    """What a worker said, in its order; whoever asks after its last word hears None, however often."""
+    """Queue of a worker's messages in order; after the last one it always returns None."""
 
     def __init__(self) -> None:
         self._queue: queue.Queue[Line | None] = queue.Queue()
 
     def put(self, line: Line | None) -> None:
-        """One more; None after the last."""
+        """Add a message; None after the last."""
         self._queue.put(line)
 
     def next(self, timeout: float) -> Line | None:
-        """The next; raises queue.Empty after the timeout."""
+        """The next message; raises queue.Empty after the timeout."""
         line = self._queue.get(timeout=timeout)
         if line is None:
-            self._queue.put(None)  # for whoever asks again
+            self._queue.put(None)  # for further calls
         return line
 
 
 class Worker:
-    """A running worker. Its stderr, and whatever on stdout is not JSON, goes to the log.
+    """A running worker. Its stderr, and any non-JSON output on stdout, goes to the log.
 
-    Its temporary files lie in a folder of its own, which ends with it however it ends.
+    It has its own temporary folder, which is deleted when it ends in any way.
     """
 
     def __init__(self, command: Sequence[str], log: Path) -> None:
@@ -68,15 +68,15 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether it still runs."""
+        """Whether the worker is still running."""
         return self.process.poll() is None
 
     def next_line(self, timeout: float) -> Line | None:
-        """The next message; raises queue.Empty after the timeout; None when the worker said its last."""
+        """The next message; raises queue.Empty after the timeout; None after the worker's last message."""
         return self._lines.next(timeout)
 
     def say(self, message: Line) -> bool:
-        """Send it a message; False when it is gone."""
+        """Send the worker a message; False when it has ended."""
         assert self.process.stdin is not None
         try:
             self.process.stdin.write(json.dumps(message).encode() + b"\n")
@@ -94,13 +94,13 @@ class Worker:
         _signal_group(self.pid, signal.SIGKILL)
 
     def close(self, grace_s: float = 0.0) -> int:
-        """Wait for the end, or bring it about after the grace; its exit status."""
+        """Wait for the worker to end, kill it after the grace period, and return its exit status."""
         try:
             self.process.wait(timeout=grace_s if grace_s > 0 else 0.001)
         except subprocess.TimeoutExpired:
             self.kill()
         status = self.process.wait()
-        self.kill()  # what it started may outlive it
+        self.kill()  # its children may outlive it
         self._reader.join(timeout=5)
         for stream in (self.process.stdin, self.process.stdout, self._log):
             if stream is not None:
@@ -130,7 +130,7 @@ class Worker:
 
 
 class Workers:
-    """Workers that requests wait for, all ended at once when the server stops: then they say their last."""
+    """Workers that requests wait for, all killed at once when the server stops, which ends the waits."""
 
     def __init__(self) -> None:
         self.stopped = False
@@ -138,10 +138,10 @@ class Workers:
 
     @contextmanager
     def running(self, command: Sequence[str], log: Path) -> Iterator[Worker]:
-        """A worker that ends with this block, or with the server; when that stops already, one that has ended."""
+        """A worker that ends with this block, or with the server; an ended one if the server is already stopping."""
         worker = Worker(command, log)
         self._running.add(worker)
-        if self.stopped:  # looked at after it was added: stop() sees it, or we see that it was called
+        if self.stopped:  # checked after adding: either stop() sees the worker, or this check sees that stop() was called
             worker.kill()
         try:
             yield worker
@@ -150,19 +150,19 @@ class Workers:
             self._running.discard(worker)
 
     def stop(self) -> None:
-        """End those that run and those that will; takes no lock, for whoever waits for one may hold any."""
+        """Kill running and future workers; takes no lock, as a waiting caller may hold any."""
         self.stopped = True
         for worker in tuple(self._running):
             worker.kill()
 
 
 def python_module(*words: str) -> tuple[str, ...]:
-    """The command that runs a module of ours."""
+    """Command that runs one of the project's modules."""
     return (sys.executable, "-m", *words)
 
 
 def started_at(pid: int) -> float | None:
-    """When the process was created; None when there is none. A pid alone may be another's by now."""
+    """Creation time of the process, or None; a pid alone may have been reused."""
     try:
         return float(psutil.Process(pid).create_time())
     except psutil.Error:
@@ -170,7 +170,7 @@ def started_at(pid: int) -> float | None:
 
 
 def end_orphan(pid: int | None, started: float | None) -> None:
-    """Kill the group of a worker that lost its server, if it is still that worker."""
+    """Kill the group of a worker whose server has died, if the pid is still that worker."""
     if pid is None or started is None:
         return
     now = started_at(pid)

@@ -1,7 +1,7 @@
-"""Who may talk to this app: Host and Origin checks, the session cookie, the custom header, and what pages may do.
+"""Access control: Host and Origin checks, session cookie, custom header, and content security policy.
 
-Pure ASGI, so that it stands before uploads and sockets as well. The cookie is a random session id; whose it is, the
-database knows (app.services.people), so a restart keeps people in and signing out works at once.
+Pure ASGI, so that it also covers uploads and sockets. The cookie is a random session id, mapped to a user in the database
+(app.services.people), so sessions survive a restart and signing out takes effect at once.
 """
 
 import json
@@ -24,11 +24,11 @@ _log = logging.getLogger(__name__)
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 OPEN_PATHS = ("/healthz", "/readyz", "/api/health", "/api/login", "/login", "/static/", "/favicon.ico")
 Role = Literal["annotator", "reviewer", "admin"]
-TokenScope = Literal["metrics", "read", "annotator", "reviewer", "admin"]  # how far a token reaches
+TokenScope = Literal["metrics", "read", "annotator", "reviewer", "admin"]  # scope of a token
 Refusal = tuple[int, str, str, str]  # status, kind, message, hint
-ROLES: tuple[Role, ...] = ("annotator", "reviewer", "admin")  # each may do what those before it may
-TOKEN_PREFIX = "r2c2r_"  # by it a token is known where it was left by mistake
-TLS_POLICY = "max-age=31536000"  # a year: a browser that came by TLS never again comes without
+ROLES: tuple[Role, ...] = ("annotator", "reviewer", "admin")  # in ascending order of rights
+TOKEN_PREFIX = "r2c2r_"  # identifies leaked tokens
+TLS_POLICY = "max-age=31536000"  # a year: a browser that has used TLS always uses it
 FEATURE_POLICY = "camera=(), microphone=(), geolocation=(), payment=(), usb=(), serial=(), bluetooth=(), display-capture=()"
 PAGE_POLICY = (
     "default-src 'self'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
@@ -40,49 +40,47 @@ NO_SESSION = "sign in, or open the address that `r2c2r serve` printed: it carrie
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """Who asks."""
+    """The user of a request."""
 
     name: str
     role: Role
-    account: bool = False  # named; else whoever started the server
-    scope: TokenScope | None = None  # of the token by which a program acts for the person
+    account: bool = False  # a named account; else the user who started the server
+    scope: TokenScope | None = None  # of the token with which a program acts for the user
 
     def may(self, needed: Role) -> bool:
-        """Whether this person's role reaches as far as the needed one."""
+        """Whether this user's role includes the needed one."""
         return ROLES.index(self.role) >= ROLES.index(needed)
 
 
 def cookie_name(scope: Scope) -> str:
-    """What the session's cookie is called: browsers send a host's cookies to each of its ports, so it says which is ours.
+    """Name of the session cookie, which includes the port, as browsers send a host's cookies to all its ports.
 
-    That is the port which the browser sees: servers behind one address share its sessions, whichever they listen on.
+    This is the port seen by the browser: servers behind one address share its sessions, regardless of their own ports.
     """
     port = Headers(scope=scope).get("host", "").rpartition(":")[2]
     return f"r2c2r_session_{port}" if port.isdecimal() else "r2c2r_session"
 
 
 def session_in(scope: Scope, cookie_header: str) -> str:
-    """The session id of a request's cookies; empty when there is none."""
-    return cookie_parser(cookie_header).get(
-        cookie_name(scope), ""
-    )  # other apps of this machine may have set anything beside it
+    """The session id in a request's cookies; empty when there is none."""
+    return cookie_parser(cookie_header).get(cookie_name(scope), "")  # other apps of this machine may have set other cookies
 
 
 class BehindProxies:
-    """Believes trusted proxies of who connects, and whether by TLS; notes that it was one of them, before it is forgotten."""
+    """Middleware that takes client address and scheme from trusted proxies, and records that the peer was one of them."""
 
     def __init__(self, app: ASGIApp, trusted: Sequence[str]) -> None:
         self.believing: Any = ProxyHeadersMiddleware(app, list(trusted))  # type: ignore[arg-type]  # uvicorn's name of the type
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass it on as the proxy tells it."""
+        """Pass the request on with the proxy's client information."""
         peer = scope.get("client")
         scope.setdefault("state", {})["proxied"] = peer is not None and peer[0] in self.believing.trusted_hosts
         await self.believing(scope, receive, send)
 
 
 class Guard:
-    """The middleware. `session_of` is that of whom a trusted proxy names in the header `named_in`, from an address."""
+    """Access-control middleware. `session_of` gives the session of a user named by a trusted proxy in the header `named_in`."""
 
     def __init__(
         self,
@@ -96,7 +94,7 @@ class Guard:
         self.named_in, self.session_of = named_in, session_of
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse what may not pass; say whose request it is to what may."""
+        """Refuse unauthorised requests; attach the user to the others."""
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
@@ -114,11 +112,11 @@ class Guard:
         await self.app(scope, receive, _with_safe_headers(send, scope) if scope["type"] == "http" else send)
 
     async def _enter(self, scope: Scope, session: str, named: str) -> tuple[str, Person | None, Refusal | None]:
-        """Whose request it is, and by which session, or why nobody in particular may ask that."""
+        """Session and user of a request, or the reason for refusing an anonymous one."""
         try:
             session = await self.session_of(named, _client(scope)) if named else session
             person = await self.person_of(session) if session else None
-        except R2C2RError as error:  # the database does not answer, or the proxy names nobody
+        except R2C2RError as error:  # the database does not answer, or the proxy names no user
             kind, status = kind_of(error)
             return session, None, (status, kind, error.message, error.hint)
         if person is None and not _brings_token(scope):
@@ -129,7 +127,7 @@ class Guard:
         return session, person, None
 
     def _misnamed(self, scope: Scope, named: Sequence[str]) -> Refusal | None:
-        """Why what the header says of who asks is not believed: whoever else could send it would be anybody."""
+        """Reason to reject the user header, which must come only from a trusted proxy; None if it is valid."""
         if named and not scope.get("state", {}).get("proxied"):
             _log.warning("%s from %s, which is no trusted proxy: refused", self.named_in, _client(scope))
             said = f"{self.named_in} is believed of trusted proxies alone, and this came from {_client(scope)}"
@@ -140,7 +138,7 @@ class Guard:
         return None
 
     def _foreign(self, scope: Scope, headers: Headers, *, by_token: bool) -> Refusal | None:
-        """Why a request does not come from our own pages, or not to us; no page makes a browser send a token by itself."""
+        """Reason to reject a cross-site or misaddressed request; token requests are exempt, as no page can forge them."""
         host = headers.get("host", "")
         if _host_name(host) not in self.allowed_hosts:
             return 421, "forbidden", f"this app does not answer for host '{host[:80]}'", "use the address it printed"
@@ -156,19 +154,19 @@ class Guard:
 
 
 def _client(scope: Scope) -> str:
-    """The address that asks, as far as trusted proxies tell it."""
+    """Client address, as reported by trusted proxies."""
     client = scope.get("client")
     return str(client[0]) if client else ""
 
 
 def _bearer(headers: Headers) -> str:
-    """The token of a program; empty when there is none."""
+    """The bearer token of a request; empty when there is none."""
     kind, _, token = headers.get("authorization", "").partition(" ")
     return token.strip() if kind.lower() == "bearer" and token.strip().startswith(TOKEN_PREFIX) else ""
 
 
 def _reaches(person: Person, scope: Scope) -> bool:
-    """Whether the token by which the person's program comes is for that."""
+    """Whether the scope of the user's token permits the request."""
     if person.scope == "metrics":
         return bool(scope["path"] == "/metrics")
     return person.scope != "read" or (scope["type"] == "http" and scope["method"] in SAFE_METHODS)

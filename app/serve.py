@@ -1,4 +1,4 @@
-"""`r2c2r serve`: the app on a port, and finished workspaces as projects."""
+"""`r2c2r serve`: runs the app on a port, and registers finished workspaces as projects."""
 
 import contextlib
 import errno
@@ -50,12 +50,12 @@ def serve(
     adopt: bool = False,
     import_from: Sequence[Path] = (),
 ) -> None:
-    """Run the app until it is stopped; the address is printed first, with its key when only this machine reaches it.
+    """Run the app until it is stopped; the address is printed first, with a key if it is only reachable from this machine.
 
-    `names` are host names by which people reach it, where they differ from the address it listens on; `behind_proxy` are the
-    addresses or networks of proxies whose word about who asks, and whether by TLS, is believed. `adopt` makes projects of
-    the folders that the database does not know, and a new database where there is none. `import_from` are folders that
-    recordings may be imported from by path, beside the home folder.
+    `names` are host names of the server, where they differ from its listening address; `behind_proxy` are addresses or
+    networks of proxies trusted for the client address, the user and TLS. `adopt` makes projects of folders that are not in
+    the database, and a new database where there is none. `import_from` are folders from which recordings may be imported by
+    path, in addition to the home folder.
     """
     data_dir = resolved(data_dir)
     proxies = tuple(_network(address) for address in (*behind_proxy, *Settings(data_dir=data_dir).trusted_proxies))
@@ -70,7 +70,7 @@ def serve(
     require_store(settings)
     keep_private(data_dir, DATABASE)
     with only_server(data_dir) as announce, _bound(host, port) as listening:
-        with opened(settings.rows, anew=adopt) as engine:  # what is wrong with it is said before an address is
+        with opened(settings.rows, anew=adopt) as engine:  # errors in it are reported before the address is printed
             if adopt:
                 sys.stderr.writelines(f"r2c2r: {line}\n" for line in adopt_all(engine, data_dir, settings.user))
             elif settings.postgres:
@@ -88,41 +88,41 @@ def serve(
         config = uvicorn.Config(
             app,
             log_level="warning",
-            ws_per_message_deflate=False,  # scenes and masks are compressed or not compressible: it only costs time
+            ws_per_message_deflate=False,  # scenes and masks are compressed or incompressible, so it would only cost time
             timeout_graceful_shutdown=3,
             server_header=False,
-            proxy_headers=False,  # the app knows which proxies it believes
-            log_config=None if settings.log else LOGGING_CONFIG,  # none: its loggers go where all others do
+            proxy_headers=False,  # the app handles trusted proxies itself
+            log_config=None if settings.log else LOGGING_CONFIG,  # None: its loggers use the same handler as all others
         )
         _Server(config, app).run(sockets=[listening])
 
 
 class _Server(uvicorn.Server):
-    """One that ends what its requests wait for before it waits for them."""
+    """Server that ends the waits of its requests before waiting for the requests."""
 
     def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
         super().__init__(config)
         self._app = app
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin to answer."""
+        """Start serving."""
         await super().startup(sockets)
         keep_what_started()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Stop, in seconds."""
+        """Stop within seconds."""
         await let_go(self._app)
         await super().shutdown(sockets)
 
 
 def keep_what_started() -> None:
-    """Leave what is there by now to no later look for garbage: it stays, and to go through it takes 0.1 s of a request."""
+    """Freeze existing objects out of garbage collection, which would otherwise take 0.1 s of a request."""
     gc.collect()
     gc.freeze()
 
 
 def new_address(data_dir: Path) -> str:
-    """Another address that signs one browser in at the server that serves this folder now."""
+    """A new one-time sign-in address of the server running on this folder."""
     data_dir = resolved(data_dir)
     running = running_server(data_dir)
     if running is None:
@@ -135,7 +135,7 @@ def new_address(data_dir: Path) -> str:
 
 
 def register_finished(data_dir: Path, *, name: str, source: Path, prompts: Path, workdir: Path) -> str:
-    """A finished workspace as a project, read where it is; the same workspace is the same project. Returns its id."""
+    """Register a finished workspace as a project, in place and only once, and return its id."""
     from app.jobs.ingest import describe
     from r2c2r_core.segment.prompts import checked_prompts
     from r2c2r_core.workspace import Workspace, write_atomically
@@ -164,7 +164,7 @@ def register_finished(data_dir: Path, *, name: str, source: Path, prompts: Path,
 
 
 def require_database(data_dir: Path) -> None:
-    """Raise DatabaseUnusable for a database that the app could not work with, before long work is begun for it."""
+    """Raise DatabaseUnusable for an unusable database, before long computations start."""
     settings = Settings(data_dir=resolved(data_dir))
     keep_private(settings.data_dir, DATABASE)
     with opened(settings.rows):
@@ -181,7 +181,7 @@ def _settings(data_dir: Path, host: str, names: Sequence[str], proxies: tuple[st
 
 
 def _check_identity(settings: Settings) -> None:
-    """Raise InputError where nobody could be believed about who asks, or be given a role."""
+    """Raise InputError where no proxy could be trusted to identify users, or no role assigned."""
     if settings.identity_header and not settings.trusted_proxies:
         hint = "R2C2R_TRUSTED_PROXIES=ADDRESS, or --behind-proxy ADDRESS, says which proxy is"
         raise InputError(f"R2C2R_IDENTITY {settings.identity}: no proxy is trusted", hint=hint)
@@ -204,13 +204,13 @@ def _require_accounts(engine: Engine, proxies: Sequence[str]) -> None:
 
 
 def _own_addresses() -> list[str]:
-    """Addresses of this machine: who listens on all of them is called by any."""
+    """All addresses of this machine, for a server listening on all of them."""
     found = (address.address for addresses in psutil.net_if_addrs().values() for address in addresses)
     return [address.split("%")[0].lower() for address in found if address[:1].isalnum()]
 
 
 def _network(address: str) -> str:
-    """A proxy's address, or a network of them, as it was given."""
+    """A proxy's address or network, validated and unchanged."""
     try:
         return str(ipaddress.ip_network(address) if "/" in address else ipaddress.ip_address(address))
     except ValueError as error:
@@ -233,7 +233,7 @@ def _shown_host(host: str) -> str:
 
 @contextlib.contextmanager
 def _bound(host: str, port: int) -> Iterator[socket.socket]:
-    """A listening socket; a taken port is said in one line."""
+    """A listening socket; a taken port gives a one-line error."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

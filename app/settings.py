@@ -1,4 +1,4 @@
-"""What the app is told when it starts."""
+"""Settings of the app at start."""
 
 import getpass
 import os
@@ -14,7 +14,7 @@ from r2c2r_core.errors import InputError
 BUSY_S = 10.0
 MEBIBYTE = 1024 * 1024
 MAX_UPLOAD_BYTES = 16 * 1024 * MEBIBYTE
-DATABASE = "r2c2r.db"  # in the data folder; by it the folder is known to be one
+DATABASE = "r2c2r.db"  # in the data folder, which it identifies
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _IDENTITIES = {
     "proxy": re.compile(r"[A-Za-z0-9-]{1,80}"),
@@ -24,7 +24,7 @@ _IDENTITIES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quotas:
-    """What one person may take at a time; admins take more."""
+    """Quotas of one user; admins have higher ones."""
 
     jobs: int = 20  # waiting or running
     uploads: int = 20  # announced and not finished
@@ -52,7 +52,7 @@ class Settings:
     """One running app. Paths are absolute; sizes in bytes; times in seconds."""
 
     data_dir: Path
-    postgres: str = field(default_factory=lambda: os.environ.get("R2C2R_DATABASE", ""))  # its address; empty: a SQLite file
+    postgres: str = field(default_factory=lambda: os.environ.get("R2C2R_DATABASE", ""))  # address; empty: a SQLite file
     store: str = field(default_factory=lambda: os.environ.get("R2C2R_STORE", ""))  # of files; empty: the data folder
     cache_gb: str = field(
         default_factory=lambda: os.environ.get("R2C2R_CACHE_GB", "")
@@ -81,17 +81,17 @@ class Settings:
     quotas: Quotas = Quotas()
     heavy_jobs: int = 1
     workers: int = 0  # objects of a job side by side; 0: as cores, shared by the heavy jobs, and memory allow
-    job_attempts: int = 3  # how often a job whose process vanishes is begun without getting further
-    job_losses: int = 10  # the same when its server vanishes, which is hardly the job's doing
-    sharing_costs_s: float = 6.0  # what a stage takes longer whose objects several seats compute: two starts of a process
-    beat_s: float = 5.0  # between two signs of life of a server that shares its database
-    beats_missed_s: float = 60.0  # without one, another server takes up its jobs
-    kill_grace_s: float = 2.0  # between asking a worker to stop and stopping it
+    job_attempts: int = 3  # tries of a job whose process vanishes without progress
+    job_losses: int = 10  # the same when its server vanishes, which is rarely the job's fault
+    sharing_costs_s: float = 6.0  # overhead of a stage shared by several seats: two process starts
+    beat_s: float = 5.0  # heartbeat interval of a server that shares its database
+    beats_missed_s: float = 60.0  # without a heartbeat, another server takes over its jobs
+    kill_grace_s: float = 2.0  # between asking a worker to stop and killing it
     live_idle_s: float = 600.0
     viewer_idle_s: float = 600.0
     viewer_answer_s: float = 60.0  # until the 3D view's process must have answered
     viewer_page_s: float = 10.0  # the same for a file of its page, and for its connection
-    busy_s: float = BUSY_S  # until a request is refused that waits for another's writing
+    busy_s: float = BUSY_S  # until a request that waits for another's write is refused
     run_jobs: bool = True  # tests of other things leave the queue alone
     prepare_imports: bool = True  # for the live segmenter, once they were read; likewise
     preview_width: int = 960
@@ -99,8 +99,8 @@ class Settings:
 
     @property
     def workers_a_job(self) -> int:
-        """Processes that one job may start; 0 leaves it to the cores and the memory that are there."""
-        if self.on_ray:  # which keeps so many cores free for it
+        """Processes that one job may start; 0: determined by cores and memory."""
+        if self.on_ray:  # which reserves this many cores for it
             return self.workers or 1
         shared = max(1, len(os.sched_getaffinity(0)) // max(1, self.heavy_jobs))
         return self.workers or (0 if self.heavy_jobs <= 1 else shared)
@@ -112,12 +112,12 @@ class Settings:
 
     @property
     def rows(self) -> Path | str:
-        """Where the rows are: the address of a Postgres, or the SQLite file."""
+        """Location of the rows: the address of a Postgres, or the SQLite file."""
         return self.postgres or self.database
 
     @property
     def cache_bytes(self) -> int | None:
-        """What may lie here of what a store holds; raises InputError."""
+        """Maximum size of the local cache of a store; None: unlimited. Raises InputError."""
         if self.cache_gb and not self.cache_gb.isdecimal():
             raise InputError(f"R2C2R_CACHE_GB {self.cache_gb[:40]!r}: no whole number", hint="gigabytes, or leave it out")
         return int(self.cache_gb) * 10**9 if self.cache_gb else None
@@ -131,12 +131,12 @@ class Settings:
 
     @property
     def identity_header(self) -> str:
-        """The header by which a trusted proxy says who asks; empty where none does. Raises InputError."""
+        """The header in which a trusted proxy names the user; empty without one. Raises InputError."""
         return self._identity("proxy")
 
     @property
     def identity_issuer(self) -> str:
-        """The OpenID provider at which people sign in; empty for none. Raises InputError."""
+        """The OpenID provider for sign-in; empty for none. Raises InputError."""
         return self._identity("oidc")
 
     def _identity(self, wanted: str) -> str:
@@ -148,27 +148,27 @@ class Settings:
 
     @property
     def uploads(self) -> Path:
-        """Recordings on their way in."""
+        """Folder of unfinished uploads."""
         return self.data_dir / "uploads"
 
     @property
     def unknown(self) -> Path:
-        """What lay in the data folder without a row: set aside for an admin."""
+        """Folder of files without a database row, set aside for an admin."""
         return self.data_dir / "unknown"
 
     @property
     def roots(self) -> tuple[Path, ...]:
-        """Folders a recording may be taken from by path."""
+        """Folders from which a recording may be imported by path."""
         return self.import_roots or (Path.home(), self.data_dir)
 
 
 def default_data_dir() -> Path:
-    """Where projects live unless someone says otherwise; the command line says the same."""
+    """Default data folder, the same as on the command line."""
     return Path(os.environ.get("R2C2R_DATA", Path.home() / ".local" / "share" / "r2c2r")).expanduser().resolve()
 
 
 def shipped(name: str, marker: str) -> Path:
-    """The folder `name` that travels with the app: beside `app/` in a checkout, `app/_<name>` in an installed wheel."""
+    """The folder `name` shipped with the app: beside `app/` in a checkout, `app/_<name>` in an installed wheel."""
     package = Path(app.__file__).resolve().parent
     for place in (package.parent / name, package / f"_{name}"):
         if (place / marker).is_file():
@@ -177,7 +177,7 @@ def shipped(name: str, marker: str) -> Path:
 
 
 def _listed(text: str) -> tuple[str, ...]:
-    """What commas part."""
+    """The comma-separated parts of a text."""
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 

@@ -1,4 +1,4 @@
-"""Things that go on side by side on one connection."""
+"""Concurrent tasks on one connection."""
 
 import contextlib
 from collections.abc import Awaitable, Callable
@@ -10,11 +10,11 @@ Work = Callable[[], Awaitable[object]]
 
 
 async def until_first(*works: Work) -> int:
-    """Do all of them until one comes to its end, or its connection does; then stop the others. Which one that was."""
+    """Run all until one of them or its connection ends, then cancel the others; returns the index of the first."""
     ended: list[int] = []
 
     async def follow(number: int, work: Work) -> None:
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # what Starlette says of a connection that is closed
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # raised by Starlette on a closed connection
             await work()
         ended.append(number)
         group.cancel_scope.cancel()

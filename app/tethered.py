@@ -1,7 +1,7 @@
-"""A program that ends with whoever started it: `python -m app.tethered COMMAND [ARGUMENT...]`.
+"""Runs a program that ends with its parent process: `python -m app.tethered COMMAND [ARGUMENT...]`.
 
-It leads a process group, and kills that when its stdin comes to its end. What stands between may be killed without being asked,
-as Ray does with its actors: then what it had started is nobody's, and would go on.
+It leads a process group, and kills it when its stdin is closed. The parent may be killed without warning, as Ray does with
+its actors; its children would then be orphaned and continue.
 """
 
 import os
@@ -12,12 +12,12 @@ import threading
 
 
 def main(command: list[str]) -> int:
-    """Run it; its exit status."""
+    """Run the program and return its exit status."""
     child = subprocess.Popen(command, stdin=subprocess.PIPE)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it is sent to the whole group: the program has it too
     threading.Thread(target=_hand_on, args=(child,), daemon=True).start()
     status = child.wait()
-    if status < 0:  # by a signal, as others are to see
+    if status < 0:  # killed by a signal, which is passed on
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         os.kill(os.getpid(), -status)
     return status

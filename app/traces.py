@@ -1,7 +1,7 @@
-"""Where time goes, as traces of requests and of jobs' stages: told to an OpenTelemetry collector where `R2C2R_TRACES=otlp`.
+"""Traces of requests and of jobs' stages, sent to an OpenTelemetry collector with `R2C2R_TRACES=otlp`.
 
-FastAPI takes those of requests by itself, where it is given who takes them. Nothing but OpenTelemetry's empty interface is
-imported otherwise. Where the collector is, and what this service is called there, its own variables say
+FastAPI records traces of requests itself, given a provider. Without tracing, only OpenTelemetry's no-op interface is
+imported. The collector's address and the service name are set by OpenTelemetry's own variables
 (`OTEL_EXPORTER_OTLP_ENDPOINT`, `OTEL_SERVICE_NAME`):
 https://opentelemetry.io/docs/specs/otel/configuration/sdk-environment-variables/
 """
@@ -15,14 +15,14 @@ from r2c2r_core.errors import EnvironmentProblem, InputError
 
 
 def open_traces(kind: str) -> TracerProvider:
-    """As R2C2R_TRACES says; raises InputError for another kind, EnvironmentProblem without OpenTelemetry."""
+    """Trace provider selected by R2C2R_TRACES; raises InputError for another kind, EnvironmentProblem without OpenTelemetry."""
     if kind not in ("", "otlp"):
         raise InputError(f"R2C2R_TRACES {kind[:40]!r}: not otlp", hint="leave it out to take none")
     return exporting() if kind else NoOpTracerProvider()
 
 
 def exporting(exporter: Any = None) -> TracerProvider:
-    """Traces to the collector, or the exporter; what is not told yet is told when the process ends."""
+    """Provider that sends traces to the collector, or the exporter; pending ones are flushed when the process ends."""
     try:
         from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
         from opentelemetry.sdk.resources import SERVICE_NAME, OTELResourceDetector, Resource
@@ -36,6 +36,6 @@ def exporting(exporter: Any = None) -> TracerProvider:
 
 
 def of_requests(provider: TracerProvider) -> TelemetryConfig:
-    """What FastAPI takes of requests: where time goes in them, and nothing of what they say."""
+    """FastAPI's telemetry configuration: durations of requests, without their content."""
     taken = not isinstance(provider, NoOpTracerProvider)
     return {"tracer_provider": provider, "tracing": taken, "operation_spans": taken, "metrics": False, "logs": False}

@@ -1,4 +1,4 @@
-"""`r2c2r user` and `r2c2r token`: who may come in, from the command line of the machine that serves them."""
+"""`r2c2r user` and `r2c2r token`: accounts and tokens from the server's command line."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ from r2c2r_core.disk import keep_private, resolved
 
 
 def add(data_dir: Path, name: str, role: str, password: str) -> None:
-    """A new account."""
+    """Add an account."""
     with _engine(data_dir) as engine:
         accounts.add(engine, name, role, password)
 
@@ -32,31 +32,31 @@ def remove(data_dir: Path, name: str) -> None:
 
 
 def set_role(data_dir: Path, name: str, role: str) -> None:
-    """Another role."""
+    """Change an account's role."""
     with _engine(data_dir) as engine:
         accounts.change(engine, name, role=role)
 
 
 def set_password(data_dir: Path, name: str, password: str) -> None:
-    """Another password; the account's sessions end."""
+    """Change an account's password and end its sessions."""
     with _engine(data_dir) as engine:
         accounts.change(engine, name, password=password)
 
 
 def add_token(data_dir: Path, owner: str | None, name: str, scope: str) -> str:
-    """A new token's secret."""
+    """Create a token and return its secret."""
     with _engine(data_dir) as engine:
         return tokens.add(engine, owner, name, scope)[0]
 
 
 def tokens_of(data_dir: Path) -> list[schemas.ApiToken]:
-    """Everybody's."""
+    """Tokens of all users."""
     with _engine(data_dir) as engine:
         return tokens.everyone(engine)
 
 
 def revoke_token(data_dir: Path, number: int) -> None:
-    """It opens nothing from now on."""
+    """Revoke a token."""
     with _engine(data_dir) as engine:
         tokens.revoke(engine, number)
 

@@ -1,4 +1,4 @@
-"""`r2c2r work`: a machine that takes jobs from the database and serves nothing."""
+"""`r2c2r work`: a machine that computes jobs from a shared database without serving."""
 
 import contextlib
 import signal
@@ -31,9 +31,9 @@ TIDY_S = 5.0
 
 
 def work(*, data_dir: Path, heavy_jobs: int = 1, workers: int = 0, live: bool = False) -> None:
-    """Take jobs until it is stopped, or drained and done; raises EnvironmentProblem where the rows are in a file.
+    """Take jobs until stopped, or drained and done; raises EnvironmentProblem where the database is a file.
 
-    With `live` it draws live masks for servers too.
+    With `live` it also computes live masks for servers.
     """
     settings = Settings(data_dir=resolved(data_dir), heavy_jobs=heavy_jobs, workers=workers)
     if not settings.postgres:
@@ -46,13 +46,13 @@ def work(*, data_dir: Path, heavy_jobs: int = 1, workers: int = 0, live: bool = 
     stopping = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.set())
-    # a cache is one process's; without a store all machines share the folder, where files are written at once or not at all
+    # a cache belongs to one process; without a store all machines share the folder, where files are written atomically
     with only_server(settings.data_dir) if settings.store else contextlib.nullcontext():
         run_jobs(settings, commands_of(settings), stopping, live=live)
 
 
 def run_jobs(settings: Settings, commands: Commands, stopping: threading.Event, *, live: bool = False) -> None:
-    """Take jobs until it is set, or the seat is drained and done."""
+    """Take jobs until `stopping` is set, or the seat is drained and done."""
     with opened(settings.rows) as engine:
         store = open_store(settings)
         hub, traces = Hub(), open_traces(settings.traces)
@@ -68,7 +68,7 @@ def run_jobs(settings: Settings, commands: Commands, stopping: threading.Event, 
         sys.stdout.flush()
         try:
             while not stopping.wait(min(TIDY_S, settings.beat_s)) and not (runner.draining and not runner.projects):
-                with contextlib.suppress(R2C2RError):  # the store is away; the next look tries again
+                with contextlib.suppress(R2C2RError):  # the store is unavailable; the next iteration tries again
                     store.tidy(runner.projects | (segmenters.projects if segmenters else frozenset()))
         finally:
             runner.stop()

@@ -1,10 +1,10 @@
 """The data folder as a cache of projects in an object store.
 
-Of each project the store holds its files as objects named by their content, and one manifest that says which file has which
-content now. The manifest is written on the condition that nobody else wrote it meanwhile: what it names is whole, whenever a
-machine dies. It also says whose job makes the nouns now: a machine that was silent for so long that another took its job up
-keeps nothing more of what it made. Beside the projects here lies what each manifest said when it was last looked at, so that
-what changed here and what changed there can be told apart; what changed in both is as who kept it last has it.
+For each project the store has its files as content-addressed objects, and one manifest that maps files to contents. The
+manifest is written conditionally (compare-and-swap), so that it is consistent even if a machine dies. It also names the
+holder whose job makes the nouns: a machine that was silent for so long that another took over its job cannot store results
+any more. A local note of each manifest as last seen separates local from remote changes; of files changed on both sides, the
+last stored version wins.
 """
 
 import hashlib
@@ -29,19 +29,19 @@ from r2c2r_core.workspace import write_atomically
 
 _log = logging.getLogger(__name__)
 
-AT_ONCE = 16  # objects on their way at a time: a recording is thousands of small ones
-TRIES = 20  # at a manifest that others write too
-UNUSED_S = 600.0  # a page may read for so long what it asked for
-UNNAMED = timedelta(hours=1)  # for so long an object that no manifest names may be one that is about to be named
-_MADE_ANEW = ("previews", "logs")  # the one at any time; the other is shown while it is written: keep_log
+AT_ONCE = 16  # concurrent transfers: a recording is thousands of small objects
+TRIES = 20  # for a manifest that others write too
+UNUSED_S = 600.0  # minimum time that a page may read requested files
+UNNAMED = timedelta(hours=1)  # minimum age of an unreferenced object to be deleted, as it may be about to be referenced
+_MADE_ANEW = ("previews", "logs")  # not stored: recreated on demand; published while written: keep_log
 _RECORDING = "source/"
-_CLICKS_BESIDE_IT = "source/prompts.json"  # of a sample: what makes it a project reads them
+_CLICKS_BESIDE_IT = "source/prompts.json"  # of a sample: read when it becomes a project
 _MADE_BY_JOBS = ("work/", "bundles/", "variants/", "requests/", "finished-prompts.json")
 _HALF_MADE = "half-made"
 
 
 class Entry(NamedTuple):
-    """One file: its content, and its time of change, by which recordings that are folders are known."""
+    """One file: its content digest, and its modification time, which identifies recordings that are folders."""
 
     sha256: str
     size: int  # bytes
@@ -49,7 +49,7 @@ class Entry(NamedTuple):
 
 
 class Lost(NotFound):
-    """The project's job is another machine's by now."""
+    """Another machine has taken over the project's job."""
 
 
 Names = dict[str, Entry]
@@ -58,7 +58,7 @@ _NONE = Entry("", -1, -1)
 
 @dataclass(slots=True)
 class Held:
-    """What of a project's manifest lies here, as far as is known; `tag` is the manifest's when all that is wanted does."""
+    """Local state of a project: its files as last synchronised; `tag` is the manifest's tag if all wanted files are local."""
 
     names: Names = field(default_factory=dict)
     tag: str | None = None
@@ -66,26 +66,26 @@ class Held:
 
 
 class Manifest(NamedTuple):
-    """What a project is made of, and who makes it."""
+    """Files of a project, and the holder that writes them."""
 
     names: Names
     holder: str
 
 
 class Mirror:
-    """A Store (app.store.protocol) of objects. `quota_bytes` is what may lie here; None: whatever was used."""
+    """A Store (app.store.protocol) of objects. `quota_bytes` limits the local cache; None: unlimited."""
 
     def __init__(self, objects: Objects, data_dir: Path, quota_bytes: int | None = None) -> None:
         self._objects, self._quota = objects, quota_bytes
         self._projects, self._notes = data_dir / "projects", data_dir / "stored"
         self._locks: defaultdict[str, threading.RLock] = defaultdict(threading.RLock)
-        self._holders: dict[str, str] = {}  # what this machine is called in manifests, of projects that it held last
+        self._holders: dict[str, str] = {}  # this machine's holder name in manifests, by project
         self._used: dict[str, float] = {}
         self._seen: set[str] = set()  # since they were last kept
         self._swept: dict[str, float] = {}
 
     def fetch(self, project_id: str, *, recording: bool = False) -> None:
-        """Take what is otherwise there than it was when it was last looked at."""
+        """Download remote changes since the last synchronisation."""
         with self._locks[project_id]:
             self._used[project_id] = time.monotonic()
             self._seen.add(project_id)
@@ -107,9 +107,9 @@ class Mirror:
             raise Unavailable(f"{project_id}: its files change all the time", hint="try again in a moment")
 
     def keep(self, project_id: str) -> None:
-        """Give what is otherwise here than it was when it was last looked at.
+        """Upload local changes since the last synchronisation.
 
-        Raises NotFound where the project was deleted, and Lost where its job is another's: what was made of it here is dropped.
+        Raises NotFound if the project was deleted, and Lost if its job was taken over: its local results are then discarded.
         """
         root = self._projects / project_id
         with self._locks[project_id]:
@@ -135,7 +135,7 @@ class Mirror:
                     )
                 except Changed:
                     continue
-                alone = found is None or found.tag == held.tag  # what others gave is still to be fetched
+                alone = found is None or found.tag == held.tag  # others' uploads are still to be fetched
                 mine = {path: entry for path, entry in held.names.items() if path not in gone} | changed
                 self._note(project_id, Held(mine, tag if alone else None, held.recording))
                 self._sweep(project_id, names)
@@ -143,25 +143,25 @@ class Mirror:
             raise Unavailable(f"{project_id}: its files change all the time", hint="try again in a moment")
 
     def hold(self, project_id: str, holder: str, *, taken: bool = False) -> None:
-        """Say in the manifest who makes what is in it; raises NotFound where the project was deleted."""
+        """Enter the holder in the manifest; raises NotFound where the project was deleted."""
         with self._locks[project_id]:
             if not taken:
                 self._take_hold(project_id, holder)
             self._holders[project_id] = holder
 
     def keep_log(self, project_id: str, log: Path) -> None:
-        """Give the log as it is."""
+        """Upload the log in its current state."""
         if log.is_file():
             self._objects.put(_log_of(project_id, log), log)
 
     def fetch_log(self, project_id: str, log: Path) -> None:
-        """Take the log as it was given last."""
+        """Download the last uploaded log."""
         found = self._objects.read(_log_of(project_id, log))
         if found is not None:
             write_atomically(log, found.content)
 
     def link(self, project_id: str, path: Path, name: str) -> str | None:
-        """A presigned address of a file that was kept."""
+        """A presigned address of a stored file."""
         root = self._projects / project_id
         entry = self._held(project_id).names.get(path.relative_to(root).as_posix())
         if entry is None:
@@ -169,23 +169,23 @@ class Mirror:
         return self._objects.link(_object(project_id, entry), f"projects/{project_id}/downloads/{entry.sha256}/{name}")
 
     def size(self, project_id: str) -> int:
-        """Bytes of all files that the manifest names."""
+        """Size in bytes of all files in the manifest."""
         found = self._objects.read(_manifest(project_id))
         return sum(entry.size for entry in _said(found).names.values())
 
     def delete(self, project_id: str) -> None:
-        """Delete all objects of the project, its manifest first: whoever would keep something is refused then."""
+        """Delete all objects of the project, its manifest first, so that later uploads are refused."""
         with self._locks[project_id]:
             self._objects.delete([_manifest(project_id)])
             self._objects.delete(self._objects.old(f"projects/{project_id}/", timedelta()))
             self._note_path(project_id).unlink(missing_ok=True)
 
     def was_deleted(self, project_id: str) -> bool:
-        """Whether it was looked at here, and is not there any more."""
+        """Whether the project was synchronised here, and its manifest no longer exists."""
         return self._note_path(project_id).exists() and not self._objects.has(_manifest(project_id))
 
     def tidy(self, in_use: frozenset[str]) -> None:
-        """Keep what pages wrote of the projects that were asked for since; delete those here that were unused longest."""
+        """Upload pending changes of recently requested projects; delete the least recently used local ones beyond the quota."""
         seen, self._seen = self._seen, set()
         for project_id in seen:
             if (self._projects / project_id).is_dir():
@@ -204,7 +204,7 @@ class Mirror:
     def _evict(self, project_id: str) -> None:
         with self._locks[project_id]:
             self._keep_or_forget(project_id)
-            self._note_path(project_id).unlink(missing_ok=True)  # first: what is missing then is no deletion
+            self._note_path(project_id).unlink(missing_ok=True)  # first, so that missing files do not count as deletions
             delete_folder(self._projects / project_id)
 
     def _keep_or_forget(self, project_id: str) -> None:
@@ -212,7 +212,7 @@ class Mirror:
             self.keep(project_id)
         except Lost as lost:
             _log.warning("%s", lost)
-        except NotFound:  # deleted for good by another machine: a cache keeps nothing of it
+        except NotFound:  # permanently deleted by another machine: remove it from the cache
             self._note_path(project_id).unlink(missing_ok=True)
             delete_folder(self._projects / project_id)
 
@@ -229,7 +229,7 @@ class Mirror:
         raise Unavailable(f"{project_id}: its files change all the time", hint="try again in a moment")
 
     def _drop(self, project_id: str, held: Held, changed: Names, gone: set[str]) -> None:
-        """Have nothing here that a lost job made; raises Lost."""
+        """Discard local results of a lost job; raises Lost."""
         for path in changed:
             if path.startswith(_MADE_BY_JOBS):
                 (self._projects / project_id / path).unlink(missing_ok=True)
@@ -240,7 +240,7 @@ class Mirror:
         raise Lost(f"{project_id}: another machine goes on with its job")
 
     def _take(self, project_id: str, held: Held, names: Names, wanted: Names) -> bool:
-        """Have the wanted files here; False where one was replaced meanwhile."""
+        """Download the wanted files; False where one was replaced meanwhile."""
         root = self._projects / project_id
         missing = {
             path: entry for path, entry in wanted.items() if held.names.get(path) != entry and _state(root / path) != entry[1:]
@@ -267,7 +267,7 @@ class Mirror:
             part.unlink(missing_ok=True)
 
     def _give(self, project_id: str, changed: Names, there: set[str]) -> Names:
-        """Put what the store lacks; what it has then. A file that was written meanwhile is left for the next time."""
+        """Upload missing objects and return the stored entries. A file written meanwhile is left for the next time."""
         with ThreadPoolExecutor(AT_ONCE) as pool:
             new = {path: entry for path, entry in changed.items() if entry.sha256 not in there}
             put = pool.map(lambda item: self._put(project_id, *item), new.items())
@@ -286,7 +286,7 @@ class Mirror:
         return whole
 
     def _sweep(self, project_id: str, names: Names) -> None:
-        """Now and then, delete objects that were replaced and copies that were downloaded."""
+        """Occasionally delete replaced objects and download copies."""
         if time.monotonic() - self._swept.setdefault(project_id, time.monotonic()) < UNNAMED.total_seconds():
             return
         self._swept[project_id] = time.monotonic()
@@ -322,7 +322,7 @@ def _wanted(names: Names, *, recording: bool) -> Names:
 
 
 def _lying(root: Path) -> dict[str, tuple[int, int]]:
-    """Size and time of change of each file that is to be kept."""
+    """Size and modification time of each file to be stored."""
     found: dict[str, tuple[int, int]] = {}
     for parent, folders, files in os.walk(root):
         if Path(parent) == root:
@@ -338,7 +338,7 @@ def _lying(root: Path) -> dict[str, tuple[int, int]]:
 def _state(path: Path) -> tuple[int, int] | None:
     try:
         found = path.stat()
-    except FileNotFoundError:  # workers write while this looks
+    except FileNotFoundError:  # workers write during the scan
         return None
     return found.st_size, found.st_mtime_ns
 

@@ -1,4 +1,4 @@
-"""Objects by name in S3, GCS, Azure, a folder or memory: the few things that are asked of them, with failures in our words."""
+"""Minimal interface to object stores (S3, GCS, Azure, a folder or memory), with the app's own errors."""
 
 import contextlib
 import fcntl
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from app.errors import Unavailable
 from r2c2r_core.errors import EnvironmentProblem, InputError
 
-LINK_S = 600  # an address for a download is good for ten minutes: to begin it, not to end it
+LINK_S = 600  # a download address is valid for ten minutes: to start the download, not to finish it
 _CHUNK = 8 << 20
 _HINT = "s3://BUCKET/PREFIX with AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or file:///FOLDER"
 
@@ -24,17 +24,17 @@ class Read(NamedTuple):
 
 
 class Changed(Exception):
-    """Somebody else wrote the object meanwhile."""
+    """The object was modified by another writer."""
 
 
 class Objects:
     """One object store."""
 
     def __init__(self, store: Any, folder: Path | None = None) -> None:
-        self._store, self._folder = store, folder  # a folder knows no conditional writes of its own
+        self._store, self._folder = store, folder  # a folder has no conditional writes of its own
 
     def read(self, name: str, *, unless: str | None = None) -> Read | None:
-        """The object; None where there is none. Raises NotModified where its tag is still this one."""
+        """The object, or None. Raises NotModified if its tag equals `unless`."""
         import obstore
 
         with _said():
@@ -47,7 +47,7 @@ class Objects:
                 raise NotModified from error
 
     def write(self, name: str, content: bytes, *, after: str | None) -> str:
-        """Write the object where its tag is still `after` (None: where there is none yet); its tag. Raises Changed."""
+        """Write the object if its tag is still `after` (None: if it does not exist), and return its tag. Raises Changed."""
         import obstore
 
         with _said(), self._alone():
@@ -63,14 +63,14 @@ class Objects:
                 raise Changed from error
 
     def put(self, name: str, path: Path) -> None:
-        """Write an object from a file, whatever is there."""
+        """Write an object from a file, unconditionally."""
         import obstore
 
         with _said():
             obstore.put(self._store, name, path)
 
     def get(self, name: str, path: Path) -> str:
-        """Write a file from an object; the SHA-256 of its bytes. Raises FileNotFoundError where there is no object."""
+        """Write a file from an object and return its SHA-256. Raises FileNotFoundError where there is no object."""
         import obstore
 
         digest = hashlib.sha256()
@@ -81,7 +81,7 @@ class Objects:
         return digest.hexdigest()
 
     def has(self, name: str) -> bool:
-        """Whether there is one."""
+        """Whether the object exists."""
         import obstore
 
         with _said():
@@ -92,7 +92,7 @@ class Objects:
             return True
 
     def old(self, prefix: str, age: timedelta) -> list[str]:
-        """Names below the prefix that were written longer ago than that."""
+        """Names below the prefix of objects older than `age`."""
         import obstore
 
         with _said():
@@ -100,7 +100,7 @@ class Objects:
         return [entry["path"] for entry in found if entry["last_modified"] <= datetime.now(UTC) - age]
 
     def delete(self, names: list[str]) -> None:
-        """Delete those that are there."""
+        """Delete the existing ones of these objects."""
         import obstore
 
         with _said():
@@ -109,7 +109,7 @@ class Objects:
                     obstore.delete(self._store, name)
 
     def link(self, name: str, as_name: str) -> str | None:
-        """An address that gives the object to whoever has it for minutes, ending in `as_name`; None where a store has none."""
+        """A presigned address of the object, valid for minutes, ending in `as_name`; None where the store has none."""
         import obstore
 
         if not isinstance(self._store, obstore.store.S3Store | obstore.store.GCSStore | obstore.store.AzureStore):
@@ -130,11 +130,11 @@ class Objects:
 
 
 class NotModified(Exception):
-    """The object is as it was."""
+    """The object is unchanged."""
 
 
 def open_objects(address: str) -> Objects:
-    """The object store at an address; raises InputError for none, EnvironmentProblem without the library that speaks to it."""
+    """The object store at an address; raises InputError for an invalid one, EnvironmentProblem without its library."""
     try:
         import obstore
     except ModuleNotFoundError as error:

@@ -1,4 +1,4 @@
-"""Where projects' files are, as the settings say it."""
+"""Selection of the store of projects' files from the settings."""
 
 from app.settings import Settings
 from app.store.mirror import Mirror

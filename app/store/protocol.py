@@ -1,4 +1,4 @@
-"""Where projects' files are: `Store` is what jobs and services ask of it, `Folder` the data folder that holds all of them."""
+"""Storage of projects' files: the protocol `Store` used by jobs and services, and `Folder`, the local data folder."""
 
 from pathlib import Path
 from typing import Protocol
@@ -7,65 +7,65 @@ from app.files import folder_bytes
 
 
 class Store(Protocol):
-    """What is beyond the data folder of this machine. Each call may be made from any thread."""
+    """Storage beyond this machine's data folder. All methods are thread-safe."""
 
     def fetch(self, project_id: str, *, recording: bool = False) -> None:
-        """Have the project's files here as they were kept last; those of the recording only where they are asked for."""
+        """Fetch the project's files as last kept; the recording's only if requested."""
 
     def keep(self, project_id: str) -> None:
-        """Keep what was written in the project's folder; returns when no loss of this machine loses it."""
+        """Store changes in the project's folder; returns once they survive the loss of this machine."""
 
     def hold(self, project_id: str, holder: str, *, taken: bool = False) -> None:
-        """Be who makes the project's nouns and bundles from now on: whoever was before keeps none of them any more.
+        """Become the only writer of the project's nouns and bundles; the previous holder can store none any more.
 
-        `taken`: another machine took it, for this one to make a part.
+        `taken`: another machine has claimed it, and this one computes a part.
         """
 
     def keep_log(self, project_id: str, log: Path) -> None:
-        """Show a log that is being written here to other machines."""
+        """Publish a log that is being written here to other machines."""
 
     def fetch_log(self, project_id: str, log: Path) -> None:
-        """Have a log here as it was shown last."""
+        """Fetch a log as last published."""
 
     def link(self, project_id: str, path: Path, name: str) -> str | None:
-        """An address, good for minutes, from which a browser takes the file under that name; None: send it from here."""
+        """An address, valid for minutes, from which a browser downloads the file under that name; None: serve it from here."""
 
     def size(self, project_id: str) -> int:
-        """Bytes of the project's files."""
+        """Size of the project's files in bytes."""
 
     def delete(self, project_id: str) -> None:
-        """Delete the project's files for good, but for those here."""
+        """Delete the project's files permanently, except the local ones."""
 
     def was_deleted(self, project_id: str) -> bool:
-        """Whether the folder here is of a project that another machine deleted for good."""
+        """Whether another machine has permanently deleted the local folder's project."""
 
     def tidy(self, in_use: frozenset[str]) -> None:
-        """Keep what was written since, and make room where none of these projects is."""
+        """Store pending changes, and free space of projects that are not in use."""
 
 
 class Folder:
-    """The data folder is the truth, and nothing is beyond it."""
+    """Store that is only the local data folder."""
 
     def __init__(self, projects: Path) -> None:
         self._projects = projects
 
     def fetch(self, project_id: str, *, recording: bool = False) -> None:
-        """They are here."""
+        """Nothing to do: files are local."""
 
     def keep(self, project_id: str) -> None:
-        """They are."""
+        """Nothing to do: files are local."""
 
     def hold(self, project_id: str, holder: str, *, taken: bool = False) -> None:
-        """Workspaces are locked while somebody writes."""
+        """Nothing to do: workspaces are locked while they are written."""
 
     def keep_log(self, project_id: str, log: Path) -> None:
-        """It is."""
+        """Nothing to do: logs are local."""
 
     def fetch_log(self, project_id: str, log: Path) -> None:
-        """It is here."""
+        """Nothing to do: logs are local."""
 
     def link(self, project_id: str, path: Path, name: str) -> str | None:
-        """None."""
+        """No address: files are served from here."""
         return None
 
     def size(self, project_id: str) -> int:
@@ -73,10 +73,10 @@ class Folder:
         return folder_bytes(self._projects / project_id)
 
     def delete(self, project_id: str) -> None:
-        """There are none elsewhere."""
+        """Nothing to do: there are no other files."""
 
     def was_deleted(self, project_id: str) -> bool:
-        """By nobody else."""
+        """False, as there is no other machine."""
         return False
 
     def tidy(self, in_use: frozenset[str]) -> None:

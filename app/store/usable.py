@@ -1,4 +1,4 @@
-"""Whether the settings of an object store open it: what is wrong is said in one line, before anything waits for the store."""
+"""Check of an object store's settings, with a one-line error before anything waits for the store."""
 
 import logging
 import re
@@ -10,7 +10,7 @@ from r2c2r_core.errors import InputError
 
 _log = logging.getLogger(__name__)
 
-WRITTEN = "checked"  # an object of no content: who may write it may write others
+WRITTEN = "checked"  # an empty object, to test write permission
 _CREDENTIALS = {
     "s3": "AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY",
     "gs": "GOOGLE_APPLICATION_CREDENTIALS",
@@ -19,7 +19,7 @@ _CREDENTIALS = {
 _WRONG = tuple(
     (re.compile(said), why, hint)
     for said, why, hint in (
-        # where machines of a cloud ask for theirs when none are set
+        # where cloud machines request credentials if none are set
         (r"169\.254\.169\.254|metadata\.google\.internal", "no credentials are set", "set {credentials}"),
         (r"builder error", "its endpoint has no TLS", "set AWS_ENDPOINT_URL to an https address, or AWS_ALLOW_HTTP=true"),
         (r"code: 404", "there is no bucket {bucket}", "make it, or name another one; AWS_ENDPOINT_URL says whose"),
@@ -31,7 +31,7 @@ _WRONG = tuple(
 
 
 def require_store(settings: Settings) -> None:
-    """Raise InputError where the store will never take what it is given; one that does not answer now may do so later."""
+    """Raise InputError for settings that can never work; a store that does not answer now may do so later."""
     if not settings.store:
         return
     open_objects(settings.store)
@@ -39,7 +39,7 @@ def require_store(settings: Settings) -> None:
 
     store = obstore.store.from_url(settings.store, retry_config={"max_retries": 1, "retry_timeout": timedelta(seconds=5)})
     try:
-        list(obstore.list(store, WRITTEN))  # first: there are servers that make a bucket when something is put into it
+        list(obstore.list(store, WRITTEN))  # first: some servers create a bucket on the first write
         obstore.put(store, WRITTEN, b"")
     except (obstore.exceptions.BaseError, OSError) as error:
         if wrong := refusal(settings.store, str(error)):
@@ -48,7 +48,7 @@ def require_store(settings: Settings) -> None:
 
 
 def refusal(address: str, said: str) -> InputError | None:
-    """What is wrong with the settings, by what came of the first words with the store; None where they may be right."""
+    """The error in the settings derived from the store's first response; None where they may be right."""
     found = re.search(r"<Code>(\w+)", said) or re.search(r"code: (\d+)", said)
     scheme, _, place = address.partition("://")
     words = {

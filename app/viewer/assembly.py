@@ -1,4 +1,4 @@
-"""A scene in the 3D view: a frame a body, so that joints turn them, objects can be hidden, and a click finds what is there."""
+"""A scene in the 3D view: one frame per body, for joint motion, hiding of objects and picking."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,7 +22,7 @@ from r2c2r_core.model.scene import ArticulatedScene, Link
 
 Draw = Literal["meshes", "wireframe", "colliders", "both", "distance", "unobserved"]
 _COLLIDER, _WIRE, _CUT = (86, 180, 233), (120, 130, 145), (230, 60, 150)
-_CUT_M = 0.004  # how thick the edges of a cut are
+_CUT_M = 0.004  # thickness of cut edges
 _CHOSEN, _CHOSEN_PX = (20, 130, 255), 3  # the box round the chosen object
 
 
@@ -37,7 +37,7 @@ class JointValue:
 
 
 class Shape(NamedTuple):
-    """Faces in a body's frame, as they are drawn."""
+    """Drawable faces in a body's frame."""
 
     vertices: Points
     faces: np.ndarray
@@ -50,17 +50,17 @@ class Shape(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Style:
-    """How a scene is drawn."""
+    """Drawing style of a scene."""
 
     draw: Draw = "meshes"
-    clip: tuple[Sequence[float], Sequence[float]] | None = None  # lowest and highest corner that stays, as shares of the span
-    paint: Callable[[Points], np.ndarray] | None = None  # RGB of points of the world, where `draw` asks for it
-    ahead: tuple[float, float] = (0.0, -1.0)  # where fronts face, of a scene in which none open
+    clip: tuple[Sequence[float], Sequence[float]] | None = None  # lowest and highest kept corner, as fractions of the span
+    paint: Callable[[Points], np.ndarray] | None = None  # RGB of world points, if `draw` requires it
+    ahead: tuple[float, float] = (0.0, -1.0)  # direction of the fronts, if none open
 
 
 @dataclass(slots=True)
 class Assembly:
-    """The bodies of a scene in one server, and where its joints stand."""
+    """The bodies of a scene in one server, with its joint values."""
 
     server: Any
     plan: Plan
@@ -71,7 +71,7 @@ class Assembly:
     boxes: list[Any] = field(default_factory=list)  # round the chosen object
     ahead: tuple[float, float] = (0.0, -1.0)  # where fronts face, where none opens
     span: Span = field(init=False)  # of all of it, closed and uncut
-    parts: dict[str, tuple[Vector3, Vector3]] = field(init=False)  # by object: what it reaches, as shares of the span
+    parts: dict[str, tuple[Vector3, Vector3]] = field(init=False)  # bounds of each object, as fractions of the span
 
     def __post_init__(self) -> None:
         reached: dict[str, list[Points]] = {}
@@ -90,7 +90,7 @@ class Assembly:
             self.frames[body.name].visible = body.object_name not in self.hidden
 
     def choose(self, name: str) -> None:
-        """Draw a box round each body of the chosen object, which moves with it; no box where no object has that name."""
+        """Draw a box around each body of the chosen object, which moves with it; none for an unknown name."""
         for box in self.boxes:
             box.remove()
         self.boxes = []
@@ -105,31 +105,31 @@ class Assembly:
 
     @property
     def bounds(self) -> tuple[Vector3, Vector3]:
-        """Lowest and highest corner of all that is shown, closed."""
+        """Lowest and highest corner of all visible bodies, closed."""
         return self.bounds_of({body.object_name for body in self.plan.bodies})
 
     def bounds_of(self, names: Collection[str]) -> tuple[Vector3, Vector3]:
-        """Lowest and highest corner of these objects, as far as they are shown, closed."""
+        """Lowest and highest corner of the visible ones of these objects, closed."""
         shown = [(body, shape) for body, shape in self._shown() if body.object_name in names]
         corners = [body.world_from_body.apply(shape.vertices) for body, shape in shown if len(shape.vertices)]
         stacked = np.vstack(corners) if corners else np.zeros((1, 3))
         return stacked.min(axis=0), stacked.max(axis=0)
 
     def move(self, values: Mapping[str, float]) -> None:
-        """Put joints at these positions, clamped to their limits, and every body where its joints have it."""
+        """Set joints to these positions, clamped to their limits, and move the bodies."""
         self.set(values)
         for name, pose in self.poses().items():
             self.frames[name].position = pose.translation
             self.frames[name].wxyz = vtf.SO3.from_matrix(pose.rotation).wxyz
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Put joints at these positions, clamped, without moving what is drawn."""
+        """Set joints to these positions, clamped, without moving the bodies."""
         for name, value in values.items():
             joint = self.joints[name]
             joint.value = float(min(max(value, joint.lower), joint.upper))
 
     def poses(self) -> dict[str, Rigid3]:
-        """World_from_body of every body."""
+        """Pose (world_from_body) of every body."""
         found: dict[str, Rigid3] = {WORLD: Rigid3()}
         for body in self.plan.bodies:
             found[body.name] = found[body.parent] @ body.parent_from_body @ self._motion(body)
@@ -137,7 +137,7 @@ class Assembly:
         return found
 
     def hit(self, origin: Vector3, direction: Vector3) -> Hit | None:
-        """The first face of what is not hidden on a ray in the world."""
+        """The first face of visible bodies on a ray in the world."""
         poses, best = self.poses(), None
         for body, shape in self._shown():
             body_from_world = poses[body.name].inverse
@@ -148,12 +148,12 @@ class Assembly:
         return best
 
     def remove(self) -> None:
-        """Take it away, with what hangs on it."""
+        """Remove the scene's nodes and their children."""
         for frame in self.frames.values():
             frame.remove()
 
     def cut(self, low: Sequence[float], high: Sequence[float]) -> dict[str, Points]:
-        """Take away what is outside a box of the span, where joints stand now; the ends (n, 2, 3) of cut edges, by body."""
+        """Cut away everything outside a box of the span at current joint values; the ends (n, 2, 3) of cut edges, by body."""
         clip, poses, edges = clip_of(self.span, low, high), self.poses(), {}
         for name, shapes in self.shapes.items():
             stay, lines = [], []
@@ -191,7 +191,7 @@ def assemble(
     textured: Callable[[str, TexturedMesh], Any],
     values: Mapping[str, float] | None = None,
 ) -> Assembly:
-    """Show a scene under a node `root`, joints at these values, else closed; `textured` adds a textured mesh at a node."""
+    """Show a scene under a node `root`, with joints at these values, else closed; `textured` adds a textured mesh to a node."""
     plan = plan_bundle(scene)
     shapes = {body.name: list(shapes_of(body.link, style.draw)) for body in plan.bodies}
     shown = Assembly(server, plan, shapes, ahead=style.ahead)
@@ -248,7 +248,7 @@ def undressed(scene: ArticulatedScene, names: Collection[str]) -> ArticulatedSce
 
 
 def shapes_of(link: Link, draw: Draw) -> Iterator[Shape]:
-    """What is drawn of a link, in its frame."""
+    """Shapes to draw for a link, in its frame."""
     if draw in HEATS:
         yield from (_fine(shape) for shape in shapes_of(link, "meshes"))
         return
@@ -268,7 +268,7 @@ def shapes_of(link: Link, draw: Draw) -> Iterator[Shape]:
 
 
 def _fine(shape: Shape) -> Shape:
-    """The same surface in triangles small enough to be coloured by their corners."""
+    """The same surface subdivided into triangles small enough for per-vertex colours."""
     vertices, faces, _ = subdivide_long_edges(shape.vertices, shape.faces, np.zeros((len(shape.vertices), 1)), EDGE_M)
     return shape._replace(vertices=vertices, faces=faces, mesh=None)
 

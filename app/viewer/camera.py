@@ -1,4 +1,4 @@
-"""Where the camera of the 3D view stands: on the side that was filmed, on an axis, near or far off."""
+"""Camera of the 3D view: filming side or axis views, with a normal or a long lens."""
 
 import threading
 from collections import deque
@@ -12,29 +12,34 @@ from r2c2r_core.arrays import Vector3
 Axis = Literal["front", "back", "left", "right", "top", "bottom"]
 AXES: tuple[Axis, ...] = get_args(Axis)
 USUAL_FOV = np.radians(75.0)  # viser's field of view, upright
-LONG_FOV = np.radians(3.0)  # viser has no orthographic camera: from this far off nothing looks smaller for being behind
-_REMEMBERED = 32  # turns that may come while a page opens
-_UNDRAWN: Vector3 = np.array([-5.0, 0.0, 0.0])  # where three.js puts a camera: so a slow page says before it has drawn anything
-_NEAR_M = {USUAL_FOV: 0.01, LONG_FOV: 2.0}  # the long lens stands some 80 m off, where 1 cm of near plane is 0.1 m of depth
+LONG_FOV = np.radians(3.0)  # viser has no orthographic camera: a long lens is nearly orthographic
+_REMEMBERED = 32  # camera moves that may occur while a page opens
+_UNDRAWN: Vector3 = np.array(
+    [-5.0, 0.0, 0.0]
+)  # three.js's default camera position, reported by a slow page before it has drawn anything
+_NEAR_M = {
+    USUAL_FOV: 0.01,
+    LONG_FOV: 2.0,
+}  # the long lens is some 80 m away, where a near plane at 1 cm gives a depth resolution of 0.1 m
 
 
 @dataclass(slots=True)
 class Lens:
-    """The camera of everybody who looks at one view."""
+    """The camera shared by all pages of one view."""
 
     server: Any
     fov: float = USUAL_FOV
-    _left: deque[Vector3] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))  # where it stood before
+    _left: deque[Vector3] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))  # earlier positions
     _turning: threading.Lock = field(default_factory=threading.Lock)
 
     def __post_init__(self) -> None:
         self.server.on_client_connect(self.meet)
 
     def meet(self, client: Any) -> None:
-        """Turn the camera of a page that was told where to stand before it was turned: viser moves only pages it knows.
+        """Move the camera of a page that connected with an outdated position, as viser moves only connected pages.
 
-        Such a page is known by where it stands, at one of the earlier places or where it began before it drew anything: a
-        person's own place, after a lost connection, is none of them.
+        Such a page is recognised by its position: an earlier one, or the default before drawing. A position set by the user
+        and restored after a lost connection is neither.
         """
         with self._turning:
             place = np.asarray(client.camera.position)
@@ -43,13 +48,13 @@ class Lens:
                 _turn(client.camera, tuple(first.position), tuple(first.look_at), self.fov)
 
     def look(self, position: Vector3, target: Vector3) -> None:
-        """Stand there as seen with the usual lens: the long one steps back along the same line."""
+        """Set the position for the usual lens; the long lens steps back along the same line."""
         away = np.asarray(position) - target
         step_back = np.tan(USUAL_FOV / 2) / np.tan(self.fov / 2)
         self.stand(target + step_back * away, target)
 
     def stand(self, position: Vector3, target: Vector3, fov: float | None = None) -> None:
-        """Stand just there, with another lens where one is given until the camera is turned again."""
+        """Set the exact position, with another lens until the next move if one is given."""
         place, aim = tuple(float(v) for v in position), tuple(float(v) for v in target)
         with self._turning:
             for camera in self._cameras():
@@ -57,13 +62,13 @@ class Lens:
 
     @property
     def pose(self) -> tuple[list[float], list[float]]:
-        """Where the page that came last stands, and what it looks at; where one to come will, while there is none."""
+        """Position and target of the last connected page, or the initial ones without a page."""
         clients = list(self.server.get_clients().values())
         camera = clients[-1].camera if clients else self.server.initial_camera
         return [float(v) for v in camera.position], [float(v) for v in camera.look_at]
 
     def use(self, *, parallel: bool) -> None:
-        """Change the lens; what is looked at stays as large as it was."""
+        """Change the lens, keeping the apparent size of the target."""
         fov = LONG_FOV if parallel else USUAL_FOV
         if fov == self.fov:
             return
@@ -75,7 +80,7 @@ class Lens:
                 _turn(camera, tuple(aim + step * (place - aim)), tuple(aim), fov)
 
     def _cameras(self) -> list[Any]:
-        """All that are to be turned, the one of pages to come first."""
+        """All cameras to move, first the initial camera of future pages."""
         self._left.append(np.array(self.server.initial_camera.position))
         return [self.server.initial_camera, *(client.camera for client in self.server.get_clients().values())]
 
@@ -86,10 +91,10 @@ def _turn(camera: Any, position: tuple[float, ...], target: tuple[float, ...], f
 
 
 def from_axis(axis: Axis, facing: Vector3, low: Vector3, high: Vector3) -> tuple[Vector3, Vector3]:
-    """Position and target that show all of a box from one side; `facing` is where its fronts face, level."""
+    """Position and target that show all of a box from one side; `facing` is the horizontal direction of its fronts."""
     target, half = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     ahead = np.array([facing[0], facing[1], 0.0]) / max(float(np.hypot(facing[0], facing[1])), 1e-9)
-    right = np.array([-ahead[1], ahead[0], 0.0])  # to the right of who faces the fronts
+    right = np.array([-ahead[1], ahead[0], 0.0])  # to the right when facing the fronts
     up = np.array([0.0, 0.0, 1.0])
     tilt = 1e-3 * ahead  # straight down there is no up
     ways = {"front": ahead, "back": -ahead, "left": -right, "right": right, "top": up + tilt, "bottom": tilt - up}

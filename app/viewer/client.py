@@ -1,6 +1,6 @@
-"""The web process's end of the viewer: starts its process when somebody looks, asks it things, knows who may look at what.
+"""Client of the viewer process: starts it on demand, sends commands, and checks access to views.
 
-Each session has a view of its own of each project: what one person shows, turns or moves, nobody else sees.
+Each session has its own view of each project, independent of other users' views.
 """
 
 import hashlib
@@ -21,21 +21,21 @@ from app.settings import Settings
 from r2c2r_core.errors import InputError, R2C2RError
 
 TOKEN_S = 12 * 3600.0
-MOST_VIEWS = 24  # each holds what it shows
-MOST_CONNECTIONS = 12  # at a time, of one person: a tab has one, and one more while it connects anew
+MOST_VIEWS = 24  # each keeps its content in memory
+MOST_CONNECTIONS = 12  # concurrent ones of one user: a tab has one, and one more while it reconnects
 WORKER = python_module("app.viewer.worker")
 
 
 class _Closed(InputError):
-    """The view is not open, or not any more."""
+    """The view is not open."""
 
 
-_FAILURES: dict[str, type[R2C2RError]] = {"internal": Unavailable, "NotOpen": _Closed}  # else what was asked is at fault
+_FAILURES: dict[str, type[R2C2RError]] = {"internal": Unavailable, "NotOpen": _Closed}  # otherwise the command is invalid
 
 
 @dataclass(slots=True)
 class Opened:
-    """One session's view of one project, and the token by which its page is reached."""
+    """One session's view of one project, with the access token of its page."""
 
     project: str
     session: str
@@ -45,16 +45,16 @@ class Opened:
     port: int | None = None  # None while it is not running
     used: float = field(default_factory=time.monotonic)
     watching: int = 0
-    shown: dict[str, Any] | None = None  # to be shown again after the process was started anew
+    shown: dict[str, Any] | None = None  # shown again after a restart of the process
 
     @property
     def name(self) -> str:
-        """What the viewer's process calls it."""
+        """Name of the view in the viewer's process."""
         return f"{self.project}/{hashlib.sha256(self.session.encode()).hexdigest()[:16]}"
 
 
 class Viewer:
-    """All open 3D views. Every method may be called from any thread; those that ask the process wait for it."""
+    """All open 3D views. All methods are thread-safe; those that send commands wait for the process."""
 
     def __init__(self, settings: Settings, command: tuple[str, ...] = WORKER, *, enabled: bool = True) -> None:
         self.enabled = enabled
@@ -68,7 +68,7 @@ class Viewer:
         self._stopped = False
 
     def open(self, project: str, workdir: Path, session: str) -> str:
-        """A token by which this session reaches its view; raises Unavailable when there is no viewer."""
+        """Access token of this session's view; raises Unavailable when there is no viewer."""
         return self._running_view(project, workdir, session)[0].token
 
     def show(self, project: str, workdir: Path, session: str, wish: dict[str, Any]) -> dict[str, Any]:
@@ -82,27 +82,27 @@ class Viewer:
         return self._ask_view(project, workdir, session, {"cmd": "joints", "values": values})[1]
 
     def place(self, project: str, workdir: Path, session: str, pose: list[list[float]] | None) -> dict[str, Any]:
-        """Put the object that is being moved somewhere; with None, where it is."""
+        """Set the pose of the object being moved, or only return it for None."""
         return self._ask_view(project, workdir, session, {"cmd": "place", "pose": pose})[1]
 
     def picked(self, project: str, workdir: Path, session: str) -> dict[str, Any]:
-        """What the last click in the session's view was on."""
+        """The last picked object or point in the session's view."""
         return self._ask_view(project, workdir, session, {"cmd": "picked"})[1]
 
     def camera(self, project: str, workdir: Path, session: str) -> dict[str, Any]:
-        """Where the camera of the session's view stands, and what it looks at."""
+        """Camera position and target of the session's view."""
         return self._ask_view(project, workdir, session, {"cmd": "camera"})[1]
 
     def port(self, token: str, session: str) -> int:
-        """The loopback port behind a token, its view started anew where it has stopped.
+        """The loopback port behind a token, with its view restarted if it has stopped.
 
-        Raises Forbidden for a token of somebody else, Unavailable when there is no viewer.
+        Raises Forbidden for another session's token, Unavailable when there is no viewer.
         """
         view = self._opened(token, session)
         return self._running_view(view.project, view.workdir, session)[1]
 
     def running_port(self, token: str, session: str) -> int | None:
-        """The same without waiting for anything: None while its view does not run."""
+        """The same without waiting; None while the view is not running."""
         view = self._opened(token, session)
         view.used = time.monotonic()
         return self._port_of(view)
@@ -113,14 +113,14 @@ class Viewer:
         return view.project if view else None
 
     def close(self, project: str, of: Callable[[str], bool] = lambda session: True) -> None:
-        """Close everybody's views of a project, or some sessions'; their tokens are worth nothing any more."""
+        """Close all views of a project, or those of some sessions, and invalidate their tokens."""
         for view in tuple(self._views.values()):
             if view.project == project and of(view.session):
                 self._views.pop((view.project, view.session), None)
                 self._end(view)
 
     def close_idle(self) -> None:
-        """Close views that nobody has looked at for a while; their tokens open them again."""
+        """Close views unused for a while; their tokens open them again."""
         limit = time.monotonic() - self._settings.viewer_idle_s
         for key, view in tuple(self._views.items()):
             if view.used < limit and not view.watching:
@@ -130,7 +130,7 @@ class Viewer:
 
     @contextmanager
     def watched(self, token: str, who: str) -> Iterator[None]:
-        """Keep the view behind the token open while the person is connected; raises TooMany for one connection too many."""
+        """Keep the view behind the token open during a connection; raises TooMany beyond the user's limit."""
         view = self._view_of(token)
         if view is None:
             raise Forbidden("this 3D view has been closed", hint="open the review page again")
@@ -144,10 +144,10 @@ class Viewer:
             view.watching -= 1
             view.used = time.monotonic()
             self._connections[who] -= 1
-            self._connections += Counter()  # forgets who has none left
+            self._connections += Counter()  # removes users without connections
 
     def stop(self) -> None:
-        """End the process for good; takes no lock, for whoever waits for its answer holds it and is woken by this."""
+        """End the process permanently; takes no lock, as a caller waiting for an answer holds it and is woken by this."""
         self._stopped = True
         worker = self._worker
         if worker is not None:
@@ -167,7 +167,7 @@ class Viewer:
         )
 
     def _ask_view(self, project: str, workdir: Path, session: str, command: dict[str, Any]) -> tuple[Opened, dict[str, Any]]:
-        """Ask the session's view; one that was closed between finding it and asking it is opened again."""
+        """Send a command to the session's view; a view closed in the meantime is reopened."""
         for _ in range(2):
             view, _ = self._running_view(project, workdir, session)
             try:
@@ -177,9 +177,9 @@ class Viewer:
         raise Unavailable("the 3D view was closed meanwhile", hint="try again in a moment")
 
     def _running_view(self, project: str, workdir: Path, session: str) -> tuple[Opened, int]:
-        """The session's view, running and showing what it showed last, and its port."""
+        """The session's view, running and with its last content, and its port."""
         view = self._views.get((project, session))
-        if view is not None and (port := self._port_of(view)):  # without the lock: a large scene may be on its way
+        if view is not None and (port := self._port_of(view)):  # without the lock: a large scene may be in transfer
             view.used = time.monotonic()
             return view, port
         with self._lock:
@@ -200,7 +200,7 @@ class Viewer:
         return view.port if view.until > time.monotonic() and worker is not None and worker.alive else None
 
     def _show_again(self, view: Opened) -> None:
-        """What the view showed before it was closed or its process ended; what is gone meanwhile is not shown."""
+        """Restore the view's content after closing or a restart; deleted content is dropped."""
         wish, view.shown = view.shown, None
         if wish is None:
             return
@@ -271,7 +271,9 @@ class Viewer:
             self._forget(self._worker)
         if self._worker is None:
             self._worker = Worker(self._command, self._settings.data_dir / "logs" / "viewer.log")
-            if self._stopped:  # looked at after it was assigned: stop() sees it, or we see that it was called
+            if (
+                self._stopped
+            ):  # checked after assignment: either stop() sees the worker, or this check sees that stop() was called
                 self._worker.kill()
             self._worker.say({"key": self.key})
         return self._worker

@@ -1,4 +1,4 @@
-"""A clip box: of what is shown only what is inside it stays, and where a body was cut its edge is lined."""
+"""Clip box: shows only the part of the content inside it, with lines along cut edges."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ _ON_CUT_M = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """How far something reaches along the kitchen's own width, depth (from its fronts) and height."""
+    """Extent along the kitchen's width, depth (from its fronts) and height."""
 
-    span_from_world: Matrix3  # rows: to the right of who faces the fronts, away from them, up
+    span_from_world: Matrix3  # rows: to the right when facing the fronts, away from them, up
     low: Vector3
     high: Vector3
 
     def part(self, points_world: Iterable[Points]) -> tuple[Vector3, Vector3]:
-        """What points reach, as shares of it."""
+        """Bounds of points as fractions of the span."""
         found = np.vstack([np.zeros((0, 3)), *(points @ self.span_from_world.T for points in points_world)])
         size = np.maximum(self.high - self.low, 1e-9)
         shares = np.clip([(found.min(axis=0) - self.low) / size, (found.max(axis=0) - self.low) / size], 0.0, 1.0)
@@ -31,19 +31,19 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """Half spaces normal . x >= offset in the world; what is inside all of them stays."""
+    """Half spaces normal . x >= offset in the world, whose intersection is kept."""
 
     normals: np.ndarray  # (k, 3)
     offsets: np.ndarray  # (k,)
 
     def keeps(self, points_world: Points) -> Mask:
-        """Which points are inside."""
+        """Mask of the points inside."""
         return np.asarray((points_world @ self.normals.T >= self.offsets).all(axis=1))
 
     def cut(
         self, world_from_part: Rigid3, vertices: Points, faces: Faces, uv: TextureCoords | None
     ) -> tuple[Points, Faces, TextureCoords | None, Points]:
-        """What stays of a mesh in a body's frame, and the ends (n, 2, 3) of the lines where it was cut."""
+        """The kept part of a mesh in a body's frame, and the ends (n, 2, 3) of its cut edges."""
         lines = []
         for normal, offset in zip(self.normals, self.offsets, strict=True):
             along = world_from_part.rotation.T @ normal
@@ -57,7 +57,7 @@ class Clip:
 
 
 def clip_of(span: Span, low: Iterable[float], high: Iterable[float]) -> Clip:
-    """The box between shares of a span; a side at 0 or 1 cuts nothing away, however far something reaches beyond."""
+    """The box between fractions of a span; a side at 0 or 1 cuts nothing, even beyond the span."""
     normals, offsets = [], []
     size = span.high - span.low
     for axis, (begins, ends) in enumerate(zip(low, high, strict=True)):
@@ -71,7 +71,7 @@ def clip_of(span: Span, low: Iterable[float], high: Iterable[float]) -> Clip:
 
 
 def span_of(facing: Vector3, points_world: Iterable[Points]) -> Span:
-    """What points reach along the directions of fronts that face there, level."""
+    """Span of points along the axes of fronts with that horizontal direction."""
     ahead = np.array([facing[0], facing[1], 0.0]) / max(float(np.hypot(facing[0], facing[1])), 1e-9)
     axes = np.array([[-ahead[1], ahead[0], 0.0], -ahead, [0.0, 0.0, 1.0]])
     stacked = np.vstack([points @ axes.T for points in points_world])

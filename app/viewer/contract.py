@@ -1,7 +1,7 @@
-"""The private seams of viser 1.1.1 that this app touches, all of them here; a test runs `check` against the installed one.
+"""All private interfaces of viser 1.1.1 used by this app; a test runs `check` against the installed version.
 
-1. `ViserServer._websock_server.unregister_handler`: takes away the handlers by which any page could open a public tunnel.
-2. `websockets.asyncio.server.serve`, as viser calls it: every request must carry the key that only the app's proxy knows,
+1. `ViserServer._websock_server.unregister_handler`: removes the handlers with which any page could open a public tunnel.
+2. `websockets.asyncio.server.serve`, as called by viser: every request must carry the key known only to the app's proxy,
    so that a page of another site, or another user of this machine, gets nothing from the port.
 """
 
@@ -17,7 +17,7 @@ KEY_HEADER = "X-R2C2R-Key"
 
 
 def open_server(key: str) -> Any:
-    """A ViserServer on a free loopback port that answers only those who know the key, with the share tunnel closed."""
+    """A ViserServer on a free loopback port that requires the key, with the share tunnel disabled."""
     import viser
     from viser import _messages
 
@@ -29,7 +29,7 @@ def open_server(key: str) -> Any:
 
 
 def check() -> list[str]:
-    """What of the contract does not hold for the installed viser; empty when all is well."""
+    """Violations of these assumptions by the installed viser; empty without any."""
     import inspect
 
     import viser
@@ -51,7 +51,7 @@ def check() -> list[str]:
 
 
 def _demand_key(key: str) -> None:
-    """Wrap the function viser serves with, in this process, once."""
+    """Wrap viser's serve function to require the key, once per process."""
     original = websockets.asyncio.server.serve
     if getattr(original, "_demands_key", False):
         return

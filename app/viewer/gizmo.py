@@ -1,7 +1,7 @@
-"""Handles to move one object by in the 3D view, with its box and its mesh hanging on them: they follow in the browser.
+"""Transform controls for one object in the 3D view, with its box and mesh as children that follow in the browser.
 
-viser's handles come with every ring or with none, but a ring is there only where both its arrows are. So the lower handles
-have right, back and the ring about the vertical, and the upper ones, which hang on them, have up.
+viser's controls have all rings or none, but a ring is only shown with both its arrows. So the lower control has right, back
+and the ring about the vertical, and the upper one, its child, has up.
 """
 
 from collections.abc import Sequence
@@ -14,30 +14,30 @@ import viser.transforms as vtf
 from app.viewer.boxes import box_edges
 from r2c2r_core.geometry.transforms import Rigid3
 
-NODE = "/moved/up"  # what is moved hangs here
+NODE = "/moved/up"  # parent of the moved nodes
 _FRONT, _SIDE = (255, 225, 77), (242, 245, 250)
 
 
 @dataclass(frozen=True, slots=True)
 class Gizmo:
-    """Both handles."""
+    """Both transform controls."""
 
     lower: Any
     upper: Any
 
     @property
     def pose(self) -> Rigid3:
-        """Where they are: world_from_object."""
+        """Current pose: world_from_object."""
         return _pose(self.lower) @ _pose(self.upper)
 
     def put(self, world_from_object: Rigid3) -> None:
-        """Move the handles, and what hangs on them."""
+        """Set the pose of the controls and their children."""
         self.lower.wxyz = vtf.SO3.from_matrix(world_from_object.rotation).wxyz
         self.lower.position = world_from_object.translation
         self.upper.position = np.zeros(3)
 
     def remove(self) -> None:
-        """Take them away, with what hangs on them."""
+        """Remove the controls and their children."""
         self.lower.remove()
 
 

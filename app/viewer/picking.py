@@ -1,4 +1,4 @@
-"""What a click in the 3D view means: the first face on its ray, or the nearest point of the scan."""
+"""Picking in the 3D view: the first face on a ray, or the scan's nearest point to it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 
-_FLAT = 1e-12  # m3: a face that the ray runs along
+_FLAT = 1e-12  # m3: a face parallel to the ray
 _NEAR = 0.01  # of the distance: how far beside the ray a point of the scan may lie
 
 
 @dataclass(frozen=True, slots=True)
 class Picked:
-    """The last click, by its number."""
+    """The last pick, numbered."""
 
     number: int = 0
     name: str = ""  # of the object; empty where none is
@@ -22,7 +22,7 @@ class Picked:
 
 
 class Hit(NamedTuple):
-    """What a ray meets first."""
+    """First intersection of a ray."""
 
     name: str  # of the object
     point_world: Vector3
@@ -30,7 +30,7 @@ class Hit(NamedTuple):
 
 
 def first_of(meshes: Sequence[tuple[str, Points, np.ndarray]], origin: Vector3, direction: Vector3) -> Hit | None:
-    """The first of some named meshes on a ray."""
+    """The first intersection of a ray with named meshes."""
     found = [
         Hit(name, origin + distance * direction, distance)
         for name, vertices, faces in meshes
@@ -40,7 +40,7 @@ def first_of(meshes: Sequence[tuple[str, Points, np.ndarray]], origin: Vector3, 
 
 
 def nearest_point(points: Points, origin: Vector3, direction: Vector3) -> Hit | None:
-    """The first point of the scan beside a ray, of no object."""
+    """The first point of the scan near a ray, without an object."""
     along = (points - origin) @ direction
     beside = np.linalg.norm(points - origin - along[:, None] * direction, axis=1)
     near = (along > 0) & (beside < _NEAR * along)
@@ -51,7 +51,7 @@ def nearest_point(points: Points, origin: Vector3, direction: Vector3) -> Hit | 
 
 
 def first_face(origin: Vector3, direction: Vector3, vertices: Points, faces: np.ndarray) -> float | None:
-    """How far along a ray the first face is, in lengths of `direction`; None where there is none (Moeller, Trumbore 1997)."""
+    """Distance of the first face on a ray in lengths of `direction`, or None (Moeller, Trumbore 1997)."""
     if not len(faces):
         return None
     first, second, third = (vertices[faces[:, corner]] for corner in range(3))

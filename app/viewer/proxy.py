@@ -1,4 +1,4 @@
-"""viser through the app's own origin: its page with our rules in it, and its connection pumped both ways."""
+"""Proxy of viser through the app's own origin: its page with added style rules, and its WebSocket in both directions."""
 
 import contextlib
 import http.client
@@ -29,7 +29,7 @@ INJECTED = (
 
 
 async def fetch_page(port: int, path: str, key: str, answer_s: float) -> Response:
-    """A file of viser's client; its page gets what it needs to live in an iframe."""
+    """A file of viser's client; its page is adapted to run in an iframe."""
     try:
         status, content_type, content = await anyio.to_thread.run_sync(_fetch, port, path, key, answer_s)
     except OSError as error:
@@ -43,7 +43,7 @@ async def fetch_page(port: int, path: str, key: str, answer_s: float) -> Respons
 
 
 async def pump(socket: WebSocket, port: int, key: str, answer_s: float, session_end: Callable[[], Awaitable[object]]) -> None:
-    """Carry messages both ways until either side leaves, or who looks may not look any more."""
+    """Forward messages in both directions until either side leaves, or the session ends."""
     wanted = [Subprotocol(name) for name in socket.scope["subprotocols"]]
     try:
         upstream = await websockets.connect(

@@ -1,10 +1,10 @@
-"""A mesh of fewer faces, to look at: the texture stays where it is."""
+"""Mesh decimation for display, with the texture preserved."""
 
 from typing import Any
 
 import numpy as np
 
-MAX_FACES = 100_000  # a scene of more takes a software GL seconds a picture
+MAX_FACES = 100_000  # a larger scene takes software GL seconds per picture
 
 
 def reduced(mesh: Any) -> Any:

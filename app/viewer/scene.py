@@ -1,4 +1,4 @@
-"""What a project's 3D view shows, read from its workspace. Runs in the viewer's process."""
+"""Content of a project's 3D view, read from its workspace. Runs in the viewer's process."""
 
 import json
 from dataclasses import dataclass, field, replace
@@ -26,17 +26,17 @@ from r2c2r_core.overrides import overrides_from
 from r2c2r_core.synthesize.corrected import corrected, differs
 from r2c2r_core.workspace import Workspace
 
-_PIN_M = 0.012  # of a comment
+_PIN_M = 0.012  # size of a comment's pin
 _TAPE = (230, 60, 150)
-_ONE_RUN = float(np.cos(np.radians(15.0)))  # units that face within this are one run
-_AHEAD_M = 2.0  # what a photo's camera is turned about afterwards
+_ONE_RUN = float(np.cos(np.radians(15.0)))  # units facing within this angle form one run
+_AHEAD_M = 2.0  # distance of the orbit centre in front of a photo's camera
 MAX_POINTS = 300_000
-POINTS_PER_NODE = 150_000  # one websocket frame each, so that the page stays alive while they arrive
+POINTS_PER_NODE = 150_000  # one WebSocket frame each, so that the page stays responsive while they arrive
 
 
 @dataclass(slots=True)
 class View:
-    """One person's server for one project, and what is on it."""
+    """One session's viser server for one project, with its content."""
 
     server: Any
     work: Workspace
@@ -45,18 +45,18 @@ class View:
     cloud_of: tuple[Any, ...] = ()  # which of its points are shown
     assembly: Assembly | None = None
     assembled: tuple[Any, ...] = ()  # what the assembly was made from
-    preview: list[str] = field(default_factory=list)  # names of its objects that are not shown as the last run made them
-    showing: int = 0  # a node that comes in the place of one of the same name keeps that one's text in the browser
+    preview: list[str] = field(default_factory=list)  # names of objects that are not shown as in the last run
+    showing: int = 0  # counter for node names, as a replaced node of the same name keeps its text in the browser
     mode: str = ""
-    chosen: str = ""  # name of the object of the scene that is looked at
+    chosen: str = ""  # name of the selected object
     text: str = ""
-    full: bool = False  # every point and face was asked for
-    reduced: bool = False  # fewer points or faces are shown than there are
+    full: bool = False  # all points and faces were requested
+    reduced: bool = False  # fewer points or faces are shown than exist
     gizmo: handles.Gizmo | None = None
     known_capture: Any = None
     known_tree: Any = None  # of the scan's points
-    looked_at: tuple[Any, ...] = ()  # what the camera was turned to last
-    steady: bool = False  # it stays where the person moved it
+    looked_at: tuple[Any, ...] = ()  # last target of an automatic camera move
+    steady: bool = False  # the camera stays where the user moved it
     placed: list[tuple[str, np.ndarray, np.ndarray]] = field(default_factory=list)  # name, vertices and faces over the scan
     picked: Picked = field(default_factory=Picked)
     lens: Lens = field(init=False)
@@ -66,7 +66,7 @@ class View:
         self.server.scene.on_click()(self._pick)
 
     def show(self, wish: dict[str, Any]) -> None:
-        """Replace what is shown. The camera is turned to what was not shown before, and to what `look` asks for."""
+        """Replace the content. The camera moves to new content, and to the target requested in `look`."""
         of_scene = wish["mode"] == "scene"  # whichever object of it is chosen
         subject = (wish["mode"], *(() if of_scene else (wish.get("name"), wish.get("candidate"), wish.get("box") is not None)))
         self.steady = subject == self.looked_at and wish.get("look") is None
@@ -108,18 +108,18 @@ class View:
 
     @property
     def joints(self) -> list[JointValue]:
-        """Where the joints of the shown scene stand."""
+        """Joint values of the shown scene."""
         return list(self.assembly.joints.values()) if self.assembly is not None else []
 
     def place(self, pose: np.ndarray) -> None:
-        """Put what is being moved at a pose, world_from_object (4, 4)."""
+        """Set the pose of the object being moved, world_from_object (4, 4)."""
         if self.gizmo is None:
             raise InputError("nothing is being moved", hint="choose an object over the scan and press Move it")
         self.gizmo.put(Rigid3.from_matrix(pose))
 
     @property
     def pose(self) -> list[list[float]] | None:
-        """Where what is being moved is, world_from_object; None when nothing is."""
+        """Pose of the object being moved, world_from_object; None without one."""
         return self.gizmo.pose.matrix.tolist() if self.gizmo is not None else None
 
     def _clear(self, *, keep_assembly: bool) -> None:
@@ -170,7 +170,7 @@ class View:
         ]
 
     def _span(self) -> Span:
-        """What a clip box cuts: the scene where one is shown, else most of the scan."""
+        """Extent to which a clip box refers: the shown scene, else most of the scan."""
         if self.assembly is not None:
             return self.assembly.span
         low, high = self._bounds()
@@ -178,14 +178,14 @@ class View:
 
     @property
     def span_m(self) -> list[float] | None:
-        """Width, depth and height of what a clip box cuts; None where there is nothing to cut."""
+        """Width, depth and height of that extent; None where there is nothing to cut."""
         if self.mode not in ("scene", "cloud"):
             return None
         span = self._span()
         return [float(side) for side in span.high - span.low]
 
     def part_of(self, name: str | None) -> dict[str, list[float]] | None:
-        """What an object of the scene reaches, as shares of that; None where it is not there."""
+        """Bounds of an object of the scene as fractions of the span; None where it does not exist."""
         found = self.assembly.parts.get(name or "") if self.assembly is not None else None
         return {"low": found[0].tolist(), "high": found[1].tolist()} if found is not None else None
 
@@ -235,7 +235,7 @@ class View:
         return f"{len(centres)} placed mesh{'es' if len(centres) > 1 else ''} over the scan"
 
     def _show_scene(self, wish: dict[str, Any]) -> str:
-        """The newest scene, with what geometry shows of corrections that no run has seen yet."""
+        """Show the newest scene, with a geometric preview of corrections made since the last run."""
         stage, scene = self._scene()
         kind = json.dumps([wish.get(key) for key in ("corrections", "undressed", "draw", "full", "clip")])
         made_from = (kind, self.work.noun_path(stage, "scene").stat().st_mtime_ns)
@@ -275,7 +275,7 @@ class View:
         )
 
     def _scene(self) -> tuple[str, ArticulatedScene]:
-        """The newest scene and its stage: what a run fitted, else what it built."""
+        """The newest scene and its stage: the warped one, else the synthesised one."""
         for stage in ("warp", "synthesize"):
             found: ArticulatedScene | None = self.work.load_latest(stage, "scene")
             if found is not None:
@@ -286,7 +286,7 @@ class View:
         self._add_mesh(node, mesh, mesh.vertices, 1.0)
 
     def _add_mark(self, node: str, mark: dict[str, Any]) -> None:
-        """Lines or a word in the scene: joint axes, what the certificate found, what people said and where."""
+        """Add lines or a label: joint axes, certificate findings, comments."""
         scene, colour = self.server.scene, tuple(mark.get("colour", (255, 225, 77)))
         if mark.get("lines"):
             ends = np.asarray(mark["lines"], dtype=np.float32)
@@ -297,7 +297,7 @@ class View:
             self.shown.append(scene.add_label(f"{node}/text", mark["text"], position=tuple(mark["at"])))
 
     def _add_tape(self, points: np.ndarray) -> None:
-        """A tape from one point to another, with its length."""
+        """Add a measuring tape between two points, with its length."""
         scene = self.server.scene
         for k, point in enumerate(points):
             self.shown.append(
@@ -338,7 +338,7 @@ class View:
         return self.server.scene.add_mesh_trimesh(node, shown, cast_shadow=False)
 
     def _look_at_all(self, low: np.ndarray, high: np.ndarray) -> None:
-        """From where the person who filmed stood, as far back as all of it takes."""
+        """Look from the filming position, far enough back to show all."""
         positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
         back = positions.mean(axis=0) - (low + high) / 2
         away = max(float(np.linalg.norm(back)), 1e-6)
@@ -346,7 +346,7 @@ class View:
         self._look_from_path((low + high) / 2, distance=max(needed / away, 1.0))
 
     def _look_from_path(self, target: np.ndarray, distance: float = 1.15) -> None:
-        """Look at the target from where the person who filmed stood; `distance` as a share of theirs."""
+        """Look at the target from the mean filming position; `distance` as a factor of its distance."""
         positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
         start = positions.mean(axis=0)
         self._look(target + distance * (start - target), target)
@@ -356,21 +356,21 @@ class View:
             self.lens.look(position, target)
 
     def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest corner of what is shown: all of the scene, else most of the scan."""
+        """Lowest and highest corner of the content: all of the scene, else most of the scan."""
         if self.assembly is not None:
             return self.assembly.bounds
         low, high = np.percentile(self._capture().surface.vertices_world, (2, 98), axis=0)
         return low, high
 
     def _facing(self) -> np.ndarray:
-        """Where the fronts face; without any that open, to where the person who filmed stood."""
+        """Direction of the fronts; without openable ones, towards the filming position."""
         found = facing(self.assembly.plan) if self.assembly is not None else None
         low, high = self._bounds()
         positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
         return found if found is not None else positions.mean(axis=0) - (low + high) / 2
 
     def _run(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where the chosen object's front faces, and the corners of all whose fronts face there; all of it without one."""
+        """Direction of the chosen object's front, and bounds of all objects facing the same way; of everything without one."""
         bodies = self.assembly.plan.bodies if self.assembly is not None else ()
         ahead = next((-b.world_from_body.rotation[:, 1] for b in bodies if b.object_name == self.chosen), None)
         if self.assembly is None or ahead is None:
@@ -379,17 +379,17 @@ class View:
         return ahead, *self.assembly.bounds_of(facing_there)
 
     def _stand_where_filmed(self, index: int) -> None:
-        """Where a photo was taken from, with its lens, upright."""
+        """Move the camera to a photo's pose with its lens, upright."""
         frame = next((frame for frame in self._capture().frames if frame.index == index), None)
         if frame is None:
             raise InputError(f"the recording has no frame {index}", hint="choose a photo of the object first")
         pose, camera = frame.world_from_camera, frame.rgb_camera
-        upright = abs(pose.rotation[2, 1]) > abs(pose.rotation[2, 0])  # else the phone was held on its side
+        upright = abs(pose.rotation[2, 1]) > abs(pose.rotation[2, 0])  # otherwise the phone was held sideways
         half = camera.height / 2 / camera.fy if upright else camera.width / 2 / camera.fx
         self.lens.stand(pose.translation, pose.translation + _AHEAD_M * pose.rotation[:, 2], 2 * float(np.arctan(half)))
 
     def _pick(self, event: Any) -> None:
-        """What is under a click: an object, or where nothing but the scan is, its nearest point."""
+        """Store the object under a click, or the scan's nearest point where only the scan is."""
         origin, direction = np.array(event.ray_origin, dtype=np.float64), np.array(event.ray_direction, dtype=np.float64)
         hit = self.assembly.hit(origin, direction) if self.assembly is not None else first_of(self.placed, origin, direction)
         if hit is None and self.cloud and self.cloud[0].visible:

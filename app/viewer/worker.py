@@ -1,4 +1,4 @@
-"""The viewer's process: `python -m app.viewer.worker`, one viser server per open view, commanded by JSON lines.
+"""The viewer's process: `python -m app.viewer.worker`, one viser server per open view, controlled by JSON lines.
 
 Reads {"id", "cmd": "open" | "show" | "joints" | "place" | "picked" | "camera" | "close", "view", …} and prints
 {"id", "ok": {…}} or {"id", "error": {…}}. The first line is the key that the app's proxy will show. End of input ends it.
@@ -21,14 +21,14 @@ from r2c2r_core.errors import InputError, R2C2RError
 from r2c2r_core.limits import limit_this_process, memory_met
 from r2c2r_core.workspace import Workspace
 
-AMBIENT = 1.6  # textures carry the room's light already: shown darker than the scan beside them, they look wrong
+AMBIENT = 1.6  # textures already contain the room's light: darker than the scan beside them, they look wrong
 
 
 BACKGROUND = ((176, 186, 198), (226, 231, 236))  # RGB, upper and lower: a white kitchen stands out from both
 
 
 class NotOpen(InputError):
-    """The view was closed; whoever asked opens it and asks again."""
+    """The view was closed; the caller opens it and repeats the command."""
 
 
 def main() -> int:
@@ -44,7 +44,7 @@ def main() -> int:
         except MemoryError:
             traceback.print_exc()
             answer = {"error": told(memory_met())}
-        except Exception as error:  # one wish must not end the view of everybody
+        except Exception as error:  # one command must not end all views
             traceback.print_exc()
             answer = {"error": {"kind": "internal", "message": f"unexpected: {error}", "hint": "see the viewer's log"}}
         sys.stdout.write(json.dumps({"id": command["id"], **answer}) + "\n")
@@ -111,7 +111,7 @@ def _state(view: View) -> dict[str, Any]:
 def _prepared(server: Any) -> Any:
     server.scene.set_up_direction("+z")
     server.scene.configure_default_lights(cast_shadow=False)
-    server.initial_camera.position = server.initial_camera.position  # said: otherwise each page has a place of its own
+    server.initial_camera.position = server.initial_camera.position  # set explicitly: otherwise each page has its own position
     server.scene.add_light_ambient("/light", intensity=AMBIENT)
     shades = np.linspace(*BACKGROUND, 256).round().astype(np.uint8)[:, None]
     server.scene.set_background_image(np.tile(shades, (1, 8, 1)), format="png")
