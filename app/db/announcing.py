@@ -1,4 +1,4 @@
-"""What webhooks hear of is stored with the change: told at least once, however the server ends, and never of what is undone."""
+"""Webhook deliveries stored in the transaction of the change: at-least-once, and never for a rolled-back change."""
 
 import json
 import time
@@ -14,7 +14,7 @@ ENDED = ("done", "failed", "cancelled")
 
 
 def announce(session: Session, _context: Any, _instances: Any) -> None:
-    """Before rows are stored: a delivery to each webhook of a project whose run ended or whose state changed."""
+    """Before a flush, add a delivery to each webhook of a project whose run ended or whose state changed."""
     for row in tuple(session.dirty):
         if isinstance(row, Job) and row.kind == "run" and row.state in ENDED and _changed(row, "state"):
             _deliver(session, row.project_id, "run.finished", {"job": row.id, "state": row.state})

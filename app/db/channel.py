@@ -1,8 +1,8 @@
-"""What happens at one of the servers that share a Postgres, told to the others: a row for each message, and a notice of it.
+"""Message channel between servers that share a Postgres: a row for each message, with LISTEN/NOTIFY.
 
-Rows are inserted under a lock of their own, so that their numbers rise in the order in which they can be seen: whoever knows
-the last that it read reads each later one, also after its connection broke. Rows are deleted after KEPT_S. Nothing waits for
-a message, so what a process had not sent when it vanished is lost: the others notice, and call `on_gap`.
+Rows are inserted under a lock, so that their numbers rise in the order of visibility: a reader that knows the last number it
+read gets every later message, even after a broken connection. Rows are deleted after KEPT_S. Sending is asynchronous, so
+unsent messages of a process that vanishes are lost: the others detect this and call `on_gap`.
 """
 
 import json
@@ -22,9 +22,9 @@ from app.hub import Hub
 _log = logging.getLogger(__name__)
 
 KEPT_S = 300.0
-WAITING_BYTES = 32 * 1024 * 1024  # of messages to be sent, while the database does not answer
-AGAIN_S = 1.0  # between two tries to reach it, and between two looks at the clock
-MISSED_BEATS = 3  # after so many without one, a process is gone, or the connection is
+WAITING_BYTES = 32 * 1024 * 1024  # of unsent messages, while the database does not answer
+AGAIN_S = 1.0  # interval of connection attempts, and of time checks
+MISSED_BEATS = 3  # missed heartbeats after which a process, or the connection, counts as lost
 
 _ORDERED = f"SELECT pg_advisory_xact_lock({0x72326334})"
 _INSERT = "INSERT INTO messages (at, sender, body) VALUES (extract(epoch FROM clock_timestamp()), %s, %s)"
@@ -38,10 +38,10 @@ Handler = Callable[[str, dict[str, Any]], None]
 
 
 class Channel:
-    """One process's end. `hears` are told of each message of their kind: who sent it, and what it says.
+    """One process's end of the channel. `hears` are handlers by message kind, called with sender and content.
 
-    `beats` say something every `beat_s` and to each process that comes. `on_gone` are told of one that is gone, and whether it
-    vanished: what it did last it may have told nobody. `on_gap` are called when messages are lost.
+    `beats` send a message every `beat_s` and to each new process. `on_gone` are called when a process is gone, and whether it
+    vanished, in which case its last messages may be lost. `on_gap` are called when messages are lost.
     """
 
     def __init__(self, engine: Engine, name: str, beat_s: float) -> None:
@@ -54,21 +54,21 @@ class Channel:
         self._waiting = 0  # bytes in it
         self._lock = threading.Lock()
         self._listening, self._stopping = threading.Event(), threading.Event()
-        self._newest: tuple[int, float] | None = None  # number and time of the message that was read last
-        self._heard: dict[str, float] = {}  # when each process was, this one too
+        self._newest: tuple[int, float] | None = None  # number and time of the last message read
+        self._heard: dict[str, float] = {}  # time of the last message of each process, including this one
         self._threads = [
             threading.Thread(target=do, name=name, daemon=True)
             for do, name in ((self._read_on, "channel-in"), (self._send_on, "channel-out"))
         ]
 
     def start(self) -> None:
-        """Be one of them."""
+        """Join the channel."""
         self._beat()
         for thread in self._threads:
             thread.start()
 
     def stop(self) -> None:
-        """Send what waits, and leave."""
+        """Send pending messages, and leave."""
         self.say("bye", {})
         self._stopping.set()
         self._listening.set()
@@ -77,7 +77,7 @@ class Channel:
                 thread.join()
 
     def say(self, kind: str, said: dict[str, Any]) -> None:
-        """Tell all others; it does not wait for that."""
+        """Send a message to all other processes, without waiting."""
         text = json.dumps({**said, "kind": kind}, separators=(",", ":"))
         with self._lock:
             if self._waiting + len(text) > WAITING_BYTES:
@@ -114,7 +114,7 @@ class Channel:
             connection.execute(_NOTIFY)
 
     def _taken(self) -> list[str]:
-        """All that waits, once something does."""
+        """All pending messages, after waiting for at least one."""
         with_beat = time.monotonic() + self._beat_s
         while True:
             try:
@@ -148,7 +148,7 @@ class Channel:
                 self._stopping.wait(AGAIN_S)
 
     def _find_place(self, connection: Any) -> None:
-        """After which message to read on; what was deleted meanwhile is a gap, also where its number is another's by now."""
+        """Find the message after which to continue reading; a deleted one, or a reused number, is a gap."""
         if self._newest is not None and connection.execute(_IS_KNOWN, self._newest).fetchone() is None:
             self._miss()
             self._newest = None
@@ -168,7 +168,7 @@ class Channel:
                 self._take(sender, json.loads(body))
                 if is_new:
                     self._beat()
-            except Exception:  # one message must not take the others with it
+            except Exception:  # one message must not affect the others
                 _log.exception("a message of %s", sender)
 
     def _take(self, sender: str, said: dict[str, Any]) -> None:
@@ -181,7 +181,7 @@ class Channel:
             self.hears[kind](sender, said)
 
     def _is_heard(self) -> bool:
-        """Whether the connection lives, by this process's own messages; others that are silent for as long are gone."""
+        """Whether the connection is alive, by this process's own messages; equally silent processes count as gone."""
         silent = {sender for sender, at in self._heard.items() if time.monotonic() - at > MISSED_BEATS * self._beat_s}
         if self.name in silent:
             return False
@@ -205,7 +205,7 @@ class Channel:
 
     @contextmanager
     def _connected(self) -> Iterator[Any]:
-        """A connection of its own, beside the pool."""
+        """A separate connection outside the pool."""
         pooled = self._engine.raw_connection()
         connection: Any = pooled.dbapi_connection
         pooled.detach()
@@ -223,7 +223,7 @@ class Channel:
 
 
 def join_hubs(channel: Channel, hub: Hub) -> None:
-    """Carry what is published at this process's hub to the others', and theirs to it."""
+    """Exchange published messages between this process's hub and the others'."""
     hub.carry = channel.say
     channel.hears |= {
         "message": lambda _, said: hub.hear(**said),

@@ -1,14 +1,14 @@
-"""How long a project was computed for: by its jobs, and by its live segmenter."""
+"""Computing time of a project: by its jobs and its live segmenter."""
 
 from sqlmodel import Session, col, select
 
 from app.db.tables import Computing, Job, Project
 
-JOINED_S = 2.0  # what begins that soon after the last time goes on with it
+JOINED_S = 2.0  # intervals separated by less are merged
 
 
 def worked(session: Session, project_id: str, began: float, ended: float) -> None:
-    """The live segmenter was at work then; nothing is stored for a project that was deleted."""
+    """Record an interval of live segmenter work; no-op for a deleted project."""
     if session.get(Project, project_id) is None:
         return
     query = select(Computing).where(Computing.project_id == project_id).order_by(col(Computing.id).desc())
@@ -20,7 +20,7 @@ def worked(session: Session, project_id: str, began: float, ended: float) -> Non
 
 
 def computing_s(session: Session, project_id: str, now: float) -> float:
-    """Seconds in which anything was computed for the project; what went on at the same time counts once."""
+    """Seconds of computation for the project, with overlapping intervals counted once."""
     jobs = session.exec(select(Job).where(Job.project_id == project_id, col(Job.started).is_not(None)))
     times = [(job.started or now, job.finished or now) for job in jobs]
     times += [(row.began, row.ended) for row in session.exec(select(Computing).where(Computing.project_id == project_id))]

@@ -1,4 +1,4 @@
-"""A project's rows as the `project.json` of its folder, and that file read again."""
+"""Serialisation of a project's rows to the `project.json` of its folder, and back."""
 
 import json
 from collections import defaultdict
@@ -14,13 +14,13 @@ from app.files import ProjectFiles
 from app.schemas.description import DescribedObject, DescribedPoint, Description
 from r2c2r_core.errors import InputError
 
-_OF_ACCOUNTS = {"owner_id", "assignee_id"}  # told by name: numbers of accounts mean others in another database
+_OF_ACCOUNTS = {"owner_id", "assignee_id"}  # described by name, as account numbers differ between databases
 _DESCRIBED = {"id", "name", "category", "colour", "deleted", "front", "frames", "crop", "run_name", "assignee"}  # of an object
 _DERIVED = {"certificate"}  # it is in the bundle itself
 
 
 def describe(session: Session, project: Project, files: ProjectFiles) -> Description:
-    """What people made of the project, by a fixed number of queries."""
+    """Description of all user-made content of the project, in a fixed number of queries."""
     of_project = SceneObject.project_id == project.id
     objects = session.exec(select(SceneObject).where(of_project).order_by(col(SceneObject.id))).all()
     points: dict[int, list[DescribedPoint]] = defaultdict(list)
@@ -57,13 +57,13 @@ def describe(session: Session, project: Project, files: ProjectFiles) -> Descrip
 
 
 def changed(session: Session, project: Project) -> float:
-    """When anybody last changed the project."""
+    """Time of the last change of the project."""
     last = session.exec(select(Event.at).where(Event.project_id == project.id).order_by(col(Event.id).desc())).first()
     return max(project.updated, last or 0.0)
 
 
 def read_description(path: Path) -> Description:
-    """A project.json; raises InputError for a file that is none, FileNotFoundError where there is none."""
+    """Read a project.json; raises InputError for an invalid file, FileNotFoundError for a missing one."""
     try:
         return Description.model_validate_json(path.read_bytes())
     except ValidationError as error:
@@ -73,13 +73,13 @@ def read_description(path: Path) -> Description:
 
 
 def relative(row: dict[str, Any], root: Path) -> dict[str, Any]:
-    """The row with paths below `root` relative to it: a folder may be moved."""
+    """The row with paths below `root` made relative to it, as a folder may be moved."""
     inside = f"{root}/"
     return {key: v.removeprefix(inside) if isinstance(v, str) else v for key, v in row.items()}
 
 
 def placed(row: dict[str, Any], root: Path, *names: str) -> dict[str, Any]:
-    """The row with these fields' paths where they lie below `root` now; what is no file there stays as it is."""
+    """The row with these path fields made absolute below `root`, where such a file exists."""
     found = {name: str(root / row[name]) for name in names if isinstance(row.get(name), str) and (root / row[name]).exists()}
     return {**row, **found}
 

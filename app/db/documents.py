@@ -1,4 +1,4 @@
-"""The clicks and corrections of a project as the files the core reads."""
+"""A project's clicks and corrections as the documents read by the core."""
 
 from collections.abc import Collection, Iterable
 from typing import Any
@@ -13,16 +13,16 @@ from r2c2r_core.schema.prompts import PromptsFileFront
 
 
 def prompts_document(session: Session, project_id: str) -> dict[str, Any]:
-    """prompts.json of the project as it is now; objects neither clicked nor drawn are left out."""
+    """Current prompts.json of the project, without objects neither clicked nor drawn."""
     return _document_of(_entries(session, project_id).values())
 
 
 def corrected_prompts(
     session: Session, project_id: str, finished: dict[str, Any], about: Collection[int | None]
 ) -> dict[str, Any]:
-    """prompts.json of the last run, but for these objects as they are now, and without what was deleted since.
+    """prompts.json of the last run, updated for these objects and without objects deleted since.
 
-    What else was clicked since may be unfinished: a correction does not take it in.
+    Other newer clicks may be unfinished and are not included in a correction's run.
     """
     before, now = {entry["name"]: entry for entry in finished["objects"]}, _entries(session, project_id)
     chosen = []
@@ -57,7 +57,7 @@ def prompt_entry(item: SceneObject, clicks: list[Click]) -> dict[str, Any]:
 
 
 def readable_front(front: dict[str, Any]) -> dict[str, Any]:
-    """A stored front; its handle is looked for where merging fronts had left it outside, which no reader takes any more."""
+    """A stored front; a handle left outside by an earlier merge of fronts is dropped, as readers refuse it."""
     try:
         PromptsFileFront.model_validate(front)
     except ValidationError:
@@ -70,14 +70,14 @@ def _readable(drawn: Drawn) -> Drawn:
 
 
 def prompts_version(objects: list[dict[str, Any]]) -> int:
-    """The version of prompts.json that these need: an older r2c2r reads what is only clicked."""
+    """The lowest version of prompts.json that these objects need, so that an older r2c2r can read clicks."""
     if any("crop" in entry for entry in objects):
         return 3
     return 2 if any(entry.keys() & {"front", "frames"} for entry in objects) else 1
 
 
 def overrides_document(session: Session, project_id: str) -> dict[str, Any]:
-    """overrides.json of the project as it is now."""
+    """Current overrides.json of the project."""
     stored = overrides_by_object(session, project_id)
     entries = {item.name: overrides_entry(stored.get(item.id or 0, {})) for item in live_objects(session, project_id)}
     return {"version": 1, "objects": {name: entry for name, entry in entries.items() if entry}}

@@ -1,4 +1,4 @@
-"""The rows, in a SQLite file or a Postgres: many readers, one writer, nothing lost when the process dies."""
+"""Database engine, SQLite or Postgres: many readers, one writer, durable commits."""
 
 import logging
 import sqlite3
@@ -25,9 +25,9 @@ _log = logging.getLogger(__name__)
 def open_engine(database: Path | str, *, anew: bool = False, busy_s: float = BUSY_S) -> Engine:
     """The engine of a database, a file or the address of a Postgres, migrated to the newest tables.
 
-    Raises DatabaseUnusable for a file that is none, is damaged, is of a newer r2c2r or may not be written, and where there
-    is no file beside projects (an empty one would hide them), unless it is to be made `anew`. Who uses it waits for another's
-    writing, up to `busy_s`.
+    Raises DatabaseUnusable for a file that is not a database, is damaged, is of a newer r2c2r or not writable, and where the
+    file is missing beside existing projects (an empty one would hide them), unless it is to be created `anew`. Waits for
+    another writer are limited to `busy_s`.
     """
     if isinstance(database, str):
         engine = postgres.postgres_engine(database, busy_s)
@@ -52,7 +52,7 @@ def opened(database: Path | str, *, anew: bool = False) -> Iterator[Engine]:
 
 @contextmanager
 def opened_to_read(database: Path) -> Iterator[Engine]:
-    """The engine of a database of the newest tables, which nothing can be written with, while the block lasts."""
+    """Context with a read-only engine of a database with the newest tables."""
     engine = _engine(database, _prepare_to_read)
     try:
         yield engine
@@ -61,12 +61,12 @@ def opened_to_read(database: Path) -> Iterator[Engine]:
 
 
 def is_shared(engine: Engine) -> bool:
-    """Whether more than one server may use it at a time; a file is one server's."""
+    """Whether several servers may use the database at a time; a file belongs to one server."""
     return engine.dialect.name != "sqlite"
 
 
 def now(session: Session) -> float:
-    """Seconds since 1970 by the clock that everybody who uses the database shares."""
+    """Seconds since 1970 by the database's clock, shared by all its users."""
     if session.get_bind().dialect.name == "sqlite":
         return time.time()
     return float(session.execute(postgres.NOW).scalar_one())
@@ -81,12 +81,12 @@ def reading(engine: Engine) -> Iterator[Session]:
 
 @contextmanager
 def writing(engine: Engine, *, lasting: bool = True) -> Iterator[Session]:
-    """One transaction that takes the write lock at its start, so that what it read is still true when it writes.
+    """One transaction that takes the write lock at its start, so that its reads stay valid until it writes.
 
-    Raises NoSpace when the disk is full, Unavailable when the database does not answer, DatabaseUnusable when it is damaged:
-    nothing of it is stored then. Once it is stored, the engine's option `projects_changed` is told whose rows changed, and
-    `announced` is called where webhooks are to hear of it. What is not `lasting` is shown for a moment: nobody waits until it
-    is on the disk of a Postgres, which may lose the last of it when it crashes.
+    Raises NoSpace when the disk is full, Unavailable when the database does not answer, DatabaseUnusable when it is damaged;
+    nothing is stored then. After the commit, the engine's option `projects_changed` is called with the changed projects, and
+    `announced` if there are webhook deliveries. Without `lasting`, a Postgres commits asynchronously, for transient data that
+    may be lost in a crash.
     """
     options = engine.execution_options(write=True, lasting=lasting)
     with _said_plainly(engine), _Writing(options, expire_on_commit=False) as session:
@@ -102,7 +102,7 @@ def writing(engine: Engine, *, lasting: bool = True) -> Iterator[Session]:
 
 
 class _Writing(Session):
-    """A session whose `info` has the ids of projects that people, or a finished job, changed."""
+    """A session whose `info` has the ids of projects changed by users or finished jobs."""
 
 
 event.listen(_Writing, "before_flush", announcing.announce)
@@ -147,9 +147,9 @@ def _prepare_to_read(connection: sqlite3.Connection, _record: Any) -> None:
 def _prepare(connection: sqlite3.Connection, _record: Any) -> None:
     connection.isolation_level = None  # the driver's own BEGIN comes too late; _begin does it
     connection.execute("PRAGMA journal_mode=WAL")
-    connection.execute("PRAGMA synchronous=FULL")  # a click that was acknowledged survives a power cut
+    connection.execute("PRAGMA synchronous=FULL")  # an acknowledged click survives a power cut
     connection.execute("PRAGMA foreign_keys=ON")
-    connection.execute("PRAGMA secure_delete=ON")  # what was deleted is overwritten
+    connection.execute("PRAGMA secure_delete=ON")  # deleted content is overwritten
 
 
 def _begin(connection: Any) -> None:

@@ -1,12 +1,12 @@
-"""Every change is an event with what it replaced and by what, so anything can be undone, also after a restart.
+"""Event history with old and new values of every change, for undo and redo that survive a restart.
 
-An object's state has two scopes that are undone apart: `prompts` (name, category, colour, clicks, whose turn it is, whether it
-is there) and `review` (verdicts, corrections). A state is flat: a key for each field, click, correction and verdict. An event
-keeps only those that differ, so the history grows with what is done and not with what is there. Undo puts back what the event
-replaced and is itself an event; nothing is ever removed.
+An object's state has two scopes with separate undo: `prompts` (name, category, colour, clicks, assignee, deletion) and
+`review` (verdicts, corrections). A state is flat: a key for each field, click, correction and verdict. An event stores only
+the differing keys, so the history grows with the changes, not with the state. Undo restores an event's old values and is
+itself an event; nothing is ever removed.
 
-What can be undone is a stack, and what can be redone another. Events say on which they stand: `done`, `undone`, or `gone`
-once something else was done instead; on both the order is that of their numbers.
+There are an undo stack and a redo stack. Events are marked as `done`, `undone`, or `gone` once another change was made
+instead; both stacks are ordered by event number.
 """
 
 import time
@@ -32,7 +32,7 @@ _POINT, _FRAME, _CORRECTION, _VERDICT = "point ", "frame ", "override ", "verdic
 
 
 class Steps(NamedTuple):
-    """Whether anything can be undone, and redone."""
+    """Availability of undo and redo."""
 
     undo: bool = False
     redo: bool = False
@@ -42,7 +42,7 @@ class Steps(NamedTuple):
 def change(
     session: Session, item: SceneObject, scope: Scope, action: str, text: str, *, who: str, frame: int | None = None
 ) -> Iterator[None]:
-    """Record what the block does to the object; nothing is recorded when nothing changes."""
+    """Context that records the block's changes of the object; nothing is recorded without a change."""
     before = snapshot(session, item, scope)
     yield
     session.flush()
@@ -54,7 +54,7 @@ def change(
 
 
 def undo(session: Session, item: SceneObject, scope: Scope, *, who: str) -> Event:
-    """Take back the object's last change; returns that change. Raises Conflict when there is none."""
+    """Undo the object's last change and return it. Raises Conflict when there is none."""
     target = last_done(session, item, scope)
     if target is None:
         raise Conflict(f"nothing to undo on {item.name}")
@@ -62,7 +62,7 @@ def undo(session: Session, item: SceneObject, scope: Scope, *, who: str) -> Even
 
 
 def redo(session: Session, item: SceneObject, scope: Scope, *, who: str) -> Event:
-    """Do again what was undone last; returns that change. Raises Conflict when there is none."""
+    """Redo the last undone change and return it. Raises Conflict when there is none."""
     target = session.exec(_standing(item, scope, "undone").order_by(col(Event.id))).first()
     if target is None:
         raise Conflict(f"nothing to redo on {item.name}")
@@ -70,12 +70,12 @@ def redo(session: Session, item: SceneObject, scope: Scope, *, who: str) -> Even
 
 
 def last_done(session: Session, item: SceneObject, scope: Scope) -> Event | None:
-    """The object's last change that stands."""
+    """The object's last change that is not undone."""
     return session.exec(_standing(item, scope, "done").order_by(col(Event.id).desc())).first()
 
 
 def steps(session: Session, project_id: str, scope: Scope, object_id: int | None = None) -> dict[int | None, Steps]:
-    """What can be undone and redone, by object; of one, where one is named."""
+    """Availability of undo and redo by object, or of one object."""
     query = select(Event.object_id, Event.standing).where(Event.project_id == project_id, Event.scope == scope)
     if object_id is not None:
         query = query.where(Event.object_id == object_id)
@@ -84,13 +84,13 @@ def steps(session: Session, project_id: str, scope: Scope, object_id: int | None
 
 
 def steps_and_saved(session: Session, item: SceneObject, scope: Scope) -> tuple[Steps, float]:
-    """An object's steps, and when the last change about it was stored, whatever it was of; by one question."""
+    """An object's undo and redo availability, and the time of its last change in any scope, in one query."""
     found = session.execute(_STEPS_AND_SAVED, {"project": item.project_id, "object": item.id, "of": scope}).one()
     return Steps(bool(found[0]), bool(found[1])), found[2] or 0.0
 
 
 def _any_of_scope(standing: str) -> Any:
-    """Whether any event of the scope stands so, as a number: Postgres has no largest truth value."""
+    """Whether any event of the scope has this standing, as a number, since Postgres has no max() of booleans."""
     return func.max(case(((col(Event.scope) == bindparam("of")) & (col(Event.standing) == standing), 1), else_=0))
 
 
@@ -102,18 +102,18 @@ _STEPS_AND_SAVED = sqlalchemy.select(
 
 
 def last_change(session: Session, project_id: str, scope: Scope, direction: Literal["undo", "redo"]) -> int | None:
-    """The object that an undo (or redo) of the whole project is about."""
+    """The object affected by an undo (or redo) of the whole project."""
     mine = (Event.project_id == project_id, Event.scope == scope)
     query = select(Event.object_id).order_by(col(Event.id).desc())
     if direction == "undo":
         return session.exec(query.where(*mine, Event.standing == "done")).first()
-    undone = aliased(Event)  # what an undo is about, and is not done again since
+    undone = aliased(Event)  # the target of an undo that was not redone since
     query = query.join(undone, col(undone.id) == Event.target).where(*mine, Event.action == "undo")
     return session.exec(query.where(undone.standing == "undone")).first()
 
 
 def version_of(session: Session, item: SceneObject, scope: Scope) -> int:
-    """A number that grows with every change of the object in this scope; 0 before the first."""
+    """Version of the object in this scope, increased by every change; 0 before the first."""
     return versions(session, item.project_id, scope, item.id).get(item.id, 0)
 
 
@@ -138,20 +138,20 @@ def snapshot(session: Session, item: SceneObject, scope: Scope) -> State:
 
 
 def require_open(project: Project) -> None:
-    """Raise Conflict when the project was approved: what a reviewer signed stays what it was."""
+    """Raise Conflict when the project is approved, as approved content must not change."""
     if project.review_state == "approved":
         raise Conflict(f"{project.name} is approved", hint="a reviewer can reopen it on the review page")
 
 
 def set_override(session: Session, item: SceneObject, data: dict[str, Any]) -> None:
-    """Store what was corrected about the object."""
+    """Store the object's corrections."""
     found = _override(session, item) or Override(project_id=item.project_id, object_id=item.id)
     found.data = dict(data)
     session.add(found)
 
 
 def override_data(session: Session, item: SceneObject) -> dict[str, Any]:
-    """What was corrected about the object."""
+    """The object's stored corrections."""
     found = _override(session, item)
     return dict(found.data) if found else {}
 
@@ -170,7 +170,7 @@ def _step(session: Session, item: SceneObject, scope: Scope, target: Event, acti
 
 
 def _replace(session: Session, item: SceneObject, scope: Scope, there: State, wanted: State) -> None:
-    """Put what is wanted in the place of what is there; ids of clicks stay what they were."""
+    """Replace the current state by the wanted one, keeping ids of clicks."""
     if scope == "prompts":
         _refuse_taken_name(session, item, wanted)
         for name in _FIELDS:
@@ -201,16 +201,16 @@ def _record(
     frame: int | None,
     state: State | None = None,
 ) -> Event:
-    """An event of now, and what is stored with every change: the object's version and keys, the project's.
+    """Record an event, and update the object's version and keys, and the project's key.
 
-    `state` is the object's in that scope, where it was just read.
+    `state` is the object's state in that scope, if it was just read.
     """
     project = session.get_one(Project, item.project_id)
     require_open(project)
     read = state if state is not None else snapshot(session, item, scope)
     clicks = _clicks_in(read) if scope == "prompts" else clicks_of(session, item.id)
     override = _named(read, _CORRECTION) if scope == "review" else override_data(session, item)
-    item.version += 1  # after the questions, which store what was set before them: each row is written once
+    item.version += 1  # after the queries, which flush pending changes: each row is written once
     note_object(session, item, project.segmenter, clicks, override)
     note_project(session, project)
     now = project.updated = time.time()
@@ -221,17 +221,17 @@ def _record(
 
 
 def _without(state: State, other: State) -> State:
-    """Of a state, what the other has not, or has otherwise."""
+    """The entries of a state that the other lacks or that differ there."""
     return {key: value for key, value in state.items() if key not in other or other[key] != value}
 
 
 def _clicks_in(state: State) -> list[Click]:
-    """`clicks_of`, from a state."""
+    """The clicks in a state, as `clicks_of`."""
     return [Click(id=int(number), **click) for number, click in _named(state, _POINT).items()]
 
 
 def _named(state: State, kind: str) -> State:
-    """The state's entries of that kind, by what follows it."""
+    """The state's entries with a key prefix, keyed by the rest."""
     return {key.removeprefix(kind): value for key, value in state.items() if key.startswith(kind)}
 
 
@@ -241,7 +241,7 @@ def _standing(item: SceneObject, scope: Scope, standing: str) -> Any:
 
 
 def _forget_undone(session: Session, item: SceneObject, scope: Scope) -> None:
-    """What was undone cannot be redone over something else."""
+    """Clear the redo stack after another change."""
     session.execute(_FORGET_UNDONE, {"project": item.project_id, "object": item.id, "of": scope})
 
 

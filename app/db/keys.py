@@ -1,6 +1,6 @@
-"""Keys of what people gave, stored beside it: masks and results are current while theirs is this one.
+"""Content keys of user input, stored with it; masks and results are current while their key matches.
 
-They are made when something changes, from the object that changed, and read by every list.
+Keys are computed when an object changes, and read by every list.
 """
 
 import hashlib
@@ -18,11 +18,11 @@ from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.robot.arms import ARMS
 from r2c2r_core.workspace import content_key
 
-Drawn = dict[str, Any]  # what an entry of prompts.json holds beside clicks: front, frames, crop
+Drawn = dict[str, Any]  # an entry of prompts.json without clicks: front, frames, crop
 
 
 def drawn_of(item: SceneObject) -> Drawn:
-    """What was drawn of an object, as in prompts.json; empty where nothing was."""
+    """An object's drawn parts, as in prompts.json; empty without any."""
     frames = [{"frame": int(number), "mask": mask} for number, mask in sorted(item.frames.items(), key=lambda one: int(one[0]))]
     front = {} if item.front is None else {"front": item.front}
     crop = {} if item.crop is None else {"crop": item.crop}
@@ -30,9 +30,9 @@ def drawn_of(item: SceneObject) -> Drawn:
 
 
 def masks_key(segmenter: str, category: str, clicks: Iterable[tuple[int, float, float, int]], drawn: Drawn) -> str:
-    """Key of what an object's masks depend on, its name not among it.
+    """Key of all inputs of an object's masks, which do not include its name.
 
-    Empty while no click (frame, x, y, label) is on it and no front is drawn.
+    Empty without a positive click (frame, x, y, label) and without a drawn front.
     """
     given: list[Any] = [[frame, x, y, label] for frame, x, y, label in clicks]
     if "front" not in drawn and not any(label for *_, label in given):
@@ -48,7 +48,7 @@ def masks_key(segmenter: str, category: str, clicks: Iterable[tuple[int, float, 
 
 
 def object_key(name: str, category: str, clicks: list[Click], override: dict[str, Any], drawn: Drawn) -> str:
-    """Key of everything about an object that a result depends on; empty where none does."""
+    """Key of all inputs of an object's results; empty where there are none."""
     prompt: list[Any] | None = [[c.frame, c.x, c.y, c.label] for c in clicks] if any(c.label for c in clicks) else None
     if "front" in drawn or (prompt and drawn):
         prompt = [*(prompt or []), *drawn.values()]
@@ -57,14 +57,14 @@ def object_key(name: str, category: str, clicks: list[Click], override: dict[str
 
 
 def overrides_entry(stored: dict[str, Any]) -> dict[str, Any]:
-    """One object of overrides.json, from what is stored about it."""
+    """An object's entry in overrides.json, from its stored corrections."""
     data = {key: value for key, value in stored.items() if value not in (None, [], {})}
     limits = [data.pop("joint_lower", None), data.pop("joint_upper", None)]
     return data if limits == [None, None] else {**data, "joint_limits": limits}
 
 
 def stored_entry(entry: dict[str, Any]) -> dict[str, Any]:
-    """What is stored about an object, from its entry in overrides.json: the inverse of `overrides_entry`."""
+    """Stored corrections of an object, from its entry in overrides.json: the inverse of `overrides_entry`."""
     lower, upper = entry.get("joint_limits") or (None, None)
     limits = {"joint_lower": lower, "joint_upper": upper}
     rest = {key: value for key, value in entry.items() if key != "joint_limits"}
@@ -72,14 +72,14 @@ def stored_entry(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def note_object(session: Session, item: SceneObject, segmenter: str, clicks: list[Click], override: dict[str, Any]) -> None:
-    """Store the keys of an object that changed."""
+    """Update the keys of a changed object."""
     item.masks_key = masks_key(segmenter, item.category, [(c.frame, c.x, c.y, c.label) for c in clicks], drawn_of(item))
     item.inputs = object_key(item.name, item.category, clicks, override, drawn_of(item))
     session.add(item)
 
 
 def note_project(session: Session, project: Project) -> None:
-    """Store the key of everything a person gave, after something of it changed."""
+    """Update the project's key of all user input after a change."""
     session.flush()
     given = [inputs for (inputs,) in session.execute(_GIVEN, {"project": project.id})]
     project.inputs = content_key(given, project.segmenter, _chosen(project))
@@ -95,7 +95,7 @@ _GIVEN = (
 
 
 def note_segmenter(session: Session, project: Project) -> None:
-    """Store the keys of the masks after another segmenter was chosen to draw them."""
+    """Update the keys of all masks after a change of the segmenter."""
     clicks = clicks_by_object(session, project.id)
     for item in live_objects(session, project.id, deleted=True):
         clicked = [(c.frame, c.x, c.y, c.label) for c in clicks.get(item.id or 0, [])]
@@ -104,7 +104,7 @@ def note_segmenter(session: Session, project: Project) -> None:
 
 
 def _chosen(project: Project) -> dict[str, str]:
-    """What is not the default, backends by seam and how depth is read: something new leaves the keys of older results."""
+    """Non-default backends and reading options only, so that new options do not change the keys of older results."""
     usual = {"generator": GENERATORS.default, "matcher": MATCHERS.default, "arm": ARMS.default}
     chosen = {seam: getattr(project, seam) for seam, name in usual.items() if getattr(project, seam) != name}
     chosen |= {"depth": "registered"} if project.register_depth else {}

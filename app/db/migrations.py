@@ -1,4 +1,4 @@
-"""Revisions of the tables, and bringing a database to the newest; of a file a copy of the older one is kept."""
+"""Schema migrations; a copy of an older database file is kept."""
 
 import time
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ KEPT_COPIES = 3  # of databases before a migration
 
 
 def migrate(engine: Engine, revision: str = "head") -> None:
-    """Bring the database to a revision; an empty one becomes a complete one, an older file is copied to backups/ first."""
+    """Migrate the database to a revision; an empty one gets all tables, an older file is copied to backups/ first."""
     if engine.dialect.name == "sqlite":
         _migrate_file(engine, revision)
     else:
@@ -30,7 +30,7 @@ def migrate(engine: Engine, revision: str = "head") -> None:
 
 
 def _migrate_server(engine: Engine, revision: str) -> None:
-    """In one transaction, with the writers' lock: of servers that start together, the others find it done."""
+    """Migrate in one transaction under the writers' lock, so that only one of several starting servers migrates."""
     config, known = _config(), revisions()
     with engine.execution_options(write=True).begin() as connection:
         now = MigrationContext.configure(connection).get_current_revision()
@@ -56,7 +56,7 @@ def _migrate_file(engine: Engine, revision: str) -> None:
         config.attributes["connection"] = connection
         command.upgrade(config, revision)
         loose = _loose_rows(connection) - before
-        if loose > 0:  # nothing of it is stored
+        if loose > 0:  # the transaction is rolled back
             found = f"{loose} rows would refer to what is not there in revision {revision}"
             raise DatabaseUnusable(f"{engine.url.database}: {found}, none expected", hint=RESTORE)
 
@@ -65,14 +65,14 @@ def _is_newest(now: str | None, revision: str) -> bool:
     return revision == "head" and now == revisions()[-1]
 
 
-@cache  # every migration is read for it
+@cache  # it reads all migrations
 def revisions() -> tuple[str, ...]:
     """All revisions, oldest first."""
     return tuple(script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions())[::-1]
 
 
 def require_tables(engine: Engine) -> None:
-    """Raise DatabaseUnusable for a database whose tables are not those of tables.py, whatever its revision says."""
+    """Raise DatabaseUnusable for a database whose tables differ from tables.py, regardless of its revision."""
     found = inspect(engine)
     names = set(found.get_table_names())
     for table in SQLModel.metadata.sorted_tables:
@@ -88,7 +88,7 @@ def require_tables(engine: Engine) -> None:
 
 @contextmanager
 def _without_foreign_keys(engine: Engine) -> Iterator[Connection]:
-    """A connection that follows no foreign key: dropping the old one of a table made anew would delete all that refers to it.
+    """A connection without foreign keys, as dropping a rebuilt table's old version would delete all rows referring to it.
 
     SQLite's own procedure (https://www.sqlite.org/lang_altertable.html, section 7); the pragma does nothing in a transaction.
     """
@@ -104,7 +104,7 @@ def _without_foreign_keys(engine: Engine) -> Iterator[Connection]:
 
 
 def _loose_rows(connection: Connection) -> int:
-    """How many rows refer to what is not there."""
+    """Number of rows with dangling references."""
     return len(connection.exec_driver_sql("PRAGMA foreign_key_check").fetchall())
 
 
@@ -116,7 +116,7 @@ def _config() -> Config:
 
 
 def _keep_copy(database: Path, revision: str) -> None:
-    """A copy of the file as it is, named for its revision; the oldest such copies go."""
+    """Copy the file, named by its revision, and delete the oldest such copies."""
     folder = database.parent / "backups"
     copy_database(database, folder / f"before-{revision}-{time.strftime('%Y%m%d-%H%M%S')}.db")
     copies = sorted(folder.glob("before-*.db"), key=lambda path: path.stat().st_mtime)

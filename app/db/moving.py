@@ -1,4 +1,4 @@
-"""`r2c2r db`: rows carried from one database to another, a file or a Postgres, and back; counted and hashed on both sides."""
+"""`r2c2r db`: copying rows between databases (SQLite files or Postgres), verified by counts and hashes."""
 
 import contextlib
 import hashlib
@@ -32,18 +32,18 @@ Address = Path | str
 
 @dataclass(frozen=True, slots=True)
 class TableRows:
-    """What a table holds."""
+    """Number and digest of a table's rows."""
 
     table: str
     rows: int
-    digest: str  # of all rows, whatever their order
+    digest: str  # of all rows, independent of order
 
 
 def move(source: str, target: str, *, progress: Progress = SILENT) -> list[TableRows]:
-    """Copy every row into an empty database, a new file or the address of a Postgres; what was there is left as it was.
+    """Copy every row into an empty database, a new file or the address of a Postgres; the source is unchanged.
 
-    Nothing is stored unless each table's rows come out as they went in. Raises InputError for a source that is not there,
-    Conflict for a target that holds rows or a file that is served.
+    Nothing is stored unless the copied rows of each table equal the source's. Raises InputError for a missing source,
+    Conflict for a non-empty target or a file in use by a server.
     """
     source_at, target_at = _address(source), _address(target)
     if isinstance(target_at, Path) and target_at.exists():
@@ -53,7 +53,7 @@ def move(source: str, target: str, *, progress: Progress = SILENT) -> list[Table
 
 
 def backup(data_dir: Path, target: Path, *, progress: Progress = SILENT) -> None:
-    """The rows as one SQLite file, also while they are served; raises InputError where there are none."""
+    """Write the rows to one SQLite file, even while a server runs; raises InputError where there are none."""
     settings = Settings(data_dir=resolved(data_dir))
     if target.exists():
         raise Conflict(f"{target}: is there already", hint="choose a new name: backups are never written over")
@@ -61,7 +61,7 @@ def backup(data_dir: Path, target: Path, *, progress: Progress = SILENT) -> None
 
 
 def copy_rows(settings: Settings, target: Path, progress: Progress = SILENT) -> None:
-    """The rows of the settings as one SQLite file at a place where nothing is, as they are at one moment."""
+    """Write a consistent snapshot of the configured database to a new SQLite file."""
     if isinstance(settings.rows, Path):
         copy_database(_existing(settings.rows), target)
         return
@@ -70,7 +70,7 @@ def copy_rows(settings: Settings, target: Path, progress: Progress = SILENT) -> 
 
 
 def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> list[TableRows]:
-    """A SQLite file's rows into the empty Postgres of the settings."""
+    """Copy a SQLite file's rows into the empty Postgres of the settings."""
     settings = Settings(data_dir=resolved(data_dir))
     if isinstance(settings.rows, Path):
         raise InputError("R2C2R_DATABASE is not set: the rows are a file", hint=f"r2c2r restore {source} {data_dir}")
@@ -78,7 +78,7 @@ def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> lis
 
 
 def check(data_dir: Path) -> list[TableRows]:
-    """What every table of a sound database holds; raises DatabaseUnusable for one of other tables than this r2c2r's."""
+    """Counts and digests of all tables of a sound database; raises DatabaseUnusable where its tables differ from r2c2r's."""
     settings = Settings(data_dir=resolved(data_dir))
     if isinstance(settings.rows, Path):
         require_usable(_existing(settings.rows), to_write=False)
@@ -94,12 +94,12 @@ def check(data_dir: Path) -> list[TableRows]:
 
 
 def _into(old: Engine, target: Address, progress: Progress) -> list[TableRows]:
-    """Fill a database; a file gets its name when it is whole."""
+    """Fill a database; a file gets its final name once it is complete."""
     if isinstance(target, str):
         with opened(target) as new:
             return _copied(old, new, progress)
     target.parent.mkdir(parents=True, exist_ok=True)
-    os.umask(0o077)  # digests of passwords are in it
+    os.umask(0o077)  # it contains password hashes
     part = target.with_name(f".{target.name}.arriving")
     part.unlink(missing_ok=True)
     try:
@@ -108,7 +108,7 @@ def _into(old: Engine, target: Address, progress: Progress) -> list[TableRows]:
             found = _copied(old, engine, progress)
         finally:
             engine.dispose()
-        copy_database(part, target)  # without what SQLite keeps beside a file in use
+        copy_database(part, target)  # without SQLite's companion files
         return found
     finally:
         for left in part.parent.glob(f"{part.name}*"):
@@ -136,12 +136,12 @@ def _copied(old: Engine, new: Engine, progress: Progress) -> list[TableRows]:
 
 
 def _kept_tables() -> list[Table]:
-    """All but what passes between servers for minutes."""
+    """All tables except transient messages between servers."""
     return [table for table in SQLModel.metadata.sorted_tables if table.name != Message.__tablename__]
 
 
 def _rows(connection: Connection, table: Table) -> Iterator[list[dict[str, Any]]]:
-    """The rows in portions; documents as the text they are stored as."""
+    """The rows in batches, with JSON documents as stored text."""
     columns = [cast(column, Text).label(column.name) if _is_document(column) else column for column in table.columns]
     found = connection.execute(select(*columns).execution_options(yield_per=AT_ONCE))
     for portion in found.mappings().partitions():
@@ -164,7 +164,7 @@ def _held(connection: Connection, table: Table) -> TableRows:
 
 
 def _counted(connection: Connection, table: Table) -> int | None:
-    """The largest number that a row of the table ever had: none is given twice; None where rows have no numbers."""
+    """The largest id ever used in the table, so that none is reused; None for tables without ids."""
     if not _is_numbered(table):
         return None
     largest = connection.execute(select(func.max(table.c.id))).scalar() or 0
@@ -210,7 +210,7 @@ def _existing(database: Path) -> Path:
 
 @contextlib.contextmanager
 def _at_rest(source: Address) -> Iterator[None]:
-    """A file that no server uses while the block lasts; what changed meanwhile would not be in the copy."""
+    """Context that locks a file against servers, as concurrent changes would be missing in the copy."""
     if isinstance(source, str):
         yield
         return

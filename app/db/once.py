@@ -1,8 +1,8 @@
-"""A change that is sent again, because its answer got lost on the way, is not made again.
+"""Idempotent changes: a request that is repeated because its answer was lost is not applied again.
 
-The sender marks a change with a key of its own. The key is stored in the transaction that makes the change, and so is the
-answer where it is known by then; else right after it. Both are kept as long as a browser's session, for a tab may come back
-with what it could not send. A server that dies before the answer is stored has the key without it: the change was made.
+The sender marks a change with an idempotency key. The key is stored in the transaction that makes the change, and so is the
+answer if it is known by then; else right after it. Both are kept as long as a browser's session, as a tab may return with
+unsent changes. If a server dies before the answer is stored, the key alone shows that the change was made.
 """
 
 import time
@@ -22,7 +22,7 @@ KEPT_S = 30 * 24 * 3600.0
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What was answered the first time."""
+    """The stored first answer."""
 
     status: int
     body: str
@@ -30,12 +30,12 @@ class Answer:
 
 @dataclass(slots=True)
 class Sending:
-    """A marked change on its way: who sent it under which key (a digest), and what it asks for."""
+    """A marked change in progress: digest of sender and key, and the request."""
 
     digest: str
     request: str  # method and path
     project_id: str | None
-    status: int = 200  # of the answer once it is made, as its route says
+    status: int = 200  # of the answer on success, from its route
     kept: Answer | None = field(default=None, compare=False)  # stored with the change
 
 
@@ -53,7 +53,7 @@ _sending: ContextVar[Sending | None] = ContextVar("sending", default=None)
 
 @contextmanager
 def marked(sending: Sending) -> Iterator[None]:
-    """What is written inside belongs to the marked change."""
+    """Context whose writes belong to the marked change."""
     token = _sending.set(sending)
     try:
         yield
@@ -62,15 +62,15 @@ def marked(sending: Sending) -> Iterator[None]:
 
 
 def promise(status: int) -> None:
-    """The route of what is being asked answers with this status when all goes well."""
+    """Set the status with which the current route answers on success."""
     if (sending := _sending.get()) is not None:
         sending.status = status
 
 
 def claim(session: Session) -> None:
-    """Store the key with what this transaction changes; nothing outside a marked change.
+    """Store the key in this transaction; no-op outside a marked change.
 
-    Raises Conflict for a key that is stored: whatever happened to the first one, a second one changes nothing.
+    Raises Conflict for a stored key: whatever the outcome of the first request, a second one changes nothing.
     """
     sending = _sending.get()
     if sending is not None:
@@ -80,7 +80,7 @@ def claim(session: Session) -> None:
 
 
 def keep_answer(session: Session, body: str) -> None:
-    """Store what will be answered in the transaction that makes the change; nothing outside a marked one."""
+    """Store the answer in the transaction that makes the change; no-op outside a marked change."""
     sending = _sending.get()
     if sending is not None:
         answered(session, sending.digest, sending.status, body)
@@ -88,17 +88,17 @@ def keep_answer(session: Session, body: str) -> None:
 
 
 def find(session: Session, digest: str) -> SentChange | None:
-    """What became of the change with that key."""
+    """The stored change with that key, or None."""
     return session.get(SentChange, digest)
 
 
 def answered(session: Session, digest: str, status: int, body: str) -> None:
-    """Keep the answer beside the key, if the change was stored at all."""
+    """Store the answer with the key, if the change was stored."""
     session.connection().execute(_ANSWERED, {"claimed": digest, "status": status, "answer": body})
 
 
 def forget(session: Session, *, before: float | None = None, project_id: str | None = None) -> None:
-    """Delete what is older, or what was about a project."""
+    """Delete older entries, or those of a project."""
     if before is not None:
         session.exec(delete(SentChange).where(col(SentChange.at) < before))
     if project_id is not None:

@@ -1,7 +1,7 @@
-"""Postgres in the place of the SQLite file, for more than one server: the same tables and the same promises.
+"""Postgres backend for several servers, with the same tables and guarantees as SQLite.
 
-Whoever writes holds one advisory lock until the transaction ends, so that there is one writer at a time as with SQLite, and
-what it read is still true when it writes; whoever reads sees the rows of one moment.
+A writer holds an advisory lock until its transaction ends, so that there is one writer at a time as with SQLite, and its
+reads stay valid until it writes; readers see a consistent snapshot.
 """
 
 import math
@@ -34,14 +34,14 @@ _FAULTS = {
 def postgres_engine(address: str, busy_s: float) -> Engine:
     """The engine of a Postgres; raises InputError for an address of another kind, EnvironmentProblem without the driver.
 
-    Its writer, and its answer to who connects, are waited for up to `busy_s`.
+    Waits for the write lock and for connections are limited to `busy_s`.
     """
     url, waits = _checked(address), {"options": f"-c lock_timeout={1000 * busy_s:.0f}ms", "connect_timeout": math.ceil(busy_s)}
     try:
         engine = create_engine(
             url,
             connect_args={**waits, "application_name": "r2c2r"},
-            pool_pre_ping=True,  # a Postgres that was started anew is found before a request fails on it
+            pool_pre_ping=True,  # a restarted Postgres is detected before a request fails on it
             pool_size=10,
             max_overflow=20,
         )
@@ -57,13 +57,13 @@ def shown(url: URL) -> str:
 
 
 def explained(error: DBAPIError, url: URL) -> R2C2RError | None:
-    """What Postgres says, as one of our errors; None for what is no fault of the server, such as a broken constraint."""
+    """A Postgres error as one of our errors; None for errors that are not the server's fault, such as a broken constraint."""
     state = getattr(error.orig, "sqlstate", None)
     if state == "53100":
         return NoSpace("the disk of the database is full", hint="free some space: nothing already made is lost")
     if state in _FAULTS:
         return DatabaseUnusable(f"{shown(url)}: {_FAULTS[state]} ({state})", hint="r2c2r db check says what is wrong")
-    if state is None or state[:2] in _PASSING:  # none: nobody answers at that address
+    if state is None or state[:2] in _PASSING:  # none: no answer at that address
         return Unavailable("the database does not answer", hint="try again in a moment")
     return None
 

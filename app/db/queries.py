@@ -1,4 +1,4 @@
-"""Rows by their keys, and rows as what goes over the wire."""
+"""Queries of rows by key, and conversion of rows to API schemas."""
 
 import time
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "run": ("segment", "generate", "align", "synthesize", "warp", "export"),
     "vary": ("vary",),
 }
-READS_RECORDING = ("import", "sample")  # kinds of jobs; until one is done the project cannot be opened
+READS_RECORDING = ("import", "sample")  # job kinds; the project cannot be opened until one is done
 ACTIVE = ("queued", "running", "cancelling")
 
 
@@ -36,7 +36,7 @@ def _no_project(project_id: str) -> NotFound:
 
 
 def object_row(session: Session, project_id: str, object_id: int, *, deleted: bool = False) -> SceneObject:
-    """The object; NotFound when the project has no such object, or it is deleted and `deleted` was not asked for."""
+    """The object; NotFound when the project has no such object, or it is deleted and `deleted` is not set."""
     found = session.get(SceneObject, object_id)
     if found is None or found.project_id != project_id or (found.deleted and not deleted):
         raise NotFound(f"no object {object_id} in this project", hint="it may have been deleted; undo brings it back")
@@ -52,18 +52,18 @@ def job_row(session: Session, job_id: int) -> Job:
 
 
 def live_objects(session: Session, project_id: str, *, deleted: bool = False) -> list[SceneObject]:
-    """The project's objects, oldest first; deleted ones only when asked for."""
+    """The project's objects, oldest first; deleted ones only with `deleted`."""
     query = select(SceneObject).where(SceneObject.project_id == project_id).order_by(col(SceneObject.id))
     return list(session.exec(query if deleted else query.where(col(SceneObject.deleted).is_(False))))
 
 
 def owner(session: Session, project: Project) -> str | None:
-    """The name of who made the project; None for whoever started the server, and where the account is gone."""
+    """The project's owner; None for the user who started the server, and for a deleted account."""
     return account_name(session, project.owner_id)
 
 
 def account_name(session: Session, account_id: int | None) -> str | None:
-    """The account's name; None for none, and for one that is gone."""
+    """The account's name; None without one, and for a deleted account."""
     account = session.get(Account, account_id) if account_id is not None else None
     return account.name if account else None
 
@@ -80,7 +80,7 @@ def who_sees(session: Session, project: Project) -> set[str]:
 
 
 class Drawn(NamedTuple):
-    """What an object's masks are found by: hundreds are read for each frame that somebody scrubs over."""
+    """The fields that locate an object's masks; lightweight, as hundreds are read for each frame while scrubbing."""
 
     id: int
     name: str
@@ -89,12 +89,12 @@ class Drawn(NamedTuple):
 
     @property
     def result_name(self) -> str:
-        """As of SceneObject."""
+        """The name of its results, as in SceneObject."""
         return self.run_name or self.name
 
 
 class DrawnIn(NamedTuple):
-    """The same of the project they are in."""
+    """The project's fields that locate masks."""
 
     id: str
     work_path: str | None
@@ -112,7 +112,7 @@ _DRAWN = (
 
 
 def drawn_in(session: Session, project_id: str) -> DrawnIn:
-    """What says where a project's masks and frames are; NotFound when there is no such project."""
+    """The fields that locate a project's masks and frames; NotFound when there is no such project."""
     found = session.execute(_DRAWN_IN, {"project": project_id}).first()
     if found is None:
         raise _no_project(project_id)
@@ -120,12 +120,12 @@ def drawn_in(session: Session, project_id: str) -> DrawnIn:
 
 
 def drawn(session: Session, project_id: str) -> list[Drawn]:
-    """What the masks of each of the project's objects are found by, oldest first."""
+    """The fields that locate each object's masks, oldest object first."""
     return [Drawn(*row) for row in session.execute(_DRAWN, {"project": project_id})]
 
 
 class Click(NamedTuple):
-    """A click as it is stored, to be looked at: thousands are read at once."""
+    """A stored click, read-only; lightweight, as thousands are read at once."""
 
     id: int
     frame: int
@@ -137,7 +137,7 @@ class Click(NamedTuple):
 _CLICKS = sqlalchemy.select(
     col(Point.id), col(Point.frame), col(Point.x), col(Point.y), col(Point.label), col(Point.object_id)
 ).order_by(col(Point.id))
-_CLICKS_OF = _CLICKS.where(col(Point.object_id) == bindparam("object"))  # made once: that takes as long as to ask
+_CLICKS_OF = _CLICKS.where(col(Point.object_id) == bindparam("object"))  # built once, which takes as long as the query itself
 
 
 def clicks_of(session: Session, object_id: int | None) -> list[Click]:
@@ -155,13 +155,13 @@ def clicks_by_object(session: Session, project_id: str) -> dict[int, list[Click]
 
 
 def overrides_by_object(session: Session, project_id: str) -> dict[int, dict[str, Any]]:
-    """What was corrected about each of a project's objects."""
+    """The corrections of each of a project's objects."""
     rows = session.exec(select(Override).where(Override.project_id == project_id))
     return {row.object_id or 0: dict(row.data) for row in rows}
 
 
 def saved(session: Session, project_id: str, object_id: int | None = None) -> dict[int | None, float]:
-    """When the last change about each object was stored; about one, where one is named."""
+    """Time of the last change by object, or of one object."""
     query = select(Event.object_id, func.max(Event.at)).where(Event.project_id == project_id)
     if object_id is not None:
         query = query.where(Event.object_id == object_id)
@@ -169,7 +169,7 @@ def saved(session: Session, project_id: str, object_id: int | None = None) -> di
 
 
 def note_size(session: Session, project_id: str, size: int) -> None:
-    """Store how large the project's folder is now."""
+    """Store the size of the project's folder."""
     values = {"size_bytes": size, "sized": time.time()}
     session.exec(update(Project).where(col(Project.id) == project_id).values(**values))
 
@@ -181,13 +181,13 @@ def newest_bundle(session: Session, project_id: str) -> Bundle | None:
 
 
 def no_retry(kind: str, source_path: str | None) -> str:
-    """Why the job, if it failed, would only fail again; empty where it may be retried."""
+    """Reason why a failed job cannot be retried; empty where it can."""
     refused = kind in READS_RECORDING and source_path is None
     return "the recording was refused, and is not kept" if refused else ""
 
 
 def job_shapes(session: Session, rows: Sequence[Job]) -> list[schemas.Job]:
-    """Jobs as they go over the wire."""
+    """Jobs as API schemas."""
     of = select(Project.id, Project.name, Project.source_path).where(col(Project.id).in_({row.project_id for row in rows}))
     projects = {number: (name, source) for number, name, source in session.exec(of)}
     waiting: list[tuple[int | None, str]] = []
@@ -197,7 +197,7 @@ def job_shapes(session: Session, rows: Sequence[Job]) -> list[schemas.Job]:
 
 
 def _job_shape(row: Job, name: str, source: str | None, waiting: list[tuple[int | None, str]]) -> schemas.Job:
-    reads = row.kind in READS_RECORDING  # imports and runs do not wait for each other
+    reads = row.kind in READS_RECORDING  # imports and runs are queued separately
     before = [number for number, kind in waiting if (kind in READS_RECORDING) == reads]
     return schemas.Job(
         id=row.id or 0,
@@ -224,7 +224,7 @@ def _job_shape(row: Job, name: str, source: str | None, waiting: list[tuple[int 
 
 
 def stage_states(row: Job) -> list[schemas.StageState]:
-    """Each stage of the job and how far it is."""
+    """Progress of each stage of the job."""
     names = STAGES[row.kind]
     if row.state == "done":
         return [schemas.StageState(name=name, state="done") for name in names]
@@ -237,7 +237,7 @@ def stage_states(row: Job) -> list[schemas.StageState]:
 
 
 def bundles(session: Session, which: Any) -> list[tuple[Bundle, bool | None]]:
-    """Bundles, newest first, and whether each passed: their certificates, which may be long, are left where they are."""
+    """Bundles, newest first, with their verdict, without loading the certificates, which may be long."""
     passed = col(Bundle.certificate)["passed"].as_boolean()
     rows = select(Bundle, passed).where(which).options(defer(Bundle.certificate))  # type: ignore[arg-type]  # a column
     found = session.exec(rows.order_by(col(Bundle.version).desc()))
@@ -245,7 +245,7 @@ def bundles(session: Session, which: Any) -> list[tuple[Bundle, bool | None]]:
 
 
 def bundle_shape(row: Bundle, passed: bool | None, name: str, inputs: str) -> schemas.Bundle:
-    """A bundle as it goes over the wire; `inputs` is the project's key of now."""
+    """A bundle as an API schema; `inputs` is the project's current key."""
     return schemas.Bundle(
         version=row.version,
         url=f"/media/{row.project_id}/bundles/{row.version}.zip",
@@ -259,11 +259,11 @@ def bundle_shape(row: Bundle, passed: bool | None, name: str, inputs: str) -> sc
 
 
 def bundle_file_name(name: str, version: int, sha256: str) -> str:
-    """What the browser saves a bundle as."""
+    """Download file name of a bundle."""
     return f"{plain_name(name)}-v{version}-{sha256[:8]}.zip"
 
 
 def plain_name(name: str) -> str:
-    """A project's name as a file may be called."""
+    """A project's name as a valid file name."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in name).strip("-").lower()
     return plain or "scene"

@@ -1,4 +1,4 @@
-"""The database as a file: read without making one, copied while it is in use, and what SQLite's codes mean."""
+"""SQLite files: opening without creating, copying while in use, and mapping of error codes."""
 
 import sqlite3
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from app.files import free_bytes
 from r2c2r_core.errors import R2C2RError
 
 RESTORE = "r2c2r restore BACKUP DATA puts a copy in its place: see docs/data.md"
-_ROOM_BYTES = 1 << 20  # with less than that free, SQLite's "disk I/O error" is a full disk
+_ROOM_BYTES = 1 << 20  # with less free space, SQLite's "disk I/O error" means a full disk
 _FAULTS = {
     sqlite3.SQLITE_NOTADB: ("no database", RESTORE),
     sqlite3.SQLITE_CORRUPT: ("a damaged database", RESTORE),
@@ -24,15 +24,15 @@ _FAULTS = {
 
 @contextmanager
 def connected(database: Path) -> Iterator[sqlite3.Connection]:
-    """A connection to a file that is there; what SQLite finds wrong with it is raised as one of our errors."""
+    """A connection to an existing file; SQLite's errors are raised as our own."""
     connection = None
     try:
         connection = sqlite3.connect(f"{database.absolute().as_uri()}?mode=rw", uri=True, timeout=10)
-        connection.text_factory = lambda raw: raw.decode(errors="replace")  # reports on damage quote what they found
+        connection.text_factory = lambda raw: raw.decode(errors="replace")  # damage reports quote raw content
         yield connection
     except sqlite3.Error as error:
         raise explained(error, database) or error from error
-    except UnicodeDecodeError as error:  # a message of SQLite that quotes damaged bytes
+    except UnicodeDecodeError as error:  # an SQLite message that quotes damaged bytes
         raise DatabaseUnusable(f"{database}: a damaged database", hint=RESTORE) from error
     finally:
         if connection is not None:
@@ -40,9 +40,9 @@ def connected(database: Path) -> Iterator[sqlite3.Connection]:
 
 
 def explained(error: sqlite3.Error, database: Path) -> R2C2RError | None:
-    """What SQLite says, as one of our errors; None for what is no fault of the file, such as a broken constraint.
+    """An SQLite error as one of our errors; None for errors that are not the file's fault, such as a broken constraint.
 
-    SQLite's texts mislead ("database disk image is malformed" is no full disk): only its codes tell
+    SQLite's messages mislead ("database disk image is malformed" is not a full disk); only its codes are reliable
     (https://www.sqlite.org/rescode.html); the low byte is the class.
     """
     code = getattr(error, "sqlite_errorcode", None)
@@ -59,16 +59,16 @@ def explained(error: sqlite3.Error, database: Path) -> R2C2RError | None:
 
 
 def require_sound(connection: sqlite3.Connection, database: Path, check: str = "integrity_check") -> None:
-    """Raise DatabaseUnusable for a damaged file; `quick_check` leaves out whether indices agree with their tables."""
+    """Raise DatabaseUnusable for a damaged file; `quick_check` skips the consistency of indices with their tables."""
     found = connection.execute(f"PRAGMA {check}(1)").fetchone()[0]
     if found != "ok":
         raise DatabaseUnusable(f"{database}: a damaged database ({found})", hint=RESTORE)
 
 
 def copy_database(database: Path, target: Path) -> None:
-    """Copy the database as it is at one moment, whoever writes meanwhile; raises DatabaseUnusable for a damaged one.
+    """Copy a consistent snapshot of the database, even during writes; raises DatabaseUnusable for a damaged one.
 
-    The copy is whole or not there: it gets its name once it was found sound.
+    The copy is atomic: it gets its final name once it was verified.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".{target.name}.part")
@@ -77,7 +77,7 @@ def copy_database(database: Path, target: Path) -> None:
     try:
         with connected(database) as source, connected(part) as copy:
             source.backup(copy)
-            copy.execute("PRAGMA journal_mode=DELETE")  # one file: what is carried away has no -wal beside it
+            copy.execute("PRAGMA journal_mode=DELETE")  # a single file without a -wal beside it
             require_sound(copy, database)
         part.replace(target)
     finally:

@@ -263,7 +263,7 @@ class Point(SQLModel, table=True):
 
 
 class Override(SQLModel, table=True):
-    """What a person corrected about one object; object_id None is the scene."""
+    """Manual corrections of one object; object_id None is the scene."""
 
     __tablename__ = "overrides"
     __table_args__ = (UniqueConstraint("project_id", "object_id", name="uq_overrides_object"),)
@@ -275,7 +275,7 @@ class Override(SQLModel, table=True):
 
 
 class Verdict(SQLModel, table=True):
-    """What a reviewer said about one candidate."""
+    """A reviewer's verdict on one candidate."""
 
     __tablename__ = "verdicts"
     __table_args__ = (UniqueConstraint("object_id", "candidate", name="uq_verdicts_candidate"),)
@@ -290,7 +290,7 @@ class Verdict(SQLModel, table=True):
 
 
 class Comment(SQLModel, table=True):
-    """What somebody said about a pixel of a frame, a point of the scene, an object, or the project."""
+    """A comment on a pixel of a frame, a point of the scene, an object, or the project."""
 
     __tablename__ = "comments"
     __table_args__ = (Index("ix_comments_project", "project_id"), {"sqlite_autoincrement": True})
@@ -419,7 +419,7 @@ class Seat(SQLModel, table=True):
 
 
 class Message(SQLModel, table=True):
-    """What one process tells the others that share the database; deleted after minutes: db/channel.py."""
+    """A message between processes that share the database; deleted after minutes: db/channel.py."""
 
     __tablename__ = "messages"
 

@@ -1,4 +1,4 @@
-"""Whether the app can work with a database file: said in one line, with the next step, before anything is built on it."""
+"""Validation of a database file before use, with a one-line error and the next step."""
 
 import sqlite3
 from pathlib import Path
@@ -14,10 +14,10 @@ from app.errors import DatabaseUnusable
 
 
 def require_usable(database: Path, *, anew: bool = False, to_write: bool = True) -> str | None:
-    """The revision of its tables, None where there are none yet; raises DatabaseUnusable unless the file is a sound database
-    that this r2c2r knows, or may be begun.
+    """The revision of its tables, None where there are none yet; raises DatabaseUnusable for an unusable file.
 
-    Beside projects none is begun unless `anew` says that they will be adopted. `to_write`: it has to be writable too.
+    Usable is a sound database of a known revision, or a new one. With existing projects, a new one needs `anew`, i.e. they
+    will be adopted. `to_write`: it must be writable too.
     """
     if database.is_dir():
         raise DatabaseUnusable(f"{database}: a folder, where the database should be", hint="move it away")
@@ -28,7 +28,7 @@ def require_usable(database: Path, *, anew: bool = False, to_write: bool = True)
 
 
 def require_projects_known(engine: Engine, data_dir: Path) -> None:
-    """Raise DatabaseUnusable for a Postgres that knows no project, beside projects: it would not know them."""
+    """Raise DatabaseUnusable for a Postgres without projects if the data folder has some, which it would hide."""
     with Session(engine) as session:
         known = session.exec(select(Project.id)).first() is not None
     folders = _project_folders(data_dir)
@@ -40,19 +40,19 @@ def require_projects_known(engine: Engine, data_dir: Path) -> None:
 
 
 def _checked(database: Path, to_write: bool) -> str | None:
-    """Its revision, once it was found sound, of a known one and, where that is asked for, writable; None without tables."""
+    """Its revision after checking soundness, known revision and, if required, writability; None without tables."""
     with connected(database) as connection:
         require_sound(connection, database, "quick_check")
         if to_write:
             connection.execute("BEGIN IMMEDIATE")
-            connection.execute("CREATE TABLE of_a_moment (it)")  # BEGIN itself takes a file that may only be read
+            connection.execute("CREATE TABLE of_a_moment (it)")  # BEGIN itself succeeds on a read-only file
             connection.execute("ROLLBACK")
         tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         return _known_revision(connection, database, tables) if tables else None
 
 
 def _known_revision(connection: sqlite3.Connection, database: Path, tables: set[str]) -> str:
-    """Which of our revisions the tables are; raises DatabaseUnusable where they do not say, or are of none of ours."""
+    """The tables' revision; raises DatabaseUnusable where it is missing or unknown."""
     row = connection.execute("SELECT version_num FROM alembic_version").fetchone() if "alembic_version" in tables else None
     if row is None:
         raise DatabaseUnusable(f"{database}: tables that do not say which revision they are", hint=RESTORE)
@@ -66,7 +66,7 @@ def _known_revision(connection: sqlite3.Connection, database: Path, tables: set[
 
 
 def _refuse_beside_projects(database: Path) -> None:
-    """Raise DatabaseUnusable rather than begin an empty database that knows nothing of the projects beside it."""
+    """Raise DatabaseUnusable instead of creating an empty database beside existing projects."""
     folders = _project_folders(database.parent)
     if folders:
         raise DatabaseUnusable(
