@@ -57,7 +57,7 @@ def prompt_entry(item: SceneObject, clicks: list[Click]) -> dict[str, Any]:
 
 
 def readable_front(front: dict[str, Any]) -> dict[str, Any]:
-    """A stored front; a handle left outside by an earlier merge of fronts is dropped, as readers refuse it."""
+    """A stored front; a handle left outside by an earlier merge of fronts is reset to be detected, as readers refuse it."""
     try:
         PromptsFileFront.model_validate(front)
     except ValidationError:

@@ -244,7 +244,7 @@ class SceneObject(SQLModel, table=True):
 
     @property
     def result_name(self) -> str:
-        """What its results are stored under: a rename leaves them where they are until the next run."""
+        """Name under which its results are stored: unaffected by a rename until the next run."""
         return self.run_name or self.name
 
 

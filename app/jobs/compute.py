@@ -1,4 +1,4 @@
-"""Where the processes of jobs run: on this machine, or where a Ray cluster has room."""
+"""Execution backends for job processes: this machine, or a Ray cluster."""
 
 import json
 import shutil
@@ -20,56 +20,56 @@ TETHERED = python_module("app.tethered")
 
 
 class Seat(Protocol):
-    """Starts the processes of jobs. Each is a Worker here, whatever stands behind it."""
+    """Protocol for starting job processes, each represented by a local Worker."""
 
     memory_bytes: int  # free on this machine before a job starts
 
     def ready(self, project_id: str, holder: str, *, taken: bool = False) -> None:
-        """Have here what a job reads on this machine, of a project that is made by `holder` from now on.
+        """Fetch the files that a job reads on this machine, and make `holder` the project's writer.
 
-        `taken`: it is another seat's job, or has been this one's, and a part of it is made here.
+        `taken`: the job belongs to another seat, or has been this one's, and a part of it is computed here.
         """
 
     def start(self, job_id: int, project_id: str, step: Step, log: Path) -> Worker:
         """Start a step."""
 
     def start_part(self, part: Claimed, step: Step, files: ProjectFiles, log: Path) -> Worker:
-        """Start a step for some objects, beside others of them; it ends with this process."""
+        """Start a step for some objects, in parallel with others; it ends with this process."""
 
     def ended(self, project_id: str) -> None:
-        """Have here what a step made."""
+        """Fetch the results of a step."""
 
 
 class OwnMachine:
-    """A process of this machine."""
+    """Backend that runs processes on this machine."""
 
     def __init__(self, settings: Settings, store: Store) -> None:
         self.memory_bytes, self._store = settings.job_memory_bytes, store
 
     def ready(self, project_id: str, holder: str, *, taken: bool = False) -> None:
-        """All files, with the recording."""
+        """Fetch all files, with the recording."""
         self._store.hold(project_id, holder, taken=taken)
         self._store.fetch(project_id, recording=True)
 
     def start(self, job_id: int, project_id: str, step: Step, log: Path) -> Worker:
-        """The step's own process."""
+        """Start the step's process."""
         return Worker(step.command, log)
 
     def start_part(self, part: Claimed, step: Step, files: ProjectFiles, log: Path) -> Worker:
-        """The same with a request of its own beside the log: that of the job is written for the machine that has it."""
+        """The same with a separate request beside the log, as the job's request has paths of the owner's machine."""
         given = files.request(part.job_id)
         request = Path(shutil.copytree(given.parent, log.with_name("request")), given.name)
         placed_request(request, files)
         return Worker((*TETHERED, *step.of(part.names, request).command), log)
 
     def ended(self, project_id: str) -> None:
-        """It was made here."""
+        """Nothing to do: results are local."""
 
 
 class RayCluster:
-    """A process of this machine that asks Ray for an actor, which starts the step's on its node (app.jobs.ray_relay).
+    """Backend that starts a local relay process, which requests a Ray actor to run the step on a node (app.jobs.ray_relay).
 
-    Whatever becomes of Ray ends that process alone, not this one.
+    A failure of Ray ends only that process, not this one.
     """
 
     memory_bytes = 256 * MEBIBYTE
@@ -79,22 +79,22 @@ class RayCluster:
         self._holders: dict[str, str] = {}  # by project
 
     def ready(self, project_id: str, holder: str, *, taken: bool = False) -> None:
-        """The recording is read where the step runs."""
+        """Fetch all files but the recording, which is read where the step runs."""
         self._store.hold(project_id, holder, taken=taken)
         self._holders[project_id] = holder
         self._store.fetch(project_id)
 
     def start(self, job_id: int, project_id: str, step: Step, log: Path) -> Worker:
-        """The relay to a node with room for the step, which finds in the store what is here."""
+        """Upload local files and start the relay to a node with resources for the step."""
         self._store.keep(project_id)
         return Worker(self._relay(job_id, project_id, step), log)
 
     def start_part(self, part: Claimed, step: Step, files: ProjectFiles, log: Path) -> Worker:
-        """The relay to another node."""
+        """Start a relay to another node."""
         return Worker((*TETHERED, *self._relay(part.job_id, part.project_id, step.of(part.names))), log)
 
     def ended(self, project_id: str) -> None:
-        """From the store."""
+        """Fetch results from the store."""
         self._store.fetch(project_id)
 
     def _relay(self, job_id: int, project_id: str, step: Step) -> tuple[str, ...]:
@@ -120,5 +120,5 @@ class RayCluster:
 
 
 def seat_of(settings: Settings, store: Store) -> Seat:
-    """As the settings say it; raises InputError."""
+    """The backend selected by the settings; raises InputError."""
     return RayCluster(settings, store) if settings.on_ray else OwnMachine(settings, store)

@@ -1,4 +1,4 @@
-"""Whose clicks fall on whose front, in the masks shown as in a run: two names on one panel part it at the seam between them."""
+"""Clicks of different objects on one front, which split the panel at the seam between them, live as in a run."""
 
 import contextlib
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -13,20 +13,20 @@ from r2c2r_core.segment.protocol import SegmentSession
 from r2c2r_core.segment.stage import find_disputed
 
 Others = tuple[PromptPoint, ...]  # ObjectPrompt.others
-Front = dict[str, Any] | None  # as app.jobs.front_wire says it
+Front = dict[str, Any] | None  # in the format of app.jobs.front_wire
 
 
 class Told(NamedTuple):
-    """An object of the project as the server tells of it."""
+    """An object of the project as sent by the server."""
 
     number: int
     key: str  # of its masks
     prompt: ObjectPrompt
-    drawn_with: Others | None  # its finished masks; None where it has none
+    drawn_with: Others | None  # other clicks used for its finished masks; None without masks
 
 
 class Again(NamedTuple):
-    """Masks that are others since these objects are clicked on the same front; of none, since none is any more."""
+    """Masks that changed because these objects are clicked on the same front; empty: none is any more."""
 
     number: int
     key: str
@@ -34,25 +34,25 @@ class Again(NamedTuple):
 
 
 class Disputes:
-    """With which clicks on others each object's masks are drawn, and which are to be drawn anew for them."""
+    """Other objects' clicks used for each object's masks, and detection of masks to recompute."""
 
     def __init__(self, session: SegmentSession, front: Callable[[ObjectPrompt], Front]) -> None:
         self._session, self._front = session, front
         self._others: dict[int, Others] = {}
-        self._drawn: dict[int, tuple[str, Others]] = {}  # of the masks asked for or drawn last
+        self._drawn: dict[int, tuple[str, Others]] = {}  # of the last requested or computed masks
 
     def drawn_with(self, number: int, key: str) -> Others | None:
-        """The clicks that these masks of the object are drawn with; None where they are not drawn here."""
+        """Other clicks used for these masks of the object; None where they are not computed here."""
         drawn = self._drawn.get(number)
         return drawn[1] if drawn is not None and drawn[0] == key else None
 
     def draw(self, number: int, key: str) -> Others:
-        """The clicks to draw the object with, from now on."""
+        """The current other clicks for an object, recorded as used."""
         self._drawn[number] = key, self._others.get(number, ())
         return self._drawn[number][1]
 
     def settle(self, lines: Iterable[dict[str, Any]], waiting: Collection[int]) -> list[Again]:
-        """Take these as the project's objects, and find those whose masks are others by that, among those that have some."""
+        """Update the project's objects, and find those with masks that change as a result."""
         told = told_objects(lines)
         self._others = _disputed_clicks(self._session, told)
         changed = [one for one in told if one.number not in waiting and self._is_drawn_otherwise(one)]
@@ -65,12 +65,12 @@ class Disputes:
             return False
         try:
             return self._front(replace(one.prompt, others=before)) != self._front(replace(one.prompt, others=others))
-        except R2C2RError:  # it says so itself when it is segmented
+        except R2C2RError:  # it is reported when the object is segmented
             return False
 
 
 def told_objects(lines: Iterable[dict[str, Any]]) -> list[Told]:
-    """From the server's {"object", "key", "prompt", "others"}; one that is not usable says so when it is segmented."""
+    """Parse the server's {"object", "key", "prompt", "others"}; an invalid one is reported when it is segmented."""
     told = []
     for line in lines:
         others = None if line["others"] is None else _read_others(line["others"])
@@ -86,7 +86,7 @@ def read_prompt(document: dict[str, Any]) -> ObjectPrompt:
 
 
 def others_line(others: Others) -> list[list[float]]:
-    """The clicks over the wire and beside the masks: frame, x, y of each."""
+    """The clicks as JSON, in messages and mask files: frame, x, y of each."""
     return [[point.frame, point.x, point.y] for point in others]
 
 
@@ -95,11 +95,11 @@ def _read_others(line: Iterable[Sequence[float]]) -> Others:
 
 
 def _disputed_clicks(session: SegmentSession, told: Sequence[Told]) -> dict[int, Others]:
-    """By object, the clicks on others that fall on its front."""
+    """Other objects' clicks on each object's front, by object."""
     disputed = find_disputed(session, [one.prompt for one in told])
     return {one.number: disputed[one.prompt.name] for one in told if one.prompt.name in disputed}
 
 
 def _clicked(others: Others, told: Sequence[Told]) -> list[int]:
-    """The objects that these clicks are on."""
+    """The objects to which these clicks belong."""
     return [one.number for one in told if any(point in others for point in one.prompt.points)]

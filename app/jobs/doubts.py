@@ -1,4 +1,4 @@
-"""What is doubtful about a front or a thing as soon as its masks are there, before a run would say so."""
+"""Early doubts about a front or an object from its masks, before a run."""
 
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
@@ -7,7 +7,7 @@ from r2c2r_core.segment.contradictions import find_implausible
 
 
 def doubts_about(prompt: ObjectPrompt, panel: FrontPanel | None, box: ThingBox | None, capture: Capture) -> list[str]:
-    """A line each, with what would mend it; without the object's name, which may change."""
+    """One line per doubt, with a remedy and without the object's name, which may change."""
     track = MaskTrack(
         name=prompt.name,
         category=prompt.category,

@@ -1,4 +1,4 @@
-"""How long the stages of a project's jobs took before: what the time left of the next one is told from."""
+"""Durations of the stages of a project's earlier jobs, for time estimates."""
 
 from collections.abc import Iterable
 from itertools import pairwise
@@ -12,7 +12,7 @@ LOOKED_AT = 5
 
 
 def longest(session: Session, job: Job) -> dict[str, float]:
-    """The most seconds that each stage took in the last jobs of its project and kind that were done."""
+    """Longest duration in seconds of each stage in the last finished jobs of the same project and kind."""
     same = select(Job.id).where(Job.project_id == job.project_id, Job.kind == job.kind, Job.state == "done")
     last = session.exec(same.order_by(col(Job.id).desc()).limit(LOOKED_AT)).all()
     took: dict[str, float] = {}
@@ -24,5 +24,5 @@ def longest(session: Session, job: Job) -> dict[str, float]:
 
 
 def _taken(marks: Iterable[JobEvent]) -> Iterable[tuple[str, float]]:
-    """Each stage from its beginning to the next mark, in seconds."""
+    """Duration of each stage from its start to the next event, in seconds."""
     return ((began.stage, ended.at - began.at) for began, ended in pairwise(marks) if began.kind == "stage")

@@ -1,7 +1,7 @@
-"""Live segmenters elsewhere: the session stays where pages are served, its process runs at a seat of `r2c2r work --live`.
+"""Remote live segmenters: the session stays at the web server, its process runs at a seat of `r2c2r work --live`.
 
-What the process is told and what it says cross by the channel between servers. A seat says how many it runs with each of its
-signs of life; a server begins the next at the one with the fewest. Whichever side vanishes, the other ends what it has of it.
+Commands and messages are sent through the channel between servers. A seat reports its number of segmenters with each
+heartbeat; a server starts the next one at the seat with the fewest. If either side vanishes, the other ends its part.
 """
 
 import base64
@@ -31,7 +31,7 @@ ELEVATIONS = "--elevations"
 
 
 class FarWorker:
-    """A worker at a seat, used as `app.process.Worker` is."""
+    """A worker at a seat, with the interface of `app.process.Worker`."""
 
     def __init__(self, channel: Channel, seat: str, files: ProjectFiles) -> None:
         self.seat, self.id, self.alive = seat, secrets.token_hex(8), True
@@ -39,48 +39,48 @@ class FarWorker:
         self._lines = Lines()
 
     def next_line(self, timeout: float) -> Line | None:
-        """The next message; raises queue.Empty after the timeout; None when the worker said its last."""
+        """The next message; raises queue.Empty after the timeout; None after the worker's last message."""
         return self._lines.next(timeout)
 
     def say(self, message: Line) -> bool:
-        """Send it a message; False when it is gone."""
+        """Send the worker a message; False when it has ended."""
         self.tell("live-say", line=message)
         return self.alive
 
     def kill(self) -> None:
-        """End it."""
+        """End the worker."""
         self.tell("live-stop")
         self.ended()
 
     def close(self) -> int:
-        """End it, if it has not ended."""
+        """End the worker if it is running."""
         if self.alive:
             self.kill()
         return 0
 
     def tell(self, kind: str, **said: Any) -> None:
-        """Tell its seat something about it."""
+        """Send a message about it to its seat."""
         self._channel.say(kind, {"to": self.seat, "id": self.id, **said})
 
     def hear(self, line: Line) -> None:
-        """It said something; what it drew of the scan comes as files."""
+        """Handle a message of the worker; its pictures of the scan come as files."""
         if "file" in line:
             write_atomically(self._files.elevations / line["file"], base64.b64decode(line["bytes"]))
         else:
             self._lines.put(line)
 
     def ended(self) -> None:
-        """It says nothing more."""
+        """Mark the worker as ended."""
         self.alive = False
         self._lines.put(None)
 
 
 class FarWorkers:
-    """Those that this server began."""
+    """Remote workers started by this server."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
-        self._seats: dict[str, int] = {}  # how many each runs
+        self._seats: dict[str, int] = {}  # number of workers by seat
         self._workers: dict[str, FarWorker] = {}
         self._lock = threading.Lock()
         channel.hears |= {"live-seat": self._offered, "live-line": self._said, "live-end": self._ended}
@@ -88,15 +88,15 @@ class FarWorkers:
         channel.on_gap.append(self._miss)
 
     def start(self, project: str, files: ProjectFiles, options: tuple[str, ...]) -> FarWorker | None:
-        """One for the project; None where no seat takes any, or the project's files are this machine's alone."""
+        """Start a worker for the project; None where no seat is available, or the project's files are only on this machine."""
         if files.work.parent != files.root:
             return None
-        with self._lock:  # a seat that goes meanwhile ends what was begun there
+        with self._lock:  # a seat that leaves meanwhile ends its workers
             if not self._seats:
                 return None
             worker = FarWorker(self._channel, min(self._seats, key=self._seats.__getitem__), files)
             self._workers[worker.id] = worker
-            self._seats[worker.seat] += 1  # until it says so itself
+            self._seats[worker.seat] += 1  # until it reports the number itself
         files.elevations.mkdir(parents=True, exist_ok=True)
         worker.tell("live-start", project=project, options=options)
         return worker
@@ -113,7 +113,7 @@ class FarWorkers:
             worker.ended()
 
     def _miss(self) -> None:
-        """Lines may be lost: what was begun is begun anew."""
+        """Restart all workers, as messages may be lost."""
         for worker in tuple(self._workers.values()):
             worker.kill()
         self._workers.clear()
@@ -129,11 +129,13 @@ class FarWorkers:
 
 
 class LiveSeat:
-    """Runs live segmenters for servers."""
+    """Seat that runs live segmenters for servers."""
 
     def __init__(self, channel: Channel, store: Store, settings: Settings, commands: Commands) -> None:
         self._channel, self._store, self._settings, self._commands = channel, store, settings, commands
-        self._workers: dict[str, tuple[str, Worker | None]] = {}  # by whom each was begun; none while its files are fetched
+        self._workers: dict[
+            str, tuple[str, Worker | None]
+        ] = {}  # by id: the server that started it, and the worker, None while its files are fetched
         self._threads: list[threading.Thread] = []
         self._lock = threading.Lock()
         self._projects: dict[str, str] = {}
@@ -144,11 +146,11 @@ class LiveSeat:
 
     @property
     def projects(self) -> frozenset[str]:
-        """Projects that it has one of."""
+        """Projects with a live segmenter here."""
         return frozenset(self._projects.copy().values())
 
     def stop(self) -> None:
-        """End all of them."""
+        """End all workers."""
         self._end(lambda _: True)
         for thread in self._threads:
             thread.join()
@@ -170,7 +172,7 @@ class LiveSeat:
 
     def _say(self, _server: str, said: dict[str, Any]) -> None:
         _, worker = self._workers.get(said["id"], ("", None))
-        if worker is not None:  # a session says nothing before it is ready
+        if worker is not None:  # a session sends nothing before it is ready
             worker.say(said["line"])
 
     def _stop(self, _server: str, said: dict[str, Any]) -> None:

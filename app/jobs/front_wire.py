@@ -1,4 +1,4 @@
-"""A front that was found, as it goes over the wire: its corners in the capture frame, how sure its edges are and its handle."""
+"""API encoding of a detected front: corners in the capture frame, edge confidences and handle."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from r2c2r_core.model.track import FrontPanel
 
 
 def front_line(panel: FrontPanel, world_from_capture: Rigid3) -> dict[str, Any]:
-    """What schemas.FoundFront says of it: top left, top right, bottom right, bottom left; the handle from its centre."""
+    """The front in the format of schemas.FoundFront: corners from top left clockwise; the handle relative to the centre."""
     c, s = np.cos(panel.roll_rad), np.sin(panel.roll_rad)
     right, up = np.array([c, 0.0, s]) * panel.width_m / 2, np.array([-s, 0.0, c]) * panel.height_m / 2
     corners = panel.world_from_front.apply(np.stack([up - right, up + right, right - up, -up - right]))

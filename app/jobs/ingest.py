@@ -1,7 +1,7 @@
 """Reading a recording as a job: `python -m app.jobs.ingest WORKDIR PROJECTDIR --request FILE`.
 
-Beside the workspace it writes what the web process needs at hand without loading the
-recording: frames.json (the frame table), facts.json (what the recording is, and its problems) and pictures of the scan.
+Beside the workspace it writes data that the web process needs without loading the recording: frames.json (the frame
+table), facts.json (facts about the recording, and its problems) and pictures of the scan.
 """
 
 import argparse
@@ -25,14 +25,14 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.progress import Progress
 from r2c2r_core.workspace import Workspace, write_atomically
 
-MEMORY_SHARE = 0.7  # of what is free when it starts: it decodes other people's files
+MEMORY_SHARE = 0.7  # of the free memory at start, as it decodes untrusted files
 CPU_S = 4 * 3600  # a recording of an hour takes a tenth of that
 FILE_BYTES = 8 << 30
-SAME_PATH_M = 0.01  # poses are read, not estimated: another recording differs by decimetres
+SAME_PATH_M = 0.01  # poses are read, not estimated, so another recording differs by decimetres
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Read, describe."""
+    """Read the recording and describe it."""
     parser = argparse.ArgumentParser(prog="app.jobs.ingest", description=__doc__)
     parser.add_argument("workdir", type=Path)
     parser.add_argument("folder", type=Path)
@@ -43,14 +43,14 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def ingest(workdir: Path, folder: Path, request: Path, progress: Progress) -> None:
-    """Read the recording that the request names, and describe it in the project's folder."""
+    """Read the request's recording, and describe it in the project's folder."""
     from r2c2r_core.pipeline import reconstruct
     from r2c2r_core.worker import read_request
 
     document = json.loads(request.read_text())
     source = _checked_source(Path(document["source"]))
     work = Workspace(workdir)
-    with suppress(PromptError):  # nobody has clicked yet; the recording is read before that is noticed
+    with suppress(PromptError):  # there are no clicks yet; the recording is read before this is detected
         reconstruct(read_request(request), work, until="ingest", progress=progress)
     capture: Capture | None = work.load_latest("ingest", "scene")
     if capture is None:
@@ -62,7 +62,7 @@ def ingest(workdir: Path, folder: Path, request: Path, progress: Progress) -> No
 
 
 def refuse_another(name: str, found: list[dict[str, Any]], awaited: list[dict[str, Any]]) -> None:
-    """Raise CaptureError for a recording that an imported project was not made from: by frames, and the camera's path."""
+    """Raise CaptureError if the recording is not the one of an imported project, by frames and camera path."""
     hint = "choose the recording that the project was made from"
     if [entry["index"] for entry in found] != [entry["index"] for entry in awaited]:
         raise CaptureError(f"{name}: {len(found)} frames, {len(awaited)} or others expected by the project", hint=hint)
@@ -73,7 +73,9 @@ def refuse_another(name: str, found: list[dict[str, Any]], awaited: list[dict[st
                 f"{name}: frame {ours['index']} has {size[0]}x{size[1]} pixels, {wanted[0]}x{wanted[1]} expected", hint=hint
             )
     ways = [np.array([entry["camera"] for entry in table]) for table in (found, awaited)]
-    far_m = np.abs(np.subtract(*(np.linalg.norm(way - way[0], axis=1) for way in ways))).max()  # whichever way is up
+    far_m = np.abs(
+        np.subtract(*(np.linalg.norm(way - way[0], axis=1) for way in ways))
+    ).max()  # independent of the up direction
     if far_m > SAME_PATH_M:
         raise CaptureError(f"{name}: its camera's path is {far_m:.2f} m off the project's", hint=hint)
 
@@ -95,7 +97,7 @@ def describe(capture: Capture, folder: Path, source: Path | None) -> None:
 
 
 def frame_table(capture: Capture) -> list[dict[str, Any]]:
-    """schemas.FrameInfo of every frame."""
+    """The frames as schemas.FrameInfo."""
     return [
         {
             "index": frame.index,
@@ -110,11 +112,11 @@ def frame_table(capture: Capture) -> list[dict[str, Any]]:
 
 
 def capture_facts(capture: Capture, source: Path | None) -> dict[str, Any]:
-    """schemas.CaptureFacts."""
+    """Facts about the recording as schemas.CaptureFacts."""
     from r2c2r_core.ingest.doctor import examine
     from r2c2r_core.ingest.readers.table import open_recording
 
-    # a finished run outlives its recording: the doctor then says what the stored frames tell
+    # a finished run outlives its recording: the doctor then uses the stored frames only
     recording = open_recording(source) if source is not None and source.exists() else None
     report = examine(capture, recording)
     first = capture.frames[0]
@@ -140,7 +142,7 @@ def capture_facts(capture: Capture, source: Path | None) -> dict[str, Any]:
 
 
 def _checked_source(source: Path) -> Path:
-    """The recording, once an archive was found safe to read."""
+    """The recording, after a safety check of an archive."""
     if source.is_file() and source.suffix.lower() in (".zip", ".r3d"):
         limits = Settings(data_dir=source.parent)
         archives.check_archive(source, source.name, max_bytes=limits.max_unpacked_bytes, max_files=limits.max_unpacked_files)

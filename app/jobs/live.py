@@ -1,4 +1,4 @@
-"""One live segmenter process per project: started on demand, stopped when idle, started anew when it vanished."""
+"""Live segmenters: one process per project, started on demand, stopped when idle, restarted after a crash."""
 
 import logging
 import queue
@@ -28,17 +28,17 @@ from r2c2r_core.errors import R2C2RError
 _log = logging.getLogger(__name__)
 
 IDLE_LOOK_S = 5.0
-MOST_DEATHS = 2  # how often a process that vanished is started anew by itself
+MOST_DEATHS = 2  # maximum automatic restarts of a crashed process
 LEFT_S = 10.0
 """A preparation that no tab looks at any more is stopped after this: longer than a page takes to load anew."""
 VANISHED = body("worker-died", "the live segmenter ended early", "click again to restart it; see its log")
 
 
 class LiveSegmenters:
-    """All live segmenters. `on_object` is told of every object whose masks came to an end.
+    """All live segmenters. `on_object` is called for every object with completed masks.
 
-    `on_again` is told of every object whose masks are to be drawn anew, with their key, for clicks on these others. `far`
-    begins a process at a seat, where there is one for that.
+    `on_again` is called for every object whose masks must be recomputed, with their key, because of clicks on the given other
+    objects. `far` starts a process at a remote seat, if there is one.
     """
 
     def __init__(self, engine: Engine, hub: Hub, settings: Settings, commands: Commands, store: Store) -> None:
@@ -47,45 +47,45 @@ class LiveSegmenters:
         self._sessions: dict[str, LiveSession] = {}
         self._ended: dict[str, LiveSession] = {}  # the last failure of each project
         self._lock = threading.RLock()
-        self.telling = threading.Lock()  # held while objects are read and told: what is told last was read last
+        self.telling = threading.Lock()  # held while objects are read and sent, to keep their order
         self.far: Callable[[str, ProjectFiles, tuple[str, ...]], FarWorker | None] = lambda project, files, options: None
         self.on_object: Callable[[str, int], None] = lambda project, number: None
         self.on_again: Callable[[str, int, str, list[int]], None] = lambda project, number, key, others: None
 
     def open(self, project: str, files: ProjectFiles, segmenter: str) -> None:
-        """Start the project's process unless it runs."""
+        """Start the project's process unless it is running."""
         with self._lock:
             found = self._sessions.get(project)
             if found is not None and found.worker.alive:
                 found.used = time.monotonic()
                 return
-            if found is not None and found.deaths < MOST_DEATHS:  # it has just vanished, and nobody has seen that yet
+            if found is not None and found.deaths < MOST_DEATHS:  # it has just crashed, which was not detected yet
                 self._revive(found)
                 return
             session = self._started(project, files, segmenter)
         session.tell_status()
 
     def status(self, project: str) -> schemas.LiveStatus:
-        """How far the project's process is."""
+        """Status of the project's process."""
         with self._lock:
             session = self._sessions.get(project) or self._ended.get(project)
             return session.status if session else schemas.LiveStatus(state="off", fraction=0.0, text="", error=None)
 
     @property
     def running(self) -> int:
-        """Projects that have a segmenter now."""
+        """Number of running segmenters."""
         with self._lock:
             return len(self._sessions)
 
     @property
     def projects(self) -> frozenset[str]:
-        """Those projects."""
+        """Projects with a running segmenter."""
         with self._lock:
             return frozenset(self._sessions)
 
     @property
     def preparing(self) -> bool:
-        """Whether a project is being prepared now."""
+        """Whether any project is being prepared."""
         with self._lock:
             return any(session.state in ("starting", "preparing") for session in self._sessions.values())
 
@@ -95,7 +95,7 @@ class LiveSegmenters:
             return project in self._sessions
 
     def know(self, project: str, objects: list[dict[str, Any]]) -> None:
-        """Tell the project's process, if there is one, of all its objects as app.jobs.disputes reads them."""
+        """Send the project's process, if there is one, all its objects in the format of app.jobs.disputes."""
         with self._lock:
             session = self._sessions.get(project)
             if session is not None:
@@ -111,17 +111,17 @@ class LiveSegmenters:
         prompt: dict[str, Any],
         objects: list[dict[str, Any]] | None,
     ) -> None:
-        """Compute the object's masks for these clicks, before anything asked for earlier; a newer call supersedes.
+        """Compute the object's masks for these clicks with priority; a newer call supersedes it.
 
-        With it the process is told of all the project's objects; None where a call that follows at once tells it.
+        `objects` are all objects of the project; None if a call that follows at once sends them.
         """
         self.open(project, files, segmenter)
         with self._lock:
-            session = self._sessions.get(project) or self._started(project, files, segmenter)  # it may be gone again
+            session = self._sessions.get(project) or self._started(project, files, segmenter)  # it may have ended again
             session.segment(number, key, prompt, objects)
 
     def proposing(self, project: str) -> tuple[float, list[dict[str, Any]]] | None:
-        """The share of the work of proposing that is done, and what came of it; None when nobody is at it."""
+        """Completed fraction of proposing, and the proposals so far; None when none is in progress."""
         with self._lock:
             session = self._sessions.get(project)
             if session is None or session.proposals_path is None:
@@ -129,14 +129,14 @@ class LiveSegmenters:
             return session.proposed, list(session.proposals)
 
     def cancel(self, project: str, number: int) -> None:
-        """Stop computing the object's masks; those there stay."""
+        """Stop computing the object's masks; existing ones are kept."""
         with self._lock:
             session = self._sessions.get(project)
             if session is not None:
                 session.cancel(number)
 
     def task(self, project: str, number: int, key: str) -> tuple[schemas.SegmentState, MaskFile] | None:
-        """The object's masks so far for these clicks, when they are being or were computed by the running process."""
+        """The object's masks so far for these clicks, if computed by the running process."""
         with self._lock:
             session = self._sessions.get(project)
             task = session.tasks.get(number) if session else None
@@ -144,7 +144,7 @@ class LiveSegmenters:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """No masks come and none end meanwhile: what is told of them here is not overtaken by what is newer."""
+        """Context that blocks mask updates, so that messages sent in it are not overtaken by newer ones."""
         with self._lock:
             yield
 
@@ -160,7 +160,7 @@ class LiveSegmenters:
             session.worker.close()
 
     def stop(self) -> None:
-        """Stop all processes; masks that were still to come are computed when the server is there again."""
+        """Stop all processes; pending masks are computed after the next start of the server."""
         with self._lock:
             sessions, self._sessions = list(self._sessions.values()), {}
             for session in sessions:
@@ -182,7 +182,7 @@ class LiveSegmenters:
         return session
 
     def _follow(self, session: LiveSession) -> None:
-        """Read a process to its end."""
+        """Read a process's messages until it ends."""
         while True:
             try:
                 line = session.worker.next_line(timeout=IDLE_LOOK_S)
@@ -197,7 +197,7 @@ class LiveSegmenters:
             self._stop_if_left(session)
             try:
                 session.take(line)
-            except OSError as error:  # a full disk must not end the process: the masks are shown, only not kept
+            except OSError as error:  # a full disk must not end the process: masks are shown but not stored
                 _log.warning("live masks of %s: %s", session.project, error)
             self._store_work(session)
             if "end" in line:
@@ -212,7 +212,7 @@ class LiveSegmenters:
             return session.state == "ready" and not session.working and unused_s > self._settings.live_idle_s
 
     def _stop_if_left(self, session: LiveSession) -> None:
-        """End a preparation whose tabs have all gone elsewhere; what it finished is found again by the next."""
+        """Stop a preparation without watching tabs; finished parts are reused by the next one."""
         now = time.monotonic()
         if self._hub.watched(session.project):
             session.watched = now
@@ -237,11 +237,11 @@ class LiveSegmenters:
             session.end((session.error or VANISHED) if failed else None)
             if failed:
                 self._ended[session.project] = session
-            if session.project not in self._sessions:  # nor has another one begun
+            if session.project not in self._sessions:  # and no other one has started
                 session.tell_status()
 
     def _revive(self, lost: LiveSession) -> None:
-        """Go on in a new process with what the lost one had not finished."""
+        """Continue the unfinished work of a crashed process in a new one."""
         _log.warning("the live segmenter of %s vanished: started anew", lost.project)
         session = self._started(lost.project, lost.files, lost.segmenter)
         session.deaths, session.watched, session.at_work = lost.deaths + 1, lost.watched, lost.at_work or session.at_work
@@ -259,19 +259,19 @@ class LiveSegmenters:
         self.on_again(project, number, key, others)
 
     def _keep(self, project: str) -> None:
-        """Have masks that ended where other servers see them; what fails is kept with the next, or when the cache is tidied."""
+        """Upload completed masks for other servers; failures are retried with the next ones, or on tidying."""
         try:
             self._store.keep(project)
         except (R2C2RError, OSError) as error:
             _log.warning("live masks of %s: %s", project, error)
 
     def _store_work(self, session: LiveSession) -> None:
-        """Store when it was at work; not under the lock, for whoever writes to the database may wait for that."""
+        """Store working times, without the lock, as a database writer may wait for it."""
         with self._lock:
             times, session.worked = session.worked, []
         try:
             for began, ended in times:
                 with writing(self._engine) as rows:
                     worked(rows, session.project, began, ended)
-        except R2C2RError as error:  # a figure less
+        except R2C2RError as error:  # only a statistic is lost
             _log.warning("the live segmenter's time for %s: %s", session.project, error)

@@ -2,14 +2,14 @@
 --segmenter geometric --elevations FOLDER`.
 
 Reads JSON lines: {"cmd": "segment", "object", "key", "prompt", "objects"} · {"cmd": "cancel", "object"} · {"cmd": "objects",
-"objects"} · {"cmd": "propose"} · end of input stops it. `objects` are all of the project as they are now (app.jobs.disputes);
-with a segment they are left out where more is asked at once.
+"objects"} · {"cmd": "propose"} · end of input stops it. `objects` are all current objects of the project (app.jobs.disputes);
+a segment command omits them if further commands follow at once.
 Prints JSON lines: {"state": "preparing", "fraction", "text"} … {"state": "ready", "total"}, then for every object
-{"object", "key", "frame", "confidence", "mask"} (the clicked frame first: a first look at it, then its mask again if that
-differs) and {"object", "key", "end", "front", "others", "doubts", "motions"}. The newest click goes first; others go on
-afterwards. {"object", "key", "again": [...]} asks for a segment of an object whose masks are others since these objects are
-clicked where they are; of none, since none is any more.
-Proposals, {"proposals": [...], "fraction"}, wait until no click does.
+{"object", "key", "frame", "confidence", "mask"} (the clicked frame first: a quick preview, then its mask again if it differs)
+and {"object", "key", "end", "front", "others", "doubts", "motions"}. The newest click has priority; others continue
+afterwards. {"object", "key", "again": [...]} requests a segment command for an object whose masks changed because of clicks
+on the listed objects, or, if empty, because there are none any more.
+Proposals, {"proposals": [...], "fraction"}, are computed while no click is pending.
 """
 
 import argparse
@@ -51,7 +51,7 @@ _speaking = threading.Lock()
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Prepare, then answer clicks until the input ends."""
+    """Prepare the recording, then process commands until the input ends."""
     parser = argparse.ArgumentParser(prog="app.jobs.live_segment", description=__doc__)
     parser.add_argument("workdir", type=Path)
     parser.add_argument("--width", type=int, default=960)
@@ -85,36 +85,36 @@ def main(arguments: list[str] | None = None) -> int:
 
 @dataclass(eq=False, slots=True)
 class _Followed:
-    """An object on its way through the frames."""
+    """An object being propagated through the frames."""
 
     key: str
     prompt: ObjectPrompt
-    said: tuple[FrameSaid, ...]  # of it, in single frames
-    glimpsed: Glimpse | None  # already shown
-    masks: Iterator[Glimpse] | None = None  # None until its turn comes
+    said: tuple[FrameSaid, ...]  # corrections in single frames
+    glimpsed: Glimpse | None  # preview already shown
+    masks: Iterator[Glimpse] | None = None  # None until propagation starts
 
 
 class Desk:
-    """The objects being segmented, the one asked for last on top.
+    """Stack of objects being segmented, the most recent request on top.
 
-    One thread takes commands and answers clicks with a first look; another goes through the frames, and prepares what is
-    likely to be asked for next while nobody waits.
+    One thread reads commands and answers clicks with a preview; another propagates masks through the frames, and prefetches
+    likely next requests while idle.
     """
 
     def __init__(self, session: SegmentSession, capture: Capture, width: int) -> None:
         self.session, self.capture, self.width = session, capture, width
         self.total = len(capture.frames)
         self._open: dict[int, _Followed] = {}
-        self._objects: list[dict[str, Any]] = []  # the project's, as last told
-        self._settled = self._objects  # those whose disputes are known
+        self._objects: list[dict[str, Any]] = []  # the project's, as last received
+        self._settled = self._objects  # those with resolved disputes
         self._disputes = Disputes(session, self._front)
         self._prefetching: Iterator[None] | None = session.prefetch()
         self._proposing: Iterator[tuple[float, tuple[Proposal, ...]]] | None = None
         self._closed = self._answering = False
-        self._changed = threading.Condition()  # guards what is above, and the order of messages about an object
+        self._changed = threading.Condition()  # guards the fields above, and the order of messages about an object
 
     def answer(self, commands: Commands) -> None:
-        """Take commands until there are no more."""
+        """Process commands until the input ends."""
         worker = threading.Thread(target=self._work, name="frames")
         worker.start()
         while (waiting := _waiting(commands)) is not None:
@@ -152,15 +152,15 @@ class Desk:
             self._changed.notify()
 
     def _follow(self, number: int, key: str, document: dict[str, Any], objects: list[dict[str, Any]] | None) -> None:
-        """Show a first look, then let the frames be gone through.
+        """Show a preview, then start propagation through the frames.
 
-        What the click means for others, and theirs for it, is found out after that look: nobody waits for it.
+        Interactions with clicks on other objects are resolved after the preview, without delaying it.
         """
         try:
             prompt = read_prompt(document)
             check_prompt(self.capture, prompt)
             asked = replace(as_found(prompt), others=self._disputes.drawn_with(number, key) or ())
-            glimpsed = self.session.glimpse(asked) if not prompt.frames else None  # it may be of a frame that is set right
+            glimpsed = self.session.glimpse(asked) if not prompt.frames else None  # the preview may be of a corrected frame
             first = self._shown(glimpsed) if glimpsed is not None else None
         except Exception as error:
             _say(object=number, key=key, **_failed(error))
@@ -193,27 +193,27 @@ class Desk:
                 self._propose_step()
 
     def _may_work(self) -> bool:
-        """Whether there is something to do, and nobody waits for a first look meanwhile."""
+        """Whether there is work to do and no preview is pending."""
         unsettled = self._settled is not self._objects
         work = unsettled or bool(self._open or self._prefetching or self._proposing)
         return self._closed or (work and not self._answering)
 
     def _settle(self, objects: list[dict[str, Any]], waiting: set[int]) -> None:
-        """Find whose clicks fall on whose front, and ask for those anew whose masks are others by that."""
+        """Find clicks on other objects' fronts, and request segmentation of objects whose masks change."""
         again: list[Again] = []
         try:
             again = self._disputes.settle(objects, waiting)
-        except Exception:  # clicks go on working without
+        except Exception:  # clicks keep working without it
             traceback.print_exc()
         with self._changed:
             self._settled = objects
             for number, key, clicked in again if self._objects is objects else ():
-                self._open.pop(number, None)  # nothing more of what it was before
+                self._open.pop(number, None)  # drop its previous state
                 self._disputes.draw(number, key)
                 _say(object=number, key=key, again=clicked)
 
     def _begin(self, number: int, followed: _Followed) -> Iterator[Glimpse]:
-        """The object's masks, with the clicks on others that are known by now."""
+        """Start the object's masks with the currently known clicks on others."""
         followed.prompt = replace(followed.prompt, others=self._disputes.draw(number, followed.key))
         return corrected_stream(iter(self.session.stream(followed.prompt)), followed.said)
 
@@ -223,7 +223,7 @@ class Desk:
             next(self._prefetching)
         except StopIteration:
             self._prefetching = None
-        except Exception:  # an unreadable image is told to whoever asks for it
+        except Exception:  # an unreadable image is reported when it is requested
             traceback.print_exc()
             self._prefetching = None
 
@@ -233,7 +233,7 @@ class Desk:
             fraction, found = next(self._proposing)
         except StopIteration:
             self._proposing = None
-        except Exception as error:  # clicks go on working without proposals
+        except Exception as error:  # clicks keep working without proposals
             traceback.print_exc()
             self._proposing = None
             _say(proposals=[], fraction=1.0, error=f"no proposals: {error}")
@@ -247,7 +247,7 @@ class Desk:
                 followed.masks = self._begin(number, followed)
             found = next(followed.masks, None)
             said = self._shown(found) if found is not None else self._done(followed.prompt)
-        except Exception as error:  # one object must not take the others with it
+        except Exception as error:  # one object must not affect the others
             found, said = None, _failed(error)
         with self._changed:
             if self._open.get(number) is not followed:
@@ -292,7 +292,7 @@ def _open_desk(workdir: Path, width: int, segmenter: str) -> Desk:
 
 
 def _waiting(commands: Commands) -> list[dict[str, Any]] | None:
-    """The next commands, without those that a later one about the same object makes pointless; None at the end."""
+    """The next commands, without those superseded by a later one for the same object; None at the end."""
     waiting = [commands.get()]
     with contextlib.suppress(queue.Empty):
         while True:

@@ -1,7 +1,7 @@
-"""What one project's live segmenter is at: its state, its objects' masks, its proposals, told to every tab as they come.
+"""State of one project's live segmenter: progress, masks and proposals, published to all tabs.
 
-It is told of all objects of the project, for a click on one may part the front of another: that is then drawn anew.
-The methods are called under the lock of app.jobs.live, but for `take`, which takes it.
+The segmenter gets all objects of the project, as a click on one may split the front of another, which is then segmented again.
+The methods are called under the lock of app.jobs.live, except `take`, which acquires it.
 """
 
 import json
@@ -25,7 +25,7 @@ from r2c2r_core.workspace import write_atomically
 
 _log = logging.getLogger(__name__)
 
-NOTED_S = 10.0  # work is noted this often while it goes on, for the server may die
+NOTED_S = 10.0  # interval of recording work in progress, as the server may die
 
 
 @dataclass(slots=True)
@@ -38,17 +38,17 @@ class Task:
     state: schemas.SegmentState = "waiting"
     asked: float = field(default_factory=time.monotonic)
     masks: MaskFile = field(default_factory=MaskFile)
-    kept: bool = True  # all of them are in the file
+    kept: bool = True  # whether all masks are in the file
 
     @property
     def is_open(self) -> bool:
-        """Whether its masks are still to come."""
+        """Whether masks are still pending."""
         return self.state in ("waiting", "running")
 
 
 @dataclass(slots=True)
 class LiveSession:
-    """One project's process. `on_object` hears of every object whose masks came to an end, `on_again` of each to draw anew."""
+    """One project's process. `on_object` is called for every completed object, `on_again` for each to be segmented again."""
 
     project: str
     files: ProjectFiles
@@ -65,38 +65,38 @@ class LiveSession:
     error: dict[str, Any] | None = None
     total: int = 0
     used: float = field(default_factory=time.monotonic)
-    watched: float | None = None  # when a tab last looked; None when none ever did
+    watched: float | None = None  # when a tab last watched it; None: never
     tasks: dict[int, Task] = field(default_factory=dict)
-    objects: list[dict[str, Any]] = field(default_factory=list)  # the project's, as app.jobs.disputes reads them
-    proposals_path: Path | None = None  # where proposals go; None when they are there already
+    objects: list[dict[str, Any]] = field(default_factory=list)  # the project's, in the format of app.jobs.disputes
+    proposals_path: Path | None = None  # destination of proposals; None when they exist already
     proposals: list[dict[str, Any]] = field(default_factory=list)
-    proposed: float = 0.0  # share of the work of proposing
-    at_work: float | None = field(default_factory=time.time)  # since when, as far as it is not noted yet
-    worked: list[tuple[float, float]] = field(default_factory=list)  # (began, ended), for whoever stores it
+    proposed: float = 0.0  # fraction of the proposal work done
+    at_work: float | None = field(default_factory=time.time)  # start of the work not yet recorded
+    worked: list[tuple[float, float]] = field(default_factory=list)  # (began, ended), to be stored by the caller
 
     @property
     def status(self) -> schemas.LiveStatus:
-        """How far the process is."""
+        """Status of the process."""
         error = schemas.ErrorBody(**self.error) if self.error else None
         return schemas.LiveStatus(state=self.state, fraction=self.fraction, text=self.text, error=error)
 
     @property
     def working(self) -> bool:
-        """Whether it has something to do that somebody may wait for."""
+        """Whether it has work that a user may be waiting for."""
         preparing = self.state in ("starting", "preparing")
         proposing = self.state == "ready" and self.proposals_path is not None
         return preparing or proposing or any(task.is_open for task in self.tasks.values())
 
     def know(self, objects: list[dict[str, Any]]) -> None:
-        """The project's objects are these by now."""
+        """Update the project's objects."""
         self.objects = objects
         if self.state == "ready":
             self.worker.say({"cmd": "objects", "objects": objects})
 
     def segment(self, number: int, key: str, prompt: dict[str, Any], objects: list[dict[str, Any]] | None) -> None:
-        """Compute the object's masks, before anything asked for earlier; what was asked about it before is superseded.
+        """Compute the object's masks with priority; an earlier request for it is superseded.
 
-        `objects` are the project's by now; None where they are told with another that is asked for at once.
+        `objects` are the project's current ones; None if another request that follows at once includes them.
         """
         self.used = time.monotonic()
         self.objects = self.objects if objects is None else objects
@@ -109,7 +109,7 @@ class LiveSession:
         self._tell_segment(number, task, restart=True)
 
     def cancel(self, number: int) -> None:
-        """Stop computing the object's masks; those there stay."""
+        """Stop computing the object's masks; existing ones are kept."""
         task = self.tasks.get(number)
         if task is None or not task.is_open:
             return
@@ -118,7 +118,7 @@ class LiveSession:
         self._end_task(number, task, "cancelled", None)
 
     def end(self, error: dict[str, Any] | None) -> None:
-        """The process is gone: stopped in order, or with an error."""
+        """Handle the end of the process: stopped, or with an error."""
         self.state, self.error = ("off", None) if error is None else ("failed", error)
         for number, task in self.tasks.items():
             if task.is_open:
@@ -126,7 +126,7 @@ class LiveSession:
         self._note_work(ended=True)
 
     def take(self, line: Line) -> None:
-        """One message of the process."""
+        """Handle one message of the process."""
         if "state" in line:
             self._take_state(line)
         elif "proposals" in line:
@@ -137,7 +137,7 @@ class LiveSession:
             self._take_mask(line)
 
     def tell_status(self) -> None:
-        """Show every tab how far the process is."""
+        """Publish the status to all tabs."""
         self.hub.publish("live", self.project, status=self.status.model_dump())
 
     def _take_state(self, line: Line) -> None:
@@ -174,7 +174,7 @@ class LiveSession:
         if path is not None and not failed:
             try:
                 write_atomically(path, json.dumps(self.proposals).encode())
-            except OSError as error:  # a full disk: they are shown as long as this goes on, and made again another time
+            except OSError as error:  # a full disk: they are shown during this session, and computed again another time
                 _log.warning("proposals of %s: %s", self.project, error)
 
     def _take_mask(self, line: Line) -> None:
@@ -198,7 +198,7 @@ class LiveSession:
             self._note_work()
         try:
             mask_store.append(task.path, entry)
-        except OSError as error:  # a full disk: they are shown all the same
+        except OSError as error:  # a full disk: they are shown anyway
             task.kept = False
             _log.warning("live masks of %s: %s", self.project, error)
         if first:
@@ -223,11 +223,11 @@ class LiveSession:
         self._note_work()
         self._tell_segment(number, task)
         if end == "done" and task.kept and self.tasks.get(number) is task:
-            del self.tasks[number]  # whoever looks at them reads the file
+            del self.tasks[number]  # they are read from the file from now on
         self.on_object(self.project, number)
 
     def _note_work(self, *, ended: bool = False) -> None:
-        """Note when it was at work: once that ends, and now and then before."""
+        """Record working time: at its end, and periodically before."""
         now, working = time.time(), self.working and not ended
         if self.at_work is not None and (not working or now - self.at_work > NOTED_S):
             self.worked.append((self.at_work, now))

@@ -1,9 +1,9 @@
-"""Masks on disk: one file per object and prompt state, one JSON line per mask, so undo finds the older ones again.
+"""Masks on disk: one file per object and prompt state, one JSON line per mask, so that undo finds older ones.
 
-The last line of a file that came to its end says where each frame's line is: whoever looks at one frame reads one line.
-It also says with which clicks on other objects the masks were drawn. Those are no part of the key, for which clicks fall on
-a front only the prepared recording tells, long after the change that makes the key is stored. The live segmenter compares
-them with those of now whenever it starts and at every change, and has the masks drawn anew where they part it otherwise.
+The last line of a complete file is an index of the frames' lines, so that reading one frame reads one line.
+It also lists the clicks on other objects with which the masks were computed. These are not part of the key, as only the
+prepared recording shows which clicks fall on a front, long after the key is stored. The live segmenter compares them with
+the current ones at its start and at every change, and recomputes the masks where they split the front differently.
 """
 
 import base64
@@ -18,37 +18,37 @@ import numpy as np
 from r2c2r_core.workspace import write_atomically
 
 Entry = dict[str, Any]  # of one frame: {"frame", "confidence", "area", "mask"}
-Others = list[list[float]]  # clicks on other objects that fall on this one's front: frame, x, y of each
+Others = list[list[float]]  # clicks on other objects on this one's front: frame, x, y of each
 
-_TAIL_BYTES = 1 << 16  # the last line of a file of some 1000 masks
-OUTDATED = "outdated"  # done before a file said what flat front was found
+_TAIL_BYTES = 1 << 16  # size of the last line of a file of some 1000 masks
+OUTDATED = "outdated"  # written by a version that did not store the flat front
 _END = b'{"end"'
 _INDEX_BYTES = 40  # of a frame in memory
 
 
 class Masks(Protocol):
-    """The masks computed for one state of an object's clicks."""
+    """Protocol of the masks for one state of an object's clicks."""
 
-    end: str | None  # done | failed | cancelled | OUTDATED; None when it never came to an end
+    end: str | None  # done | failed | cancelled | OUTDATED; None if incomplete
     error: dict[str, Any] | None
-    front: dict[str, Any] | None  # its flat front, as app.jobs.front_wire says it; None where it has none
-    others: Others  # drawn with these
-    doubts: list[str]  # about its front, with what would mend them
-    motions: list[dict[str, Any]]  # of its leaves, as app.jobs.motion_wire says them
+    front: dict[str, Any] | None  # its flat front, in the format of app.jobs.front_wire, or None
+    others: Others  # clicks on other objects used
+    doubts: list[str]  # about its front, with remedies
+    motions: list[dict[str, Any]]  # of its leaves, in the format of app.jobs.motion_wire
 
     def __len__(self) -> int:
-        """On how many frames there is one."""
+        """Number of frames with a mask."""
 
     def seen(self) -> np.ndarray:
         """(n, 3): frame, confidence, share of the image; by frame."""
 
     def entry(self, frame: int) -> Entry | None:
-        """One frame's."""
+        """The mask of one frame."""
 
 
 @dataclass(slots=True)
 class MaskFile:
-    """Masks in memory, while they are computed."""
+    """Masks in memory during computation."""
 
     frames: dict[int, Entry] = field(default_factory=dict)
     end: str | None = None
@@ -67,19 +67,19 @@ class MaskFile:
         return np.array(sorted(rows), float).reshape(-1, 3)
 
     def entry(self, frame: int) -> Entry | None:
-        """One frame's."""
+        """The mask of one frame."""
         return self.frames.get(frame)
 
 
 @dataclass(slots=True)
 class StoredMasks:
-    """Masks in a file: only where they are is in memory."""
+    """Masks in a file, with only the index in memory."""
 
     path: Path | str
     index: np.ndarray  # (n, 5): frame, confidence, share of the image, byte where its line begins, bytes of it; by frame
     end: str | None = None
     error: dict[str, Any] | None = None
-    backend: str = ""  # that drew them, where the file says so
+    backend: str = ""  # segmenter that computed them, if stored in the file
     front: dict[str, Any] | None = None
     others: Others = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
@@ -93,7 +93,7 @@ class StoredMasks:
         return self.index[:, :3]
 
     def entry(self, frame: int) -> Entry | None:
-        """One frame's; None also where the file was begun anew meanwhile."""
+        """The mask of one frame; None also where the file was restarted meanwhile."""
         at = int(self.index[:, 0].searchsorted(frame))
         if at == len(self.index) or self.index[at, 0] != frame:
             return None
@@ -106,7 +106,7 @@ class StoredMasks:
 
     @property
     def bytes(self) -> int:
-        """About what it takes of the memory."""
+        """Approximate memory use in bytes."""
         return 1000 + _INDEX_BYTES * len(self.index)
 
 
@@ -116,12 +116,12 @@ def mask_path(folder: Path, object_id: int, key: str) -> Path:
 
 
 def mask_file(folder: str, object_id: int, key: str) -> str:
-    """The same as text, for whoever looks at hundreds of objects at once: to make a Path takes longer than to look."""
+    """The same as text, for loops over hundreds of objects, where constructing a Path would dominate."""
     return f"{folder}/{object_id}/{key}.jsonl"
 
 
 def begin(path: Path) -> None:
-    """Forget older masks; until an end is written, whoever starts next knows that these are wanted."""
+    """Start an empty file, which marks the masks as wanted until an end is written."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(b"")
 
@@ -134,7 +134,7 @@ def append(path: Path, line: dict[str, Any]) -> None:
 
 
 def finish(path: Path, end: str, error: dict[str, Any] | None, masks: Masks | None = None) -> None:
-    """Say how it came to its end, what flat front it has, what it was drawn with, and where each mask is."""
+    """Append the last line: end state, flat front, other clicks used, and the index of masks."""
     about = masks or MaskFile()
     said: dict[str, Any] = {"end": end, "error": error, "front": about.front, "others": about.others}
     said |= {"doubts": about.doubts, "motions": about.motions}
@@ -150,7 +150,7 @@ def write(
     others: Others | None = None,
     motions: list[dict[str, Any]] | None = None,
 ) -> None:
-    """A whole file at once, of what the backend drew."""
+    """Write a complete file at once."""
     lines, index, at = [], [], 0
     for entry in sorted(entries, key=lambda entry: int(entry["frame"])):
         line = json.dumps(entry).encode() + b"\n"
@@ -164,7 +164,7 @@ def write(
 
 
 def read(path: Path | str) -> StoredMasks | None:
-    """Where everything in the file is; a line cut off by a crash is dropped; None when there is nothing."""
+    """Index of a file; a line truncated by a crash is dropped; None when there is nothing."""
     try:
         with open(path, "rb") as handle:
             size = handle.seek(0, os.SEEK_END)
@@ -183,7 +183,7 @@ def read(path: Path | str) -> StoredMasks | None:
 
 
 def _part(path: Path | str, begin: int, size: int) -> bytes:
-    """Some bytes of a file."""
+    """A byte range of a file."""
     handle = os.open(path, os.O_RDONLY)
     try:
         return os.pread(handle, size, begin)
@@ -192,7 +192,7 @@ def _part(path: Path | str, begin: int, size: int) -> bytes:
 
 
 def _scanned(path: Path | str, content: bytes) -> StoredMasks:
-    """The same from all lines: of a file without an end, or a long one."""
+    """The index from all lines, for an incomplete file, or a long last line."""
     found, at = StoredMasks(path, np.zeros((0, 5))), 0
     rows: dict[int, list[float]] = {}
     for raw in content.splitlines(keepends=True):
@@ -211,16 +211,19 @@ def _scanned(path: Path | str, content: bytes) -> StoredMasks:
 
 def _ended(found: StoredMasks, line: dict[str, Any]) -> StoredMasks:
     found.end, found.error, found.backend = line["end"], line.get("error"), line.get("backend", "")
-    found.front, found.others = line.get("front"), line.get("others", [])  # older files: every object was drawn alone
+    found.front, found.others = (
+        line.get("front"),
+        line.get("others", []),
+    )  # older files: every object was segmented independently
     found.doubts, found.motions = line.get("doubts", []), line.get("motions", [])
     if found.end == "done" and "front" not in line:
         found.end = OUTDATED
-    index = line.get("index", [])  # numbers, in files of before they were packed
+    index = line.get("index", [])  # numbers, in files of older versions
     rows = np.frombuffer(base64.b64decode(index), "<f8") if isinstance(index, str) else np.array(index, float)
     found.index = rows.reshape(-1, 5)
     return found
 
 
 def _packed(index: np.ndarray) -> str:
-    """The index as base64: read in a fiftieth of the time that numbers take."""
+    """The index as base64, which is read 50 times faster than JSON numbers."""
     return base64.b64encode(index.astype("<f8").tobytes()).decode()

@@ -1,4 +1,4 @@
-"""Masks as they go over the wire: at preview size, the bits of the mask's box."""
+"""API encoding of masks: the bits of the mask's bounding box at preview size."""
 
 import base64
 from typing import Any
@@ -11,7 +11,7 @@ from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 
 
 def mask_bits(packed: PackedMask, preview_width: int) -> dict[str, Any]:
-    """schemas.MaskBits of a mask, at most `preview_width` pixels wide."""
+    """The mask as schemas.MaskBits, at most `preview_width` pixels wide."""
     small = packed if packed.width <= preview_width else _shrunk(packed, preview_width)
     return {
         "width": small.width,

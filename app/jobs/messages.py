@@ -1,4 +1,4 @@
-"""How a child process of a job reports: JSON lines on stdout, as r2c2r_core.worker does."""
+"""Reports of a job's child process: JSON lines on stdout, as in r2c2r_core.worker."""
 
 import json
 import signal
@@ -13,7 +13,7 @@ from r2c2r_core.progress import Progress
 
 
 def run_stage(stage: str, work: Callable[[Progress], None]) -> int:
-    """Do the work, report it, and turn its failure into one line; the exit status."""
+    """Do the work, report progress, turn a failure into one line, and return the exit status."""
     stopped: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
     report = Progress(
@@ -28,7 +28,7 @@ def run_stage(stage: str, work: Callable[[Progress], None]) -> int:
         traceback.print_exc()
         say(error=told(memory_met()))
         return 1
-    except Exception as error:  # the edge of a job: the traceback goes to the log, one line to the person
+    except Exception as error:  # the edge of a job: the traceback goes to the log, one line to the user
         traceback.print_exc()
         say(error={"kind": "internal", "message": f"unexpected: {error}", "hint": "see the job's log"})
         return 1
@@ -37,6 +37,6 @@ def run_stage(stage: str, work: Callable[[Progress], None]) -> int:
 
 
 def say(**message: object) -> None:
-    """One line to the server."""
+    """Send one line to the server."""
     sys.stdout.write(json.dumps(message) + "\n")
     sys.stdout.flush()

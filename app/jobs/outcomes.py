@@ -1,4 +1,4 @@
-"""What a finished or failed job leaves in the database."""
+"""Database updates after a finished or failed job."""
 
 import hashlib
 import json
@@ -26,24 +26,24 @@ from r2c2r_core.workspace import write_atomically
 
 
 class KeptBundle(NamedTuple):
-    """A workspace's bundle, kept as a version."""
+    """A workspace's bundle, stored as a version."""
 
     row: Bundle | None  # None: it is the newest version already
 
 
 def forget_previews(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
-    """What was drawn of an older reading."""
+    """Delete the previews of an older reading."""
     shutil.rmtree(files.previews, ignore_errors=True)
 
 
 def import_done(session: Session, job: Job, project: Project, files: ProjectFiles, _: None = None) -> None:
-    """The project shows its recording."""
+    """Take over the imported recording."""
     adopt_capture(project, files)
     session.add(project)
 
 
 def sample_done(session: Session, job: Job, project: Project, files: ProjectFiles, _: None = None) -> None:
-    """The project shows its recording, and the sample's clicks are in it."""
+    """Take over the sample's recording and clicks."""
     adopt_capture(project, files)
     session.add(project)
     if not live_objects(session, project.id):
@@ -51,23 +51,25 @@ def sample_done(session: Session, job: Job, project: Project, files: ProjectFile
 
 
 def run_done(session: Session, job: Job, project: Project, files: ProjectFiles, kept: KeptBundle | None = None) -> None:
-    """The bundle becomes a version, unless it is the same as the newest one."""
+    """Store the bundle as a version, unless it equals the newest one."""
     adopt_bundle(session, project, files, job.payload.get("inputs", ""), kept)
     names = files.request(job.id or 0).with_name(NAMES)
-    named: dict[str, str] = json.loads(names.read_text()) if names.is_file() else {}  # none beside an older version's request
+    named: dict[str, str] = (
+        json.loads(names.read_text()) if names.is_file() else {}
+    )  # missing beside requests of older versions
     for item in live_objects(session, project.id):
         item.run_name = named.get(str(item.id), item.run_name)
         session.add(item)
 
 
 def vary_done(session: Session, job: Job, project: Project, files: ProjectFiles, _: None = None) -> None:
-    """Nothing: the variants lie in a folder of their own, which says itself what they are."""
+    """Nothing to do: the variants have their own self-describing folder."""
 
 
 def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
-    """An import that did not come to its end leaves the project failed, with the reason.
+    """Mark the project as failed, with the reason, after an unsuccessful import.
 
-    Of an upload that never could be read nothing else stays: asking again would end the same.
+    The files of an unreadable upload are deleted, as a retry would fail the same way.
     """
     project.updated = time.time()
     if job.kind in READS_RECORDING:
@@ -82,7 +84,7 @@ def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles)
 
 
 def _delete_what_was_read(files: ProjectFiles) -> None:
-    """The recording, what was unpacked of it, and what was drawn; the log stays."""
+    """Delete the recording, its unpacked files and previews, but not the log."""
     for folder in (files.source, files.work, files.previews, files.masks, files.requests):
         delete_folder(folder)
     for path in (files.frames, files.facts, *files.scan_pictures):
@@ -90,15 +92,15 @@ def _delete_what_was_read(files: ProjectFiles) -> None:
 
 
 def run_files(session: Session, job: Job, project: Project, files: ProjectFiles) -> KeptBundle:
-    """The bundle, kept as a version, and the prompts that the workspace's masks are of by now."""
+    """Store the bundle as a version, and the prompts of the workspace's masks."""
     write_atomically(files.finished_prompts, files.request(job.id or 0).with_name("prompts.json").read_bytes())
     return keep_bundle(session, project, files)
 
 
 def keep_bundle(session: Session, project: Project, files: ProjectFiles) -> KeptBundle:
-    """Keep a copy of the workspace's bundle as the next version, unless it is the same as the newest one.
+    """Copy the workspace's bundle as the next version, unless it equals the newest one.
 
-    It reads hundreds of megabytes: not in a transaction that writes.
+    It reads hundreds of megabytes, so it must not run in a write transaction.
     """
     made = files.work / "bundle.zip"
     if not made.is_file():
@@ -127,7 +129,7 @@ FINISHERS: dict[str, Finisher] = {
 
 
 def adopt_capture(project: Project, files: ProjectFiles) -> None:
-    """Take over facts.json, which the ingest process wrote."""
+    """Take over facts.json, written by the ingest process."""
     found: dict[str, Any] = json.loads(files.facts.read_text())
     project.capture, project.notices = found["facts"], found["notices"]
     project.source_path = found["source"] or project.source_path
@@ -137,7 +139,7 @@ def adopt_capture(project: Project, files: ProjectFiles) -> None:
 
 
 def adopt_prompts(session: Session, project: Project, file: PromptsFile, who: str) -> list[SceneObject]:
-    """Add the objects of a prompts.json; one whose name is taken gets the file's clicks and category."""
+    """Add the objects of a prompts.json; an existing object of the same name gets the file's clicks and category."""
     known = {item.name: item for item in live_objects(session, project.id)}
     colours = session.exec(select(func.count()).select_from(SceneObject).where(SceneObject.project_id == project.id)).one()
     items = []
@@ -161,7 +163,7 @@ def adopt_prompts(session: Session, project: Project, file: PromptsFile, who: st
 
 
 def drawn_in(entry: PromptsFileObject) -> tuple[dict[str, Any] | None, dict[str, Any], dict[str, Any] | None]:
-    """What a person drew of an object in a prompts.json, as it is stored: its front, its masks by frame, its crop box."""
+    """The drawn parts of an object in a prompts.json, as stored: front, masks by frame, crop box."""
     frames = {str(said.frame): said.mask.model_dump() if said.mask is not None else None for said in entry.frames}
     front, crop = (drawn.model_dump() if drawn is not None else None for drawn in (entry.front, entry.crop))
     return front, frames, crop
@@ -170,7 +172,7 @@ def drawn_in(entry: PromptsFileObject) -> tuple[dict[str, Any] | None, dict[str,
 def adopt_bundle(
     session: Session, project: Project, files: ProjectFiles, inputs: str, kept: KeptBundle | None = None
 ) -> Bundle:
-    """Store what was kept as the next version, or that the newest one is made from these inputs too."""
+    """Store the copied bundle as the next version, or these inputs with the newest one if it is equal."""
     kept = kept or keep_bundle(session, project, files)
     newest = newest_bundle(session, project.id)
     if kept.row is None:
@@ -186,7 +188,7 @@ def adopt_bundle(
 
 
 def bundle_row(project: Project, kept: Path, version: int) -> Bundle:
-    """The row of a bundle that is kept, with the certificate that it holds."""
+    """The row of a stored bundle, with its certificate."""
     size, created = kept.stat().st_size, kept.stat().st_mtime
     row = Bundle(project_id=project.id, version=version, path=kept.name, sha256=_sha256(kept), size=size, created=created)
     row.certificate = _certificate_in(kept)
@@ -194,14 +196,14 @@ def bundle_row(project: Project, kept: Path, version: int) -> Bundle:
 
 
 def _free_version(files: ProjectFiles, version: int, digest: str) -> int:
-    """The next version that writes over nothing: a restored database does not know the newest files."""
+    """The next version number without an existing file, as a restored database may not know the newest files."""
     while (kept := files.bundles / f"v{version}.zip").exists() and _sha256(kept) != digest:
         version += 1
     return version
 
 
 def _with_speed(certificate: dict[str, Any] | None, work: Path) -> dict[str, Any] | None:
-    """The certificate with how fast this machine simulates the scene, which a bundle, the same on every machine, leaves out."""
+    """The certificate with this machine's simulation speed, which a reproducible bundle omits."""
     from r2c2r_core.workspace import Workspace
 
     noun = Workspace(work).load_latest("export", "scene")
@@ -214,7 +216,7 @@ def _with_speed(certificate: dict[str, Any] | None, work: Path) -> dict[str, Any
 
 
 def _certificate_in(bundle: Path) -> dict[str, Any] | None:
-    """What the bundle's report says."""
+    """The certificate in the bundle's report, or None."""
     try:
         with zipfile.ZipFile(bundle) as archive:
             report: dict[str, Any] = json.loads(archive.read("report.json"))

@@ -1,7 +1,7 @@
-"""The table of parts: objects of a stage of a running job, which any seat may compute; each is one's at a time.
+"""Table of parts: objects of a running job's stage that any seat may compute, each claimed by one seat at a time.
 
-A part only brings forward what the stage would compute itself: one that fails, or is never computed, is left to it, and nothing
-here has to outlive the database's machine.
+A part only precomputes what the stage would compute itself: one that fails, or is never computed, is left to the stage, so
+the table need not survive a crash of the database's machine.
 """
 
 from collections import Counter
@@ -15,13 +15,13 @@ from app.db.engine import is_shared, now, reading, writing
 from app.db.tables import Job, Part, Seat
 from app.settings import Settings
 
-TRIES = 2  # of a part whose process vanishes
-LOG_KEPT = 64_000  # characters of what a process wrote, the last ones
+TRIES = 2  # for a part whose process vanishes
+LOG_KEPT = 64_000  # last characters kept of a process's output
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claimed:
-    """Objects that are this process's to compute, by one process of the stage."""
+    """Objects claimed by this process, to be computed by one process of the stage."""
 
     ids: tuple[int, ...]
     job_id: int
@@ -32,27 +32,27 @@ class Claimed:
 
 
 class PartRows:
-    """Its rows, as of one process: what another does with a part that this one lost is not changed any more."""
+    """The table as used by one process, which does not change parts that it has lost to another."""
 
     def __init__(self, engine: Engine, owner: str, settings: Settings) -> None:
         self._engine, self._owner, self._settings = engine, owner, settings
 
     def spare(self) -> int:
-        """Seats that have no job of their own."""
+        """Number of seats without a job of their own."""
         with reading(self._engine) as session:
             return self._spare(session)
 
     def begin(self, job_id: int, stage: str, names: Collection[str], holder: str, at_least: int) -> None:
-        """Offer these objects."""
+        """Offer these objects for computation."""
         with writing(self._engine, lasting=False) as session:
             for name in names:
                 part = Part(job_id=job_id, stage=stage, name=name, holder=holder, at_least=at_least, state="waiting")
                 session.add(part)
 
     def claim(self, side_by_side: int, job_id: int | None = None) -> Claimed | None:
-        """Take some objects of a job, the oldest unless one is named, as many as keep all seats at it busy to the end.
+        """Claim some objects of a job, by default the oldest, so many that all seats stay busy to the end.
 
-        `side_by_side`: as many this process computes at once; no seat takes more than its share for that.
+        `side_by_side`: number of objects that this process computes in parallel, within its fair share.
         """
         of = select(Part).join(Job).where(Job.state == "running").order_by(col(Part.job_id), col(Part.id))
         if job_id is not None:
@@ -82,7 +82,7 @@ class PartRows:
             )
 
     def beat(self, claimed: Claimed) -> bool:
-        """Say that this process is at them; whether they are still wanted of it."""
+        """Renew the heartbeat of the claimed parts; returns whether they are still wanted."""
         with writing(self._engine, lasting=False) as session:
             lives = update(Part).where(self._mine(claimed)).values(heartbeat=now(session))
             states = [state for (state,) in session.execute(lives.returning(col(Part.state)))]
@@ -90,26 +90,26 @@ class PartRows:
             return states == ["running"] * len(claimed.ids) and job is not None and job.state == "running"
 
     def done(self, claimed: Claimed, log: str, *, failed: bool) -> None:
-        """They were computed; or some can not be, which is then the stage's own to say."""
+        """Mark the parts as done, or failed if some cannot be computed, which the stage then reports itself."""
         self._leave(claimed, log, 0, state="failed" if failed else "done")
 
     def give_back(self, claimed: Claimed, log: str, *, tried: bool) -> None:
-        """Let others compute them."""
+        """Release the parts for others."""
         self._leave(claimed, log, 0 if tried else 1, state="waiting")
 
     def is_open(self, job_id: int) -> bool:
-        """Whether some are computed, or are to be, of a job that goes on."""
+        """Whether a running job has parts waiting or in progress."""
         of = select(Part.id).join(Job).where(Part.job_id == job_id, Job.state == "running").limit(1)
         with reading(self._engine) as session:
             return session.exec(of.where(self._waits(session) | self._is_at_work(session))).first() is not None
 
     def counted(self, job_id: int) -> Counter[str]:
-        """How many are in each state."""
+        """Number of parts in each state."""
         with reading(self._engine) as session:
             return Counter(session.exec(select(Part.state).where(Part.job_id == job_id)))
 
     def take_logs(self, job_id: int) -> list[str]:
-        """What their processes wrote, of those that ended since."""
+        """Output of processes that have ended since the last call."""
         of = (col(Part.job_id) == job_id, col(Part.log) != "")
         with reading(self._engine) as session:
             if session.exec(select(Part.id).where(*of).limit(1)).first() is None:
@@ -120,7 +120,7 @@ class PartRows:
         return list(found.values())
 
     def end(self, project_id: str) -> bool:
-        """Have none of the project's parts any more; False while some are computed, which is to stop."""
+        """Remove all of the project's parts; False while some are still being stopped."""
         of = col(Part.job_id).in_(select(Job.id).where(Job.project_id == project_id))
         with reading(self._engine) as session:
             if session.exec(select(Part.id).where(of).limit(1)).first() is None:
@@ -132,7 +132,7 @@ class PartRows:
             return session.exec(select(Part.id).where(of).limit(1)).first() is None
 
     def _leave(self, claimed: Claimed, log: str, untried: int, *, state: str) -> None:
-        """What nobody wants any more is forgotten."""
+        """Release claimed parts in a state, and delete unwanted ones."""
         left = {"state": state, "owner": None, "attempts": col(Part.attempts) - untried}
         with writing(self._engine, lasting=False) as session:
             session.execute(delete(Part).where(self._mine(claimed), col(Part.state) == "stopping"))
@@ -149,12 +149,12 @@ class PartRows:
         return int(seats) - running
 
     def _waits(self, session: Session) -> ColumnElement[bool]:
-        """A part that may be taken, also from who was silent for so long that it is gone."""
+        """Condition on parts that may be claimed, including those of owners without heartbeat."""
         gone = (col(Part.state) == "running") & (col(Part.heartbeat) < self._silent_since(session))
         return ((col(Part.state) == "waiting") | gone) & (col(Part.attempts) < TRIES)
 
     def _is_at_work(self, session: Session) -> ColumnElement[bool]:
-        """A part that somebody computes."""
+        """Condition on parts in progress."""
         return col(Part.state).in_(("running", "stopping")) & (col(Part.heartbeat) >= self._silent_since(session))
 
     def _silent_since(self, session: Session) -> float:
@@ -165,5 +165,5 @@ class PartRows:
 
 
 def fair_share(waiting: int, seats: int, fewest: int) -> int:
-    """Half of a seat's share of what waits, so that none is left with much at the end; `fewest` where its share is so many."""
+    """Half of a seat's share of the waiting parts, to balance the end; at least `fewest` where its share allows."""
     return min(-(-waiting // seats), max(fewest, -(-waiting // (2 * seats))))

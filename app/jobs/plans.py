@@ -1,4 +1,4 @@
-"""What a job runs: one process per stage, and how long each is likely to take beside the others."""
+"""Steps of a job: one process per stage, with relative durations."""
 
 import json
 from collections.abc import Callable, Collection
@@ -29,21 +29,21 @@ class Step:
     stage: str
     command: tuple[str, ...]
     weight: float  # share of the job's time; only ratios mean something
-    took_s: float | None = None  # the most it took in the project's last jobs; None: it was never done there
-    side_by_side: bool = False  # its objects, in as many processes as a job may start
-    objects: int = 0  # of a step that goes by them
-    object_s: float = 0.0  # what each of them is likely to take
-    learned: bool = False  # by a model that a GPU makes quicker
+    took_s: float | None = None  # longest duration in the project's last jobs; None: never done
+    side_by_side: bool = False  # computes its objects in parallel processes
+    objects: int = 0  # number of objects, for a per-object step
+    object_s: float = 0.0  # estimated duration per object
+    learned: bool = False  # uses a model that benefits from a GPU
 
     def of(self, names: Collection[str], request: Path | None = None) -> "Step":
-        """The step for these objects alone (r2c2r_core.worker --only), perhaps by a request that lies elsewhere."""
-        given = () if request is None else ("--request", str(request))  # the last one counts
+        """The step for these objects only (r2c2r_core.worker --only), optionally with another request."""
+        given = () if request is None else ("--request", str(request))  # the last one is used
         return replace(self, command=(*self.command, *given, "--only", *names))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Commands:
-    """The programs a job may start; tests put their own in their place."""
+    """The programs of jobs; replaceable in tests."""
 
     worker: tuple[str, ...] = field(default_factory=lambda: python_module("r2c2r_core.worker"))
     probe: tuple[str, ...] = field(default_factory=lambda: python_module("r2c2r_core.alone", "app.jobs.probe"))
@@ -54,15 +54,15 @@ class Commands:
 
 
 def commands_of(settings: Settings) -> Commands:
-    """The programs of the app, as it was told to run them."""
+    """The app's programs as configured by the settings."""
     return Commands(worker=(*python_module("r2c2r_core.worker"), "--workers", str(settings.workers_a_job)))
 
 
-NAMES = "names.json"  # beside a request: what each object, by its number, is called in the run
+NAMES = "names.json"  # beside a request: names of the objects in the run, by number
 
 Planner = Callable[[Job, Project, ProjectFiles, Commands], list[Step]]
 
-# without a model, by two processes side by side: lines through kitchens of 5, 14 and 40 objects (benchmarks/speed.json)
+# without a model, with two parallel processes: line fits through kitchens of 5, 14 and 40 objects (benchmarks/speed.json)
 _OBJECT_S = {"segment": 0.6, "generate": 1.6, "align": 0.4, "a model": 20.0}
 _WEIGHTS = {"segment": 30.0, "generate": 30.0, "align": 25.0, "synthesize": 3.0, "warp": 4.0, "export": 8.0}
 
@@ -76,10 +76,10 @@ _AS_RECORDED: dict[str, Any] = {"register_depth": False, "scale": 1.0}
 
 
 def request_of(session: Session, job: Job, project: Project, files: ProjectFiles) -> dict[str, Any]:
-    """What the job is given: the clicks and corrections of the moment it first began, whatever is clicked later.
+    """The job's request: a snapshot of clicks and corrections at its first start.
 
-    They lie in a place of the job's own, where its processes read them (r2c2r_core.worker.read_request); request.json is
-    written last, so a job that is taken up again finds all of them or none.
+    The files are in the job's own folder, where its processes read them (r2c2r_core.worker.read_request); request.json is
+    written last, so that a resumed job finds either all of them or none.
     """
     path, payload = files.request(job.id or 0), job.payload
     if path.is_file():
@@ -111,7 +111,7 @@ def request_of(session: Session, job: Job, project: Project, files: ProjectFiles
 
 
 def _prompts_of(session: Session, job: Job, files: ProjectFiles) -> dict[str, Any] | None:
-    """The clicks of a run that a correction started; None for any other, and where no run came before."""
+    """Prompts for a run started by a correction; None for any other run, and without an earlier run."""
     about = job.payload.get("about")
     if not about or not files.finished_prompts.is_file():
         return None
@@ -123,7 +123,7 @@ def _names(document: dict[str, Any]) -> set[str]:
 
 
 def placed_request(path: Path, files: ProjectFiles) -> dict[str, Any]:
-    """The request that was written before, perhaps on another machine, with its paths as they are here."""
+    """An existing request, possibly from another machine, with paths mapped to this one."""
     request: dict[str, Any] = json.loads(path.read_text())
     overrides = path.with_name("overrides.json")
     written = json.loads(overrides.read_text())
@@ -137,7 +137,7 @@ def placed_request(path: Path, files: ProjectFiles) -> dict[str, Any]:
 
 
 def _placed_overrides(document: dict[str, Any], files: ProjectFiles) -> dict[str, Any]:
-    """overrides.json whose uploaded meshes are where they are here."""
+    """overrides.json with paths of uploaded meshes mapped to this machine."""
     for entry in document["objects"].values():
         if isinstance(entry.get("candidate"), str):
             entry["candidate"] = str(files.here(entry["candidate"]))
@@ -145,7 +145,7 @@ def _placed_overrides(document: dict[str, Any], files: ProjectFiles) -> dict[str
 
 
 def write_json(path: Path, document: Any) -> None:
-    """Write a JSON file at once or not at all."""
+    """Write a JSON file atomically."""
     write_atomically(path, json.dumps(document, indent=1).encode())
 
 
@@ -192,7 +192,7 @@ def _vary(job: Job, project: Project, files: ProjectFiles, commands: Commands) -
 
 
 def _backend(stage: str, payload: dict[str, Any]) -> Backend:
-    """The stage's tool of a job."""
+    """The backend of a job's stage."""
     seam, backends = _TOOLS[stage]
     return backends.get(payload.get(seam) or backends.default)
 

@@ -16,21 +16,21 @@ from app.jobs.messages import run_stage, say
 from r2c2r_core.errors import CaptureError, InputError
 from r2c2r_core.limits import free_memory, limit_this_process
 
-LOOKED_AT = 8  # frames
+LOOKED_AT = 8  # number of frames examined
 _Y_UP = (".glb", ".obj")  # glTF's axes are +Y up, and most programs write OBJ so
 _DRAWN_FROM_Y_UP = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
-MEMORY_SHARE = 0.7  # of what is free when it starts: it decodes other people's files
+MEMORY_SHARE = 0.7  # of the free memory at start, as it decodes untrusted files
 
 
 class Look(NamedTuple):
-    """How one kind of file is looked at, and the CPU seconds that may take."""
+    """Probe of one kind of file, with its CPU time limit in seconds."""
 
     probe: Callable[[Path], None]
     cpu_s: int
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Look, say."""
+    """Probe the file and report."""
     parser = argparse.ArgumentParser(prog="app.jobs.probe", description=__doc__)
     parser.add_argument("kind", choices=LOOKS)
     parser.add_argument("file", type=Path)
@@ -42,7 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def probe_recording(file: Path) -> None:
-    """Raise CaptureError unless the recording opens and most frames looked at can be decoded."""
+    """Raise CaptureError unless the recording opens and most examined frames can be decoded."""
     import numpy as np
 
     from r2c2r_core.ingest.readers.protocol import UnreadableFrame
@@ -68,7 +68,7 @@ def probe_recording(file: Path) -> None:
 
 
 def probe_mesh(file: Path) -> None:
-    """Say what a person is to see of the mesh; raise OverrideError unless a closed candidate can be made of it."""
+    """Report a preview of the mesh; raise OverrideError unless a closed candidate can be made from it."""
     import numpy as np
 
     from app.drawing import mesh_picture
@@ -90,7 +90,7 @@ LOOKS = {"recording": Look(probe_recording, cpu_s=60), "mesh": Look(probe_mesh, 
 
 
 def _named(probe: Callable[[Path], None], file: Path, name: str) -> None:
-    """Look, and complain in the sender's words: the file has another name here."""
+    """Probe the file, with errors that use the sender's file name, as it has another name here."""
     try:
         probe(file)
     except InputError as error:

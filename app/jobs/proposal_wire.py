@@ -1,4 +1,4 @@
-"""Proposals as they go over the wire and lie in the project's folder."""
+"""Encoding of proposals in the API and in the project's folder."""
 
 import hashlib
 import json
@@ -13,11 +13,11 @@ from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.model.proposal import Proposal
 
-_SMOOTH = 0.002  # of the frame's width: how far the drawn outline may leave the mask's border
+_SMOOTH = 0.002  # tolerance of the outline's simplification, as a fraction of the frame's width
 
 
 def proposal_line(proposal: Proposal, preview_width: int) -> dict[str, Any]:
-    """schemas.Proposal, and its mask at preview size under "mask"."""
+    """The proposal as schemas.Proposal, with its mask at preview size under "mask"."""
     click = proposal.click
     content = json.dumps([click.frame, click.x, click.y])
     return {
@@ -37,7 +37,7 @@ def proposal_line(proposal: Proposal, preview_width: int) -> dict[str, Any]:
 
 
 def read_proposals(path: Path) -> list[dict[str, Any]] | None:
-    """The lines stored in a file; None when there are none, or only half a file."""
+    """The proposals stored in a file; None where it is missing or incomplete."""
     try:
         lines: list[dict[str, Any]] = json.loads(path.read_text())
     except (FileNotFoundError, ValueError):

@@ -1,4 +1,4 @@
-"""What a node of a Ray cluster is to do."""
+"""Order for a node of a Ray cluster."""
 
 import sys
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """One step of a job, as the machine says it that has the job, and what it takes."""
+    """One step of a job with its resources, as issued by the machine that owns the job."""
 
-    version: str  # as app.jobs.seats has it
+    version: str  # as in app.jobs.seats
     job: int
     project: str
-    holder: str  # as app.store has it
+    holder: str  # as in app.store
     stage: str
     command: tuple[str, ...]
     data_dir: str

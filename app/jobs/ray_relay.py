@@ -1,7 +1,7 @@
 """One step of a job on a Ray cluster: `python -m app.jobs.ray_relay ORDER`, a JSON of app.jobs.ray_order.
 
-It says what the step says and stops as the step stops, so that whoever started it need not know of Ray. It waits for a cluster
-and for a node with room. The actor is Ray's and ends with this process; the step's processes end with the actor.
+It relays the step's messages and exit status, so that the caller need not know about Ray. It waits for a cluster and for a
+node with free resources. The actor belongs to Ray and ends with this process; the step's processes end with the actor.
 """
 
 import json
@@ -18,12 +18,12 @@ from app.jobs.ray_seat import NodeSeat
 from app.process import Line
 from r2c2r_core.errors import Cancelled, EnvironmentProblem, R2C2RError
 
-SAID_S = 5.0  # between two words about waiting
+SAID_S = 5.0  # interval of messages while waiting
 TRIED_S = 1.0
 
 
 def main(arguments: list[str]) -> int:
-    """Relay a step; its exit status, or 1 with no last word where its node vanished."""
+    """Relay a step and return its exit status, or 1 without a last message where its node vanished."""
     order, stopped = order_of(arguments[0]), threading.Event()
     _listen(stopped)
     try:
@@ -34,7 +34,7 @@ def main(arguments: list[str]) -> int:
 
 
 def order_of(said: str) -> Order:
-    """As `app.jobs.compute` wrote it."""
+    """Parse the order written by `app.jobs.compute`."""
     return Order(**json.loads(said))
 
 
@@ -71,7 +71,7 @@ def _listen(stopped: threading.Event) -> None:
 
 
 def _joined(order: Order, stopped: threading.Event) -> Any:
-    """Ray, once a cluster answers."""
+    """The ray module, once connected to a cluster."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         import ray
@@ -81,16 +81,16 @@ def _joined(order: Order, stopped: threading.Event) -> Any:
     while True:
         try:
             ray.init(address="auto", log_to_driver=False, logging_level="ERROR", configure_logging=False)
-            _listen(stopped)  # Ray has put its own there
+            _listen(stopped)  # Ray has installed its own handlers
             return ray
         except ConnectionError:
             waiting.wait()
-        except RuntimeError as error:  # versions of Ray or Python that differ
+        except RuntimeError as error:  # mismatching versions of Ray or Python
             raise EnvironmentProblem(f"Ray: {_first_line(error)}", hint="install the same on all machines") from error
 
 
 def _started(ray: Any, seat: Any, order: Order, stopped: threading.Event, takes: str) -> Line | None:
-    """Begin the step where there is room; why that is not possible, if it is not."""
+    """Start the step on a free node; returns an error message, or None."""
     starting, waiting = seat.start.remote(), _Waiting(order, stopped, f"waits for a Ray node with {takes}")
     while not ray.wait([starting], timeout=0)[0]:
         waiting.wait()
@@ -99,14 +99,14 @@ def _started(ray: Any, seat: Any, order: Order, stopped: threading.Event, takes:
 
 
 class _Waiting:
-    """Says what for, and ends where it is cancelled."""
+    """Waiting loop that reports the reason, and ends on cancellation."""
 
     def __init__(self, order: Order, stopped: threading.Event, words: str) -> None:
         self._order, self._stopped, self._words = order, stopped, words
         self._told = time.monotonic()
 
     def wait(self) -> None:
-        """A moment."""
+        """Wait for a short interval."""
         if self._stopped.wait(TRIED_S / 10):
             raise Cancelled(f"{self._order.stage}: cancelled")
         if time.monotonic() - self._told > SAID_S:

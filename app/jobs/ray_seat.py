@@ -1,4 +1,4 @@
-"""What Ray starts on a node: an actor with one step of a job, in a process group of its own that ends with it."""
+"""Ray actor on a node that runs one step of a job, in its own process group that ends with it."""
 
 import contextlib
 import queue
@@ -18,12 +18,12 @@ from app.store.opening import open_store
 from app.store.protocol import Store
 from r2c2r_core.errors import EnvironmentProblem, R2C2RError
 
-HEARD_S = 1.0  # of silence, until that is what is heard
-CACHES = 256  # that one machine may have: as many steps run there at a time
+HEARD_S = 1.0  # maximum wait for output before an empty report
+CACHES = 256  # maximum caches, and so concurrent steps, of one machine
 
 
 class Heard(NamedTuple):
-    """What came of the step since the last time; `status` when it has ended and what it made is kept."""
+    """Output of the step since the last call; `status` once it has ended and its results are stored."""
 
     lines: list[Line]
     log: bytes
@@ -31,7 +31,7 @@ class Heard(NamedTuple):
 
 
 class NodeSeat:
-    """The node's side of a step: fetch, start, hear, keep. `ask_to_stop` is called while `hear` waits."""
+    """The node's side of a step: fetch, start, report, store. `ask_to_stop` may be called while `hear` waits."""
 
     def __init__(self, order: Order) -> None:
         self._order, self._left = order, contextlib.ExitStack()
@@ -41,7 +41,7 @@ class NodeSeat:
         self._store: Store | None = None
 
     def start(self) -> Line | None:
-        """Begin; what is wrong, if anything."""
+        """Start the step; returns an error message, or None."""
         order = self._order
         try:
             if version() != order.version:
@@ -63,7 +63,7 @@ class NodeSeat:
         return None
 
     def hear(self) -> Heard:
-        """Wait for something; the last word is heard when what was made is kept."""
+        """Wait for output; the last report follows after results are stored."""
         worker, lines = self._worker, list[Line]()
         assert worker is not None
         with contextlib.suppress(queue.Empty):
@@ -93,7 +93,7 @@ class NodeSeat:
         return Heard(lines, log, status)
 
     def _logged(self) -> bytes:
-        """What the log has got since."""
+        """New content of the log since the last call."""
         with self._log.open("rb") as log:
             log.seek(self._read)
             said = log.read()
@@ -103,7 +103,7 @@ class NodeSeat:
 
 @contextlib.contextmanager
 def _data_folder(order: Order) -> Iterator[Path]:
-    """A cache that is this step's alone; without a store, the folder that all machines share."""
+    """A cache used only by this step; without a store, the folder shared by all machines."""
     root = Path(order.data_dir)
     if not order.store:
         yield root
@@ -121,7 +121,7 @@ def _data_folder(order: Order) -> Iterator[Path]:
 
 
 def _command(order: Order, here: Path) -> tuple[str, ...]:
-    """The step's command with this machine's Python and this machine's folder."""
+    """The step's command with this machine's Python and folder."""
     placed = (
         str(here) + word.removeprefix(order.data_dir) if word.startswith(f"{order.data_dir}/") else word
         for word in order.command

@@ -1,4 +1,4 @@
-"""What becomes of a job's row: each step is one transaction with an event beside it, and shown to every tab."""
+"""State transitions of a job's row: each is one transaction with an event, and published to all tabs."""
 
 import os
 import secrets
@@ -27,11 +27,11 @@ from app.store.protocol import Store
 
 
 def _nothing(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
-    """Nothing takes long."""
+    """No-op for finishers without files."""
 
 
 class Finisher(NamedTuple):
-    """How what a finished job made is taken over: files first, while others may write, then rows, in one transaction."""
+    """Takeover of a finished job's results: files first, outside a transaction, then rows, in one transaction."""
 
     store: Callable[[Session, Job, Project, ProjectFiles, Any], None]  # the last is what `files` returned
     files: Callable[[Session, Job, Project, ProjectFiles], Any] = _nothing
@@ -50,9 +50,9 @@ _AT_WORK = ("running", "cancelling")
 
 
 class JobRows:
-    """The table of jobs. `finishers` take over what a finished job made, `ended` what one that came to no end leaves.
+    """The table of jobs. `finishers` take over results of finished jobs, `ended` cleans up after unsuccessful ones.
 
-    A running job is its owner's: whoever lost it, taken for dead by another server, changes nothing of it any more.
+    A running job belongs to its owner: a server that lost it, having been taken for dead, cannot change it any more.
     """
 
     def __init__(
@@ -67,10 +67,10 @@ class JobRows:
         self._finishers, self._ended = finishers, ended
 
     def recover(self) -> None:
-        """Take up what a server that is gone left: its workers are ended, its jobs wait again.
+        """Recover the jobs of dead servers: kill their workers and queue their jobs again.
 
-        In a file, which one server holds at a time, that is all that ran before; where servers share a database, what had no
-        sign of life for long.
+        With a SQLite file, which has one server at a time, these are all running jobs; with a shared database, those without a
+        heartbeat for long.
         """
         if not self.shared:
             self._forget_parts()
@@ -78,7 +78,7 @@ class JobRows:
             left = self._left(session)
         if not left:
             return
-        for row in filter(self._is_here, left):  # outside the transaction: nobody else can write while it lasts
+        for row in filter(self._is_here, left):  # outside the transaction, which blocks other writers
             end_orphan(row.worker_pid, row.worker_started)
         with writing(self.engine) as session:
             left = self._left(session)
@@ -103,21 +103,21 @@ class JobRows:
             self._tell_end(row.id or 0)
 
     def claim(self, *, imports_only: bool = False) -> int | None:
-        """Take the oldest waiting job whose project's workspace nobody writes; no two threads or servers get the same one."""
+        """Claim the oldest waiting job whose project's workspace is idle; no two threads or servers get the same one."""
         claim = self._claim_import if imports_only else self._claim
         with writing(self.engine) as session:
             found = session.execute(claim, {"owner": self.owner, "now": now(session)}).first()
         return int(found[0]) if found else None
 
     def beat(self) -> dict[int, bool]:
-        """Say that this server lives; the jobs that are its own by now, and whether somebody wants each stopped."""
+        """Send a heartbeat; returns this server's jobs, and whether each is to be cancelled."""
         mine = update(Job).where(col(Job.owner) == self.owner, col(Job.state).in_(_AT_WORK))
         with writing(self.engine, lasting=False) as session:
             rows = session.execute(mine.values(heartbeat=now(session)).returning(col(Job.id), col(Job.state)))
             return {number: state == "cancelling" for number, state in rows}
 
     def next_waits(self, why: str) -> None:
-        """Say once why the job that is next does not start; `why` begins the same as long as the reason is the same."""
+        """Report once why the next job does not start; `why` has the same beginning for the same reason."""
         with writing(self.engine) as session:
             row = session.exec(select(Job).where(Job.state == "queued").order_by(col(Job.id))).first()
             if row is None or row.message.startswith(why[:16]):
@@ -132,7 +132,7 @@ class JobRows:
             return self._own(session, job_id).project_id
 
     def begin(self, job_id: int, commands: Commands) -> tuple[list[Step], Path]:
-        """Write down what the job is given; its processes, and its log. Raises NoSpace where there is no room for it."""
+        """Write the job's request; returns its steps and log. Raises NoSpace on a full disk."""
         with writing(self.engine) as session:
             row = self._own(session, job_id)
             project = project_row(session, row.project_id)
@@ -145,12 +145,12 @@ class JobRows:
             return [replace(step, took_s=took.get(step.stage)) for step in steps], files.root / "logs" / f"job-{job_id}.log"
 
     def is_cancelling(self, job_id: int) -> bool:
-        """Whether somebody, at any server, wants a job stopped that this server runs."""
+        """Whether cancellation of a job running here was requested at any server."""
         with reading(self.engine) as session:
             return self._own(session, job_id).state == "cancelling"
 
     def step_of(self, job_id: int, stage: str, commands: Commands) -> tuple[Step, ProjectFiles]:
-        """A stage of a job that any process runs, and where its files are here."""
+        """A step of a job running at any process, and its local files."""
         with reading(self.engine) as session:
             row = job_row(session, job_id)
             files = self._files(session, row)
@@ -160,7 +160,7 @@ class JobRows:
     def began_step(
         self, job_id: int, stage: str, fraction: float, log: Path, worker: Worker, progress: float, eta_s: float | None
     ) -> None:
-        """A process of the job was started; the first of a stage, at its fraction 0, is its beginning."""
+        """Record the start of a process; the first one of a stage, at fraction 0, marks the stage's beginning."""
         began = started_at(worker.pid)
         with writing(self.engine) as session:
             row = self._own(session, job_id)
@@ -175,7 +175,7 @@ class JobRows:
     def progressed(
         self, job_id: int, stage: str, fraction: float, message: str | None, progress: float, eta_s: float | None
     ) -> None:
-        """How far it is; without a message it only lives."""
+        """Store the progress; without a message, only as a sign of life."""
         with writing(self.engine, lasting=False) as session:
             row = self._own(session, job_id)
             if message is not None:
@@ -185,7 +185,7 @@ class JobRows:
         self.tell(job_id)
 
     def got_further(self, job_id: int, stages: int) -> bool:
-        """So many stages are finished; whether that is more than ever: what was tried in vain does not count any more."""
+        """Store the number of finished stages; returns whether it is a new maximum, which resets the attempts."""
         with writing(self.engine) as session:
             row = self._own(session, job_id)
             further = stages > row.reached
@@ -195,12 +195,12 @@ class JobRows:
         return further
 
     def finish(self, job_id: int) -> str:
-        """All of it is done: what it made is taken over; its kind. Raises what the finisher raises; nothing is stored then."""
+        """Take over a finished job's results and return its kind. Errors of the finisher propagate, with nothing stored."""
         with reading(self.engine) as session:
             row = self._own(session, job_id)
             finisher, files = self._finishers[row.kind], self._files(session, row)
             made = finisher.files(session, row, project_row(session, row.project_id), files)
-        self.store.keep(row.project_id)  # all of it, before a row names it: this machine may be gone after that
+        self.store.keep(row.project_id)  # everything, before a row refers to it, as this machine may die afterwards
         size = self.store.size(row.project_id)
         with writing(self.engine) as session:
             row = self._own(session, job_id)
@@ -215,7 +215,7 @@ class JobRows:
         return kind
 
     def end(self, job_id: int, state: str, error: dict[str, Any]) -> None:
-        """It failed or was cancelled."""
+        """Mark the job as failed or cancelled."""
         with writing(self.engine) as session:
             row = self._own(session, job_id)
             row.state, row.finished, row.eta_s, row.worker_pid = state, time.time(), None, None
@@ -228,7 +228,7 @@ class JobRows:
         self._tell_end(job_id)
 
     def queue_again(self, job_id: int, why: str) -> None:
-        """Wait for another try after its process vanished."""
+        """Queue the job for another try after its process vanished."""
         with writing(self.engine) as session:
             row = self._own(session, job_id)
             _set_waiting(session, row, "taken up again after its process ended early")
@@ -236,14 +236,14 @@ class JobRows:
         self.tell(job_id)
 
     def give_back(self, job_id: int, why: str) -> None:
-        """Wait for the next server, or for what is away: that is no failed try."""
+        """Queue the job for the next server or until a resource is available, without counting a failed attempt."""
         with writing(self.engine) as session:
             row = self._own(session, job_id)
             row.attempts = max(row.attempts - 1, 0)
             _set_waiting(session, row, why)
 
     def cancel(self, job_id: int) -> bool:
-        """Cancel it where it only waits; whether it runs here and is to be stopped now."""
+        """Cancel a waiting job; returns whether it runs here and must be stopped."""
         with writing(self.engine) as session:
             row = job_row(session, job_id)
             running, here = row.state == "running", row.owner == self.owner
@@ -259,13 +259,13 @@ class JobRows:
         return running and here
 
     def busy(self, project_id: str) -> bool:
-        """Whether a process works for the project."""
+        """Whether a job process is running for the project."""
         with reading(self.engine) as session:
             query = select(Job.id).where(Job.project_id == project_id, col(Job.state).in_(_AT_WORK))
             return session.exec(query).first() is not None
 
     def tell(self, job_id: int) -> None:
-        """Show the row to every tab."""
+        """Publish the row to all tabs."""
         with reading(self.engine) as session:
             row = session.get(Job, job_id)
             if row is not None:
@@ -279,7 +279,7 @@ class JobRows:
             session.execute(delete(Part))
 
     def _left(self, session: Session) -> list[Job]:
-        """Jobs at work by their rows, whose owner is gone."""
+        """Running jobs whose owner is gone."""
         of = select(Job).where(col(Job.state).in_(_AT_WORK))
         if self.shared:
             silent_since = now(session) - self.settings.beats_missed_s
@@ -287,11 +287,11 @@ class JobRows:
         return list(session.exec(of))
 
     def _is_here(self, row: Job) -> bool:
-        """Whether its worker, known by its process id, was one of this machine."""
+        """Whether the job's worker process was on this machine."""
         return not self.shared or (row.owner or "").startswith(f"{socket.gethostname()}:")
 
     def _own(self, session: Session, job_id: int) -> Job:
-        """A job that this server runs; raises NotFound where there is none, or another has taken it up meanwhile."""
+        """A job that this server runs; raises NotFound where there is none, or another server has taken it over."""
         row = job_row(session, job_id)
         if row.owner != self.owner:
             raise NotFound(f"job {job_id} is run by {row.owner or 'nobody'} now, where {self.owner} ran it")

@@ -1,8 +1,8 @@
-"""The queue: durable rows, one process per stage, at most `heavy_jobs` at a time, and one import beside them.
+"""Job queue: durable rows, one process per stage, at most `heavy_jobs` at a time, plus one import.
 
-A job belongs to the server that runs it. When a server dies, the next one ends what it left running and queues its jobs
-again; finished stages are found in the workspace, so little is done twice. Servers that share a database say every few seconds
-that they live, and take up the jobs of those that do not.
+A job belongs to the server that runs it. When a server dies, the next one kills its leftover processes and queues its jobs
+again; finished stages are reused from the workspace, so little is computed twice. Servers that share a database send
+heartbeats every few seconds, and take over the jobs of those that do not.
 """
 
 import errno
@@ -35,19 +35,19 @@ from r2c2r_core.errors import EnvironmentProblem, R2C2RError
 
 _log = logging.getLogger(__name__)
 
-PREPARED, SHARED = 0.1, 0.9  # of a stage whose objects several seats compute, when that begins and ends
-AWAY_S = 5.0  # until a job is tried again whose rows or files did not answer
+PREPARED, SHARED = 0.1, 0.9  # progress of a shared stage at which the sharing begins and ends
+AWAY_S = 5.0  # before retrying a job whose database or store did not answer
 UNEXPECTED = {"kind": "internal", "message": "the queue met an unexpected error", "hint": "see the server's log, then retry"}
 
 
 class ServerStops(Exception):
-    """The job goes on with the next server."""
+    """The server stops; the job continues with the next server."""
 
 
 class Runner:
-    """Takes jobs from the table and runs them in threads that only wait for processes.
+    """Claims jobs from the table and runs them in threads that only wait for processes.
 
-    `on_done` is told of every job that did its work, by its project and kind; it raises nothing.
+    `on_done` is called for every finished job with its project and kind; it must not raise.
     """
 
     def __init__(
@@ -60,16 +60,16 @@ class Runner:
         self._wake, self._stopping = threading.Event(), threading.Event()
         self._sharing = Sharing(rows, settings, commands, self._compute, self._stopping)
         self.on_done: Callable[[str, str], None] = lambda project, kind: None
-        self.draining, self.began = False, time.time()  # draining: it takes no further job
+        self.draining, self.began = False, time.time()  # draining: no further jobs are claimed
         self._at: dict[int, tuple[str, Path | None]] = {}  # project and log of each job that runs here
         self._threads: list[threading.Thread] = []
         self._workers: dict[int, Worker] = {}
         self._cancelled: set[int] = set()
-        self._deaths: Counter[int] = Counter()  # of a job's processes, since it last got further
+        self._deaths: Counter[int] = Counter()  # of a job's processes, since its last progress
         self._lock = threading.Lock()
 
     def start(self) -> None:
-        """Take up what an earlier server left, and begin; raises EnvironmentProblem beside seats of another version."""
+        """Recover an earlier server's jobs, and start; raises EnvironmentProblem beside seats of another version."""
         if self.rows.shared:
             self._seat.join()
         self.rows.recover()
@@ -85,7 +85,7 @@ class Runner:
             self._threads[-1].start()
 
     def stop(self) -> None:
-        """End the running workers; their jobs wait in the queue for the next start."""
+        """Stop the running workers; their jobs stay in the queue for the next start."""
         self._stopping.set()
         self._wake.set()
         for thread in self._threads:
@@ -95,22 +95,22 @@ class Runner:
 
     @property
     def busy(self) -> int:
-        """Jobs that run here."""
+        """Number of jobs running here."""
         with self._lock:
             return len(self._workers)
 
     @property
     def projects(self) -> frozenset[str]:
-        """Projects of the jobs, and of parts of others' jobs, that run here."""
+        """Projects of jobs, and of parts of other seats' jobs, running here."""
         return self._sharing.projects.union(project_id for project_id, _ in tuple(self._at.values()))
 
     def queued(self, job_id: int) -> None:
-        """A job waits: show it, and look whether it can begin."""
+        """Publish a newly queued job, and check whether it can start."""
         self._wake.set()
         self.rows.tell(job_id)
 
     def cancel(self, job_id: int) -> None:
-        """Ask a job to stop; done at once when it only waits."""
+        """Request cancellation of a job; immediate if it is waiting."""
         with self._lock:
             if self.rows.cancel(job_id):
                 self._cancelled.add(job_id)
@@ -118,7 +118,7 @@ class Runner:
                     self._workers[job_id].ask_to_stop()
 
     def wait_until_idle(self, project_id: str, timeout_s: float) -> bool:
-        """Whether no process works for the project any more."""
+        """Wait until no process is running for the project; returns whether that was reached."""
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
             if not self.rows.busy(project_id):
@@ -127,8 +127,8 @@ class Runner:
         return False
 
     def _loop(self, imports_only: bool) -> None:
-        unfinished: int | None = None  # a job whose end could not be written: a full disk, say
-        away: Unavailable | None = None  # why it has no end yet: what it needs is not there now
+        unfinished: int | None = None  # a job whose end could not be stored, e.g. on a full disk
+        away: Unavailable | None = None  # why its end is pending: a resource is unavailable
         while not self._stopping.is_set():
             job_id = unfinished
             try:
@@ -149,21 +149,21 @@ class Runner:
                 with self._tracer.start_as_current_span("job", attributes={"job": job_id, "seat": self.rows.owner}):
                     self._run(job_id)
                 JOB.set(None)
-            except NotFound as error:  # deleted with its project, or taken up by another server
+            except NotFound as error:  # deleted with its project, or taken over by another server
                 _log.warning("job %s: %s", job_id, error)
                 self._forget(job_id or 0)
                 unfinished = None
-            except Unavailable as error:  # rows or files
+            except Unavailable as error:  # database or store
                 _log.warning("job %s: %s", job_id, error)
                 unfinished, away = job_id, error
                 self._stopping.wait(AWAY_S)
-            except Exception:  # the edge of a job: whatever it was, the queue goes on
+            except Exception:  # the edge of a job: the queue continues after any error
                 _log.exception("job %s", job_id)
                 unfinished, away = job_id, None
                 self._stopping.wait(1.0)
 
     def _beat(self) -> None:
-        """Live for the other servers, and hear of them."""
+        """Send heartbeats, and check those of other servers."""
         while not self._stopping.wait(self.settings.beat_s):
             try:
                 with self._lock:
@@ -176,18 +176,18 @@ class Runner:
                 for project_id, log in tuple(self._at.values()):
                     if log is not None:
                         self._files.keep_log(project_id, log)
-            except R2C2RError as error:  # the database is away: there is nothing else to do than to try again
+            except R2C2RError as error:  # the database is unavailable: try again
                 _log.warning("sign of life: %s", error)
 
     def _stop(self, job_id: int, worker: Worker) -> None:
-        """Stop the job if it is still this worker that runs it: what was queued again meanwhile goes on."""
+        """Stop the job if it is still run by this worker, and was not queued again."""
         with self._lock:
             if self._workers.get(job_id) is worker:
                 self._cancelled.add(job_id)
                 worker.ask_to_stop()
 
     def _has_memory(self) -> bool:
-        """Whether a job may start now; the one that is next says why it waits."""
+        """Whether enough memory is free to start a job; if not, the next job reports why it waits."""
         free, needed = psutil.virtual_memory().available, self._compute.memory_bytes
         if free < needed:
             self.rows.next_waits(f"waits for memory: {free / 1e9:.1f} GB free, {needed / 1e9:.1f} GB needed")
@@ -234,7 +234,7 @@ class Runner:
     def _run_stage(
         self, job_id: int, project_id: str, step: Step, progress: JobProgress, log: Path, holder: str
     ) -> dict[str, Any] | None:
-        """Run a step, with other seats where that is sooner; None when it did its work, else why not."""
+        """Run a step, with other seats if that is faster; None on success, else the failure."""
         began, failure, complete = time.monotonic(), None, False
         if self._sharing.is_worthwhile(step, step.objects):
             failure, complete = self._share(job_id, project_id, step, progress, log, holder)
@@ -246,7 +246,7 @@ class Runner:
     def _share(
         self, job_id: int, project_id: str, step: Step, progress: JobProgress, log: Path, holder: str
     ) -> tuple[dict[str, Any] | None, bool]:
-        """Have the step's objects computed at all seats that are free: why that ends it, if it does; whether all are done."""
+        """Compute the step's objects at all free seats: a failure that ends it, or None, and whether all are done."""
         progress.span = (0.0, PREPARED)
         failure, last = self._run_step(job_id, project_id, step.of(()), progress, log)
         left = last.get("left", ())
@@ -276,7 +276,7 @@ class Runner:
     def _run_step(
         self, job_id: int, project_id: str, step: Step, progress: JobProgress, log: Path
     ) -> tuple[dict[str, Any] | None, Line]:
-        """Run one process; None when it did its work, else why not, and its last word."""
+        """Run one process; None on success, else the failure, and its last message."""
         worker = self._compute.start(job_id, project_id, step, log)
         with self._lock:
             self._workers[job_id] = worker
@@ -315,15 +315,15 @@ class Runner:
     def _store(self, job_id: int, step: Step, progress: JobProgress, words: str | None) -> None:
         try:
             self.rows.progressed(job_id, step.stage, progress.fraction, words, progress.overall, progress.eta_s)
-        except NotFound:  # it was deleted: there is nobody to work for
+        except NotFound:  # the job was deleted
             self._cancelled.add(job_id)
-        except R2C2RError as error:  # the work goes on also when nobody can be told how far it is
+        except R2C2RError as error:  # the work continues even if its progress cannot be stored
             _log.warning("job %s: %s", job_id, error)
 
     def _failed(self, job_id: int, failure: dict[str, Any]) -> None:
-        """Try again when its process vanished, unless that happened too often at the same place."""
+        """Retry the job if its process vanished, unless that happened too often at the same stage."""
         if failure["kind"] == VANISHED and not self._was_cancelled(job_id):
-            self._deaths[job_id] += 1  # a server that vanished is none of them
+            self._deaths[job_id] += 1  # a vanished server does not count
             if self._deaths[job_id] < self.settings.job_attempts:
                 self.rows.queue_again(job_id, failure["message"])
                 self._wake.set()
@@ -343,7 +343,7 @@ class Runner:
 
 
 def _said(error: R2C2RError | OSError) -> R2C2RError:
-    """The error in one line with the next step."""
+    """The error as one line with the next step."""
     if isinstance(error, R2C2RError):
         return error
     if error.errno in (errno.ENOSPC, errno.EDQUOT):

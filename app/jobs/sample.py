@@ -13,11 +13,11 @@ from r2c2r_core.limits import limit_this_process
 from r2c2r_core.progress import Progress
 from r2c2r_core.workspace import write_atomically
 
-PICTURE_WIDTH = 480  # pixels, of the picture that is shown meanwhile
+PICTURE_WIDTH = 480  # pixels, of the progress picture
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Write the recording unless it is there already."""
+    """Write the recording unless it exists."""
     parser = argparse.ArgumentParser(prog="app.jobs.sample", description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seed", type=int, default=0)
@@ -47,7 +47,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def write_picture(path: Path, rgb: Image) -> None:
-    """Write a frame as a small JPEG, at once or not at all."""
+    """Write a frame as a small JPEG, atomically."""
     height = round(rgb.shape[0] * PICTURE_WIDTH / rgb.shape[1])
     small = cv2.resize(rgb, (PICTURE_WIDTH, height), interpolation=cv2.INTER_AREA)
     write_atomically(path, cv2.imencode(".jpg", cv2.cvtColor(small, cv2.COLOR_RGB2BGR))[1].tobytes())

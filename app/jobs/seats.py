@@ -1,4 +1,4 @@
-"""The processes that take jobs from one database: servers, and `r2c2r work` on machines that serve nothing."""
+"""Seats: processes that take jobs from one database, i.e. servers, and `r2c2r work` on compute-only machines."""
 
 import hashlib
 import sys
@@ -17,13 +17,13 @@ from r2c2r_core.errors import EnvironmentProblem
 
 
 class OwnSeat:
-    """One's own among them, known by the owner of its jobs."""
+    """The seat of this process, identified by the owner name of its jobs."""
 
     def __init__(self, engine: Engine, owner: str, settings: Settings) -> None:
         self._engine, self._owner, self._settings = engine, owner, settings
 
     def join(self) -> None:
-        """Be one of them; raises EnvironmentProblem where another is of another version: both would call a stage by one key."""
+        """Register the seat; raises EnvironmentProblem beside seats of another version, whose results would share keys."""
         with writing(self._engine) as session:
             session.exec(delete(Seat).where(col(Seat.seen) < now(session) - self._settings.beats_missed_s))
             for other in session.exec(select(Seat).where(Seat.version != version())):
@@ -34,16 +34,16 @@ class OwnSeat:
             self._add(session)
 
     def beat(self) -> bool:
-        """Say that it lives; whether it is to take no further job."""
+        """Send a heartbeat; returns whether the seat is draining."""
         with writing(self._engine, lasting=False) as session:
             lives = update(Seat).where(col(Seat.owner) == self._owner).values(seen=now(session))
             draining = session.execute(lives.returning(col(Seat.draining))).scalar()
-            if draining is None:  # it was silent for so long that others took it for gone
+            if draining is None:  # it was silent for so long that others removed it
                 self._add(session)
         return bool(draining)
 
     def leave(self) -> None:
-        """Be none of them any more."""
+        """Remove the seat."""
         with writing(self._engine) as session:
             session.exec(delete(Seat).where(col(Seat.owner) == self._owner))
 
@@ -53,7 +53,7 @@ class OwnSeat:
 
 
 def living(engine: Engine, settings: Settings) -> list[Seat]:
-    """All that said of late that they live, the oldest first."""
+    """All seats with a recent heartbeat, oldest first."""
     with reading(engine) as session:
         since = now(session) - settings.beats_missed_s
         return list(session.exec(select(Seat).where(col(Seat.seen) >= since).order_by(col(Seat.id))))
@@ -61,7 +61,7 @@ def living(engine: Engine, settings: Settings) -> list[Seat]:
 
 @cache
 def version() -> str:
-    """The version, a digest of the code that computes and Python's: what differs in none of them computes the same."""
+    """Version, digest of the computing code and Python version; seats with equal values compute the same results."""
     digest = hashlib.sha256()
     for package in (r2c2r_core, app):
         root = Path(package.__file__ or "").parent

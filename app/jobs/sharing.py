@@ -1,9 +1,9 @@
-"""The objects of a stage at all seats that have no job of their own: whose job it is offers them, the others help.
+"""Distribution of a stage's objects to idle seats: the job's owner offers them, the others help.
 
-A stage is shared in three: its own process makes what the objects share and says which are left to compute; these are the
-parts, computed wherever there is room; then, where some could not be, the stage is run as everywhere, finds what the parts
-stored, computes what they did not, and says what fails. So a part that goes wrong costs time, and nothing else; and the first
-stage that does not go by objects finds, or computes, all that it needs.
+A shared stage has three phases: its own process computes the shared inputs and reports the remaining objects; these are the
+parts, computed at any free seat; if some of them failed, the stage is then run as usual, reuses the stored parts, computes
+the rest, and reports failures. So a failing part costs only time, and the next stage that is not per object finds, or
+computes, all its inputs.
 """
 
 import contextlib
@@ -28,53 +28,53 @@ from r2c2r_core.pool import usual_workers
 
 _log = logging.getLogger(__name__)
 
-FEWEST = 2  # objects to share
+FEWEST = 2  # minimum number of objects to share
 LOOK_S = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SharedStage:
-    """A stage of a job that runs here, and what becomes of it."""
+    """A shared stage of a job that runs here, with its callbacks."""
 
     job_id: int
     project_id: str
     step: Step
-    holder: str  # as the store has it
+    holder: str  # as in the store
     log: Path
     progress: JobProgress
-    store: Callable[[str | None], None]  # the progress, with words where there are new ones
+    store: Callable[[str | None], None]  # stores the progress, with a new message if there is one
     stop: Callable[[], bool]
 
 
 class Sharing:
-    """What one process that runs jobs shares with others; `stopping` ends it."""
+    """Sharing of objects between this process and others; `stopping` ends it."""
 
     def __init__(self, rows: JobRows, settings: Settings, commands: Commands, compute: Seat, stopping: threading.Event) -> None:
         self._rows, self._settings, self._commands, self._compute = rows, settings, commands, compute
         self._parts = PartRows(rows.engine, rows.owner, settings)
         self._stopping = stopping
-        self._here: dict[int, str] = {}  # projects of the parts that are computed here, by the first of each claim
+        self._here: dict[int, str] = {}  # projects of the parts computed here, by the first part of each claim
         self._several = rows.shared or settings.heavy_jobs > 1
 
     @property
     def projects(self) -> frozenset[str]:
-        """Projects of the parts that are computed here."""
+        """Projects of the parts computed here."""
         return frozenset(self._here.copy().values())
 
     def is_worthwhile(self, step: Step, objects: int) -> bool:
-        """Whether seats have nothing else to do, and so many objects of the step are computed sooner with them."""
+        """Whether there are idle seats, and sharing so many objects of the step saves time."""
         spare = self._parts.spare() if self._several and objects >= FEWEST else 0
         return spare > 0 and objects * step.object_s * spare / (spare + 1) > self._settings.sharing_costs_s
 
     def help(self) -> bool:
-        """Compute some objects of another seat's job; False where none waits."""
+        """Compute some objects of another seat's job; False if none are waiting."""
         claimed = self._parts.claim(self._side_by_side) if self._several else None
         if claimed is None:
             return False
         JOB.set(claimed.job_id)
         try:
             self._compute_part(claimed, self._stopping.is_set, lambda: None)
-        except (R2C2RError, OSError) as error:  # of this seat: whose job it is does without it
+        except (R2C2RError, OSError) as error:  # this seat's own failure: the job continues without it
             _log.warning("%s of job %s: %s", claimed.stage, claimed.job_id, error)
             self._stopping.wait(1.0)
         finally:
@@ -82,8 +82,8 @@ class Sharing:
         return True
 
     def share(self, shared: SharedStage, names: Collection[str]) -> bool:
-        """Have the objects computed, here and where there is room, and their files here; whether that did the whole stage."""
-        self._compute.ended(shared.project_id)  # what they share
+        """Compute the objects here and at free seats, and fetch their files; returns whether that completed the stage."""
+        self._compute.ended(shared.project_id)  # the shared inputs
         self._rows.store.keep(shared.project_id)
         step = shared.step
         at_least = max(1, math.ceil(self._settings.sharing_costs_s / step.object_s))
@@ -107,12 +107,12 @@ class Sharing:
         return counted["done"] == len(names)
 
     def end(self, project_id: str) -> None:
-        """See that nobody computes parts of the project any more, of this job or of one whose owner is gone."""
+        """Wait until no parts of the project are being computed, for this job or one whose owner is gone."""
         while self._several and not self._parts.end(project_id) and not self._stopping.wait(LOOK_S):
             pass
 
     def _compute_part(self, claimed: Claimed, stop: Callable[[], bool], tell: Callable[[], None]) -> None:
-        """One process, from fetching what it reads to keeping what it made."""
+        """Run one process, from fetching its inputs to storing its results."""
         with self._at_it(claimed) as unwanted, tempfile.TemporaryDirectory(prefix="r2c2r-part-") as scratch:
             self._compute.ready(claimed.project_id, claimed.holder, taken=True)
             step, files = self._rows.step_of(claimed.job_id, claimed.stage, self._commands)
@@ -133,16 +133,16 @@ class Sharing:
             self._compute.ended(claimed.project_id)
             self._rows.store.keep(claimed.project_id)
             said = log.read_text(errors="replace")
-            if "done" in last or ("error" in last and not stop()):  # what fails is for the stage to say
+            if "done" in last or ("error" in last and not stop()):  # the stage reports failures
                 self._parts.done(claimed, said, failed="error" in last or bool(last["failures"]))
             else:
                 self._parts.give_back(claimed, said, tried=not stop())
 
     @contextlib.contextmanager
     def _at_it(self, claimed: Claimed) -> Iterator[threading.Event]:
-        """Says all the time that they are computed here; the event is set when they are not wanted of this process any more.
+        """Context that sends heartbeats for the parts; the event is set when they are no longer wanted from this process.
 
-        Where that ends in an error, others compute them.
+        On an error, the parts are released for others.
         """
         unwanted, ended = threading.Event(), threading.Event()
 
@@ -151,7 +151,7 @@ class Sharing:
                 try:
                     if not self._parts.beat(claimed):
                         unwanted.set()
-                except R2C2RError as error:  # the database is away: there is nothing else to do than to try again
+                except R2C2RError as error:  # the database is unavailable: try again
                     _log.warning("sign of life of a part: %s", error)
 
         beating = threading.Thread(target=beat, name=f"jobs-part-{claimed.ids[0]}", daemon=True)
@@ -169,7 +169,7 @@ class Sharing:
             del self._here[claimed.ids[0]]
 
     def _tell(self, shared: SharedStage) -> None:
-        """How many of the objects are done, and what was logged with them, in the job's log."""
+        """Update the job's progress and log from the parts."""
         if not shared.progress.is_due(STORE_EVERY_S):
             return
         self._write_down(shared)

@@ -1,4 +1,4 @@
-"""One process of a job, from its first word to its last, and how far the job is with it."""
+"""Execution of one process of a job, and the job's progress."""
 
 import queue
 import signal
@@ -14,32 +14,32 @@ from r2c2r_core.limits import HOURS_VARIABLE
 POLL_S = 0.15
 STORE_EVERY_S = 0.5
 HEARTBEAT_S = 2.0
-SHORTEST_S = 0.1  # a step is a process: none takes less to start
+SHORTEST_S = 0.1  # a step is a process, which takes at least this long to start
 
 
 @dataclass(slots=True)
 class JobProgress:
-    """How far a job is, and when that was last stored."""
+    """Progress of a job, and when it was last stored."""
 
     steps: list[Step]
     began: float = field(default_factory=time.monotonic)
     at_step: int = 0
     fraction: float = 0.0  # of the step
-    span: tuple[float, float] = (0.0, 1.0)  # of the step, that the process at hand does
+    span: tuple[float, float] = (0.0, 1.0)  # part of the step done by the current process
     stored: float = 0.0
 
     @property
     def overall(self) -> float:
-        """Share of all steps that is done."""
+        """Completed fraction of all steps."""
         weights, _ = self._weights
         return (sum(weights[: self.at_step]) + weights[self.at_step] * self.fraction) / sum(weights)
 
     @property
     def eta_s(self) -> float | None:
-        """Seconds left: what the rest took before in this project, or more if this job is slower; None while nothing tells.
+        """Estimated seconds left, from earlier durations in this project, or more if this job is slower; None if unknown.
 
-        A job that finds most of its work done gets through the first steps at once: its own pace alone would promise a rest
-        as fast, and the time left would rise.
+        A job that reuses most results passes the first steps at once: its own pace alone would underestimate the rest, and
+        the estimate would rise.
         """
         weights, measured = self._weights
         elapsed, overall = time.monotonic() - self.began, self.overall
@@ -50,22 +50,22 @@ class JobProgress:
 
     @property
     def _weights(self) -> tuple[list[float], bool]:
-        """Of all steps, and whether they are seconds that these took before."""
+        """Weights of all steps, and whether they are measured seconds."""
         took = [max(step.took_s, SHORTEST_S) for step in self.steps if step.took_s is not None]
         measured = len(took) == len(self.steps)
         return took if measured else [step.weight for step in self.steps], measured
 
     def at(self, step: int) -> None:
-        """The next step begins, and that is stored."""
+        """Begin a step, and count it as stored."""
         self.at_step, self.fraction, self.span, self.stored = step, 0.0, (0.0, 1.0), time.monotonic()
 
     def reached(self, fraction: float) -> None:
-        """How far the process at hand is with its part of the step."""
+        """Update the current process's fraction of its part of the step."""
         low, high = self.span
         self.fraction = low + (high - low) * fraction
 
     def is_due(self, every_s: float) -> bool:
-        """Whether it is time to store it again; then it counts as stored."""
+        """Whether it is time to store the progress; if so, it counts as stored."""
         now = time.monotonic()
         if now - self.stored <= every_s:
             return False
@@ -82,7 +82,7 @@ def listen(
     silent: Callable[[], None],
     grace_s: float,
 ) -> Line:
-    """Follow a worker to its last word, empty when it has none; once `stop` says so it is asked to stop, then made to."""
+    """Follow a worker to its last message, or {}; once `stop` returns True, it is terminated, then killed."""
     asked: float | None = None
     while True:
         now = time.monotonic()
@@ -105,12 +105,12 @@ def listen(
 
 
 def outcome(last: Line, status: int, stage: str) -> dict[str, Any] | None:
-    """None for a process that did its work, else why it did not, from its last word and its exit status."""
+    """Failure of a process from its last message and exit status; None on success."""
     if "error" in last:
         return dict(last["error"])
-    if "done" in last:  # what it made is stored: how it left does not matter any more
+    if "done" in last:  # its results are stored, so its exit status does not matter
         return None
-    if status == -signal.SIGXCPU:  # met again if it is tried again
+    if status == -signal.SIGXCPU:  # a retry would reach the limit again
         hint = f"give a smaller recording, or allow more with {HOURS_VARIABLE}"
         return {"kind": "EnvironmentProblem", "message": f"{stage}: it took all the processor time it may use", "hint": hint}
     reason = f"signal {-status}" if status < 0 else f"exit status {status}"
