@@ -1,4 +1,4 @@
-"""What a supervisor or a load balancer asks without a session, and what Prometheus reads as an admin."""
+"""Health checks for supervisors and load balancers without a session, and metrics for Prometheus as an admin."""
 
 from fastapi import APIRouter
 from fastapi.responses import Response
@@ -25,5 +25,5 @@ def ready(context: OpenCtx) -> dict[str, str]:
 
 @router.get("/metrics")
 def read_metrics(context: Ctx) -> Response:
-    """What Prometheus reads: requests, stages, the queue, seats, bytes; 403 but for an admin, or a token made for it."""
+    """Metrics for Prometheus: requests, stages, the queue, seats, bytes; 403 but for an admin, or a token made for it."""
     return Response(metrics.exposed(context), media_type=CONTENT_TYPE)

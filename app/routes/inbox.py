@@ -11,7 +11,7 @@ router = APIRouter(prefix="/api", tags=["people"])
 
 @router.get("/inbox", operation_id="getInbox")
 def get_inbox(context: Ctx) -> schemas.Inbox:
-    """What waits for you: projects sent back, projects assigned, open comments that name you."""
+    """Your inbox: projects sent back, projects assigned, open comments that name you."""
     return inbox.inbox(context)
 
 
@@ -29,7 +29,7 @@ def assign_project(context: Ctx, project: str, body: schemas.AssigneeIn) -> sche
 
 @router.get("/projects/{project}/news", operation_id="getNews")
 def get_news(context: Ctx, project: str) -> schemas.News:
-    """What others did since you last were here."""
+    """Changes by others since your last visit."""
     return news.news(context, project)
 
 

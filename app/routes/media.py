@@ -154,7 +154,7 @@ def download_object(context: Ctx, project: str, version: RowId, object_name: str
 def bundle_picture(
     context: Ctx, request: Request, project: str, version: RowId, folder: Literal["gripper", "arm"], picture: PictureName
 ) -> Response:
-    """What a robot did at a joint, or where an arm stands."""
+    """A picture of a robot's trial at a joint, or of an arm's positions."""
     kind = "image/svg+xml" if picture.endswith(".svg") else "image/jpeg"
     answer = send(request, bundles.picture(context, project, version, f"{folder}/{picture}"), kind, immutable=True)
     answer.headers["content-security-policy"] = "sandbox; default-src 'none'; style-src 'unsafe-inline'"
@@ -177,7 +177,7 @@ def variants_wall(context: Ctx, request: Request, project: str, variants_name: s
 def report_picture(
     context: Ctx, request: Request, project: str, folder: Literal["pictures", "gripper", "arm"], picture: PictureName
 ) -> Response:
-    """What the newest bundle's report shows."""
+    """A picture of the newest bundle's report."""
     kind = "image/svg+xml" if picture.endswith(".svg") else "image/jpeg"
     answer = send(request, bundles.member(context, project, f"{folder}/{picture}"), kind, immutable=False)
     answer.headers["content-security-policy"] = "sandbox; default-src 'none'; style-src 'unsafe-inline'"

@@ -11,7 +11,7 @@ router = APIRouter(prefix="/api/projects/{project}/proposals", tags=["proposals"
 
 @router.get("", operation_id="getProposals")
 def get_proposals(context: Ctx, project: str) -> schemas.Proposals:
-    """What is proposed now, surest first."""
+    """The current proposals, most confident first."""
     return proposals.current(context, project)
 
 

@@ -50,7 +50,7 @@ async def upload_candidate(
 
 @router.post("/objects/{object}/mesh-look", operation_id="lookAtMesh", max_body_size=STREAMED)
 async def look_at_mesh(context: ReviewerCtx, request: Request, project: str, object: RowId, filename: str) -> schemas.MeshLook:
-    """What a mesh (the request's body: GLB, OBJ, PLY or STL) would be used as; nothing of it is kept."""
+    """Preview of a mesh (the request's body: GLB, OBJ, PLY or STL) as a candidate; nothing is stored."""
     return await mesh_uploads.look(context, project, object, filename, request.stream())
 
 
@@ -68,7 +68,7 @@ def give_verdict(context: ReviewerCtx, project: str, object: RowId, body: schema
 
 @router.get("/objects/{object}/override", operation_id="getOverride")
 def get_override(context: Ctx, project: str, object: RowId) -> schemas.OverrideData:
-    """What was corrected about the object."""
+    """The corrections of the object."""
     return reviews.get_override(context, project, object)
 
 

@@ -36,11 +36,11 @@ def check_bundle(context: Ctx, project: str, version: RowId) -> schemas.BundleCh
 
 @router.get("/bundles/{version}/inside", operation_id="bundleInside")
 def bundle_inside_of(context: Ctx, project: str, version: RowId) -> schemas.BundleInside:
-    """What a bundle holds for robots: its objects alone, what robots did in it, each simulator's lines."""
+    """A bundle's content for robots: its single objects, robot trials, loading code for each simulator."""
     return bundle_inside.inside(context, project, version)
 
 
 @router.get("/bundles/{version}/changes", operation_id="compareBundles")
 def compare_bundles(context: Ctx, project: str, version: RowId, since: OtherId) -> list[schemas.BundleChange]:
-    """What became different since another version."""
+    """Changes since another version."""
     return bundles.compare(context, project, since, version)

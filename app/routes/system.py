@@ -1,4 +1,4 @@
-"""What this app can do, and folders a recording may be taken from."""
+"""Capabilities of this app, and folders from which a recording may be imported."""
 
 from fastapi import APIRouter
 

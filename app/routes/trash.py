@@ -11,7 +11,7 @@ router = APIRouter(prefix="/api/trash", tags=["trash"])
 
 @router.get("", operation_id="listTrash")
 def list_trash(context: AdminCtx) -> list[schemas.Trashed]:
-    """What is in the trash, the newest first."""
+    """The projects in the trash, newest first."""
     return trash.everything(context)
 
 

@@ -1,4 +1,4 @@
-"""What lay in the data folder and no row knew of."""
+"""Files found in the data folder without a database row."""
 
 from fastapi import APIRouter
 
@@ -11,7 +11,7 @@ router = APIRouter(prefix="/api/unknown", tags=["unknown"])
 
 @router.get("", operation_id="listUnknown")
 def list_unknown(context: AdminCtx) -> list[schemas.UnknownFolder]:
-    """What was set aside because the database does not know it."""
+    """Folders set aside because they are not in the database."""
     return unknown.everything(context)
 
 

@@ -37,7 +37,7 @@ async def place_in_viewer(context: Ctx, request: Request, project: str, body: sc
 
 @router.get("/api/projects/{project}/viewer/picked", operation_id="getPicked")
 async def get_picked(context: Ctx, request: Request, project: str) -> schemas.ViewerPicked:
-    """What the last click in the 3D view was on."""
+    """The object or point of the last click in the 3D view."""
     return await context.gates.views.run(context.who, viewers.picked, context, project, request.state.session)
 
 

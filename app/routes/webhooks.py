@@ -36,5 +36,5 @@ def test_webhook(context: Ctx, webhook: RowId) -> schemas.Delivery:
 
 @router.get("/{webhook}/deliveries", operation_id="listDeliveries")
 def list_deliveries(context: Ctx, webhook: RowId) -> list[schemas.Delivery]:
-    """What was and will be posted, newest first, with what was answered."""
+    """Past and pending deliveries with their answers, newest first."""
     return webhooks.deliveries(context, webhook)

@@ -1,4 +1,4 @@
-"""What goes over the wire. Times are seconds since 1970; lengths are metres; pixels are of the stored RGB frame."""
+"""API schemas. Times are seconds since 1970; lengths are metres; pixels are of the stored RGB frame."""
 
 from app.schemas.base import ErrorBody
 from app.schemas.bundles import (

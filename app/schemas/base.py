@@ -1,4 +1,4 @@
-"""What all of them share."""
+"""Common parts of the API schemas."""
 
 from typing import Any
 

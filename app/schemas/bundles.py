@@ -52,7 +52,7 @@ class StandingPlace(Shape):
 
 
 class RobotTrial(Shape):
-    """What one robot did in a bundle."""
+    """One robot's trial in a bundle."""
 
     name: str
     joints: int
@@ -74,7 +74,7 @@ class SimulatorLines(Shape):
 
 
 class BundleInside(Shape):
-    """What a bundle holds for robots."""
+    """A bundle's content for robots."""
 
     version: int
     assets: list[ObjectAsset]
@@ -116,7 +116,7 @@ class LoaderVerdict(Shape):
 
 
 class BlockerVerdict(Shape):
-    """What keeps a joint from opening all the way: a loose thing, or the part of another joint that stands open."""
+    """An obstacle that keeps a joint from opening completely: a free object, or the part of another open joint."""
 
     name: str
     kind: str

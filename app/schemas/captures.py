@@ -15,7 +15,7 @@ class CaptureRemark(Shape):
 
 
 class CaptureMoment(Shape):
-    """What one of the frames that the doctor looked at is like."""
+    """Measures of one frame examined by the capture doctor."""
 
     frame_index: int
     sharpness: float  # over the median frame's
@@ -32,7 +32,7 @@ class CaptureFigure(Shape):
 
 
 class CaptureFacts(Shape):
-    """What the recording is: shown before any work starts. Pictures: /media/{project}/scan/plan.png and view.png."""
+    """Facts about the recording, shown before any work starts. Pictures: /media/{project}/scan/plan.png and view.png."""
 
     format: str = ""
     sha256: str = ""

@@ -33,7 +33,7 @@ class TrueObject(Shape):
 
 
 class HoneypotScore(Shape):
-    """What the person made of it."""
+    """The user's score on a honeypot."""
 
     found: int  # objects that are really there, and have one of the person's on them
     extra: int  # objects of the person on nothing of the kind

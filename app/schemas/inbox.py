@@ -44,7 +44,7 @@ class InboxMention(Shape):
 
 
 class Inbox(Shape):
-    """What waits for who asks; each project is in one of the first two lists."""
+    """The current user's inbox; each project is in one of the first two lists."""
 
     returned: list[InboxProject]  # sent back: to whom it is assigned, else to who had sent it to review
     assigned: list[InboxProject]
@@ -60,7 +60,7 @@ class PersonsChanges(Shape):
 
 
 class News(Shape):
-    """What others did to a project since you last were there, newest first."""
+    """Changes of a project by others since your last visit, newest first."""
 
     since: float | None  # None: you were never here, or have no account; there is nothing to tell then
     last: int  # the newest event there is, to say that all of it is read

@@ -55,7 +55,7 @@ class JobEvent(Shape):
 
 
 class RunRequest(Shape):
-    """Which backends, where not the defaults."""
+    """A run's backends, where not the defaults."""
 
     segmenter: Word | None = None
     generator: Word | None = None

@@ -1,4 +1,4 @@
-"""What a tab says on its connection."""
+"""Messages of a tab on its live connection."""
 
 from typing import Annotated, Literal
 

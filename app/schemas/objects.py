@@ -45,7 +45,7 @@ class Point(Shape):
 
 
 class FrameIn(Shape):
-    """What an object is in one frame: a mask that stands, or None: not visible there."""
+    """Correction of an object in one frame: a fixed mask, or None: not visible there."""
 
     mask: PromptsFileMask | None
 
@@ -67,7 +67,7 @@ class ObjectIn(Shape):
 
 
 class ObjectPatch(Shape):
-    """What changes, a drawn front, a crop box and whose turn it is also to none.
+    """Changes of an object; a drawn front, a crop box and the assignee can also be removed.
 
     With `version`, only if nobody changed it meanwhile.
     """
@@ -107,7 +107,7 @@ class SceneObject(Shape):
 
 
 class UndoRequest(Shape):
-    """What to undo or redo: the last change of this object, or of any object when None."""
+    """Target of an undo or redo: the last change of this object, or of any object when None."""
 
     object: int | None = Field(default=None, ge=0, lt=2**63)
     scope: Literal["prompts", "review"] = "prompts"
@@ -115,7 +115,7 @@ class UndoRequest(Shape):
 
 
 class Undone(Shape):
-    """What was undone or redone, so that the page can say it."""
+    """The undone or redone change, for display."""
 
     object: SceneObject
     text: str
@@ -138,7 +138,7 @@ class HistoryEntry(Shape):
 
 
 class ObjectPoints(Shape):
-    """What the masks and the depth say of an object's shape: points around their centre, +Z up."""
+    """An object's shape from masks and depth: points around their centre, +Z up."""
 
     count: int
     frames: int  # that they come from

@@ -50,7 +50,7 @@ class AccountIn(Shape):
 
 
 class AccountPatch(Shape):
-    """What changes; a new password ends the account's sessions."""
+    """Changes of an account; a new password ends the account's sessions."""
 
     role: RoleName | None = None
     password: str | None = Field(default=None, min_length=1, max_length=1000)

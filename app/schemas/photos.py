@@ -11,7 +11,7 @@ OverlayLook = Literal["ghost", "outline", "residual"]
 
 
 class Leaf(Shape):
-    """What a joint of the object moves: its front as a box, closed, and the line it turns about or goes along."""
+    """The part moved by a joint of the object: its front as a box, closed, and the line it turns about or goes along."""
 
     joint: str
     part: str  # which of the object's it is: marks are by this

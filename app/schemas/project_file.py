@@ -38,7 +38,7 @@ class ProjectFileRecording(Document):
 
 
 class ProjectFileComment(Document):
-    """What somebody said."""
+    """A comment of a user."""
 
     who: Word = Field(description="a name")
     at: _At
@@ -74,7 +74,7 @@ class ProjectFile(Document):
 
 
 class ProjectFileOffer(Shape):
-    """What the file of a project would hold."""
+    """Size of a project's export file."""
 
     size_bytes: int  # without the recording, about
     recording_bytes: int | None  # None: the recording is not kept here

@@ -14,7 +14,7 @@ from app.schemas.text import ServerPath, Title, Word
 
 
 class ProjectCounts(Shape):
-    """What is in a project."""
+    """Counts of a project's content."""
 
     objects: int = 0
     points: int = 0
@@ -63,7 +63,7 @@ class Project(ProjectSummary):
 
 
 class ProjectPatch(Shape):
-    """What changes: its name, tags, whether it is archived, or which backends do its stages."""
+    """Changes of a project: its name, tags, whether it is archived, or which backends do its stages."""
 
     name: Title | None = None
     tags: list[Word] | None = Field(default=None, max_length=20)
@@ -127,6 +127,6 @@ class Trashed(Shape):
 
 
 class Deleted(Shape):
-    """What deleting freed."""
+    """Result of deleting a project."""
 
     freed_bytes: int

@@ -25,7 +25,7 @@ class Proposal(Shape):
 
 
 class Proposals(Shape):
-    """What is proposed now: dismissed ones and those that became objects are left out."""
+    """The current proposals, without dismissed and confirmed ones."""
 
     state: Literal["none", "running", "done"]
     fraction: float
@@ -34,12 +34,12 @@ class Proposals(Shape):
 
 
 class ProposalIds(Shape):
-    """Which proposals are meant."""
+    """Selection of proposals."""
 
     ids: list[Word] = Field(min_length=1, max_length=500)
 
 
 class ProposalsConfirmed(ProposalIds):
-    """Which proposals become objects."""
+    """Proposals to be confirmed as objects."""
 
     category: Word | None = None  # of all of them; None: as proposed

@@ -80,7 +80,7 @@ class Crop(Shape):
 
 
 class Differences(Shape):
-    """What tells candidates apart.
+    """Differences between candidates.
 
     Turntables: /media/{project}/candidates/{object}/{candidate}/turns.png?against={candidate}, 24 pictures from left to right.
     """
@@ -143,7 +143,7 @@ class CandidateGroup(Shape):
 
 
 class VerdictIn(Shape):
-    """What a reviewer says. Rejecting the last one makes new candidates; accepting another one aligns it anew."""
+    """A reviewer's verdict. Rejecting the last one makes new candidates; accepting another one aligns it anew."""
 
     candidate: Word
     verdict: Literal["accepted", "rejected", "cleared"]
@@ -153,7 +153,7 @@ class VerdictIn(Shape):
 
 
 class OverrideData(Shape):
-    """What a person corrected about one object; None is computed."""
+    """Manual corrections of one object; None is computed."""
 
     candidate: str | None = None
     hinge: HingeSide | None = None

@@ -39,7 +39,7 @@ class SceneItem(Shape):
 
 
 class LeftOut(Shape):
-    """What was made from the scan and a person wants none of."""
+    """An object made from the scan that the user does not want."""
 
     object: int
     name: str

@@ -39,6 +39,6 @@ class Seats(Shape):
 
 
 class SeatIn(Shape):
-    """What is to become of a seat."""
+    """A requested change of a seat."""
 
     draining: bool

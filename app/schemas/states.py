@@ -41,7 +41,7 @@ class ReviewStep(Shape):
 
 
 class CommentPin(Shape):
-    """What a comment is about: a pixel of a frame, a point of the scene (world, metres), or neither."""
+    """Position of a comment: a pixel of a frame, a point of the scene (world, metres), or neither."""
 
     object: int | None = Field(default=None, ge=0, lt=2**63)
     frame: int | None = Field(default=None, ge=0, lt=2**31)
@@ -74,7 +74,7 @@ class CommentPatch(Shape):
 
 
 class Comment(CommentPin):
-    """What somebody said, where, and whether it is settled."""
+    """A comment with its position, and whether it is resolved."""
 
     id: int
     text: str
@@ -85,7 +85,7 @@ class Comment(CommentPin):
 
 
 class Figures(Shape):
-    """What the project cost its people so far; times in seconds."""
+    """Effort spent on the project so far; times in seconds."""
 
     objects: int
     clicks: int  # points set, moved, removed; proposals confirmed, dismissed; objects edited, deleted; undos: each is one

@@ -1,4 +1,4 @@
-"""What this app can do here, and the folders it may read."""
+"""Capabilities of this app, and the folders it may read."""
 
 from typing import Literal
 
@@ -34,7 +34,7 @@ class BundleFormat(Shape):
 
 
 class SystemInfo(Shape):
-    """What the app can do here; limits are shown before a file is chosen."""
+    """Capabilities of the app; limits are shown before a file is chosen."""
 
     version: str
     user: str

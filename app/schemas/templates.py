@@ -15,7 +15,7 @@ class ListedObject(Shape):
 
 
 class TemplateIn(Shape):
-    """What a template holds; names are unique, as in a project."""
+    """Content of a template; names are unique, as in a project."""
 
     name: Title
     objects: list[ListedObject] = Field(min_length=1, max_length=MOST_OBJECTS)
@@ -33,6 +33,6 @@ class Template(Shape):
 
 
 class ChecklistIn(Shape):
-    """Which template's objects a project is to click from now on; None: none."""
+    """The template whose objects form a project's checklist; None: none."""
 
     template: int | None = Field(ge=0, lt=2**63)

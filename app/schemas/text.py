@@ -10,7 +10,7 @@ LONGEST_FILE_NAME = 255  # bytes: what file systems take
 
 
 def readable(value: Any) -> Any:
-    """What was given; ValueError where it is text that cannot be shown (r2c2r_core/texts.py)."""
+    """The given value; ValueError for text that cannot be displayed (r2c2r_core/texts.py)."""
     found = OBEYED.search(value) if isinstance(value, str) else None
     if found is not None:
         raise ValueError(f"it holds U+{ord(found.group()):04X}, which cannot be shown; write it without")

@@ -1,4 +1,4 @@
-"""What was found in the data folder without a row."""
+"""Files found in the data folder without a database row."""
 
 from typing import Literal
 

@@ -14,7 +14,7 @@ VariantsName = Annotated[str, Path(pattern=r"^v\d+-n\d+-s\d+$", max_length=60)]
 
 
 class VariantsIn(Shape):
-    """What is wished for."""
+    """Request for variants."""
 
     version: int = Field(ge=1, lt=2**31)  # of the bundle
     count: int = Field(ge=1, le=MOST_VARIANTS)
@@ -22,7 +22,7 @@ class VariantsIn(Shape):
 
 
 class VariantsOffer(Shape):
-    """What variants of the newest bundle would take."""
+    """Estimated size of variants of the newest bundle."""
 
     version: int
     most: int  # at a time

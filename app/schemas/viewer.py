@@ -1,4 +1,4 @@
-"""What the 3D view shows."""
+"""API schemas of the 3D view."""
 
 from typing import Annotated, Literal
 
@@ -74,7 +74,7 @@ class ViewerLook(Shape):
 
 
 class ViewerShow(ViewerLook):
-    """What the 3D view shows."""
+    """The requested content of the 3D view."""
 
     object: int | None = Field(default=None, ge=0, lt=2**63)
     made: Word | None = None  # what was made from the scan, by its name there, where no object is chosen
@@ -99,7 +99,7 @@ class ViewerJoint(Shape):
 
 
 class ViewerShown(Shape):
-    """What the 3D view shows now."""
+    """The current content of the 3D view."""
 
     mode: str
     text: str
@@ -111,7 +111,7 @@ class ViewerShown(Shape):
 
 
 class ViewerPicked(Shape):
-    """What the last click in the 3D view was on."""
+    """The object or point of the last click in the 3D view."""
 
     number: int  # of the click
     name: str  # of the object, as the scene's table has it; empty where none is

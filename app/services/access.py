@@ -1,7 +1,7 @@
-"""Who may see a project: everybody who may sign in, unless its owner or an admin named its members.
+"""Read access to projects: all users, unless the owner or an admin has restricted it to members.
 
-Asked for every request and every message, so it is answered from memory; a server has its data folder to itself, and
-changes by the command line (`r2c2r user`) are noticed within a tidy.
+Checked for every request and every message, so it is cached in memory; a server has its data folder to itself, and
+changes by the command line (`r2c2r user`) are detected at the next tidying.
 """
 
 from sqlalchemy import Engine
@@ -14,14 +14,14 @@ from app.security import Person
 
 
 class Access:
-    """Projects that not everybody may see, and the names of those who may."""
+    """Cache of restricted projects and their permitted users."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
         self.look_again()
 
     def sees(self, person: Person, project_id: str | None) -> bool:
-        """Whether the person sees the project; admins see all but the trash, and what is of no project is everybody's."""
+        """Whether the user may see the project; admins see all but the trash, and everyone sees content without a project."""
         if project_id in self._trashed:
             return False
         names = self._closed.get(project_id or "")
@@ -35,11 +35,11 @@ class Access:
             return self.sees(person, session.exec(select(Job.project_id).where(Job.id == job_id)).first())
 
     def hidden(self, person: Person) -> frozenset[str]:
-        """The projects that the person may not see."""
+        """The projects that the user may not see."""
         return frozenset(project for project in self._trashed | set(self._closed) if not self.sees(person, project))
 
     def look_again(self) -> None:
-        """Members, accounts or what is in the trash changed."""
+        """Reload after changes of members, accounts or the trash."""
         with reading(self._engine) as session:
             closed = session.exec(select(Project).where(col(Project.members_only).is_(True))).all()
             self._trashed = frozenset(session.exec(select(Project.id).where(col(Project.trashed).is_not(None))))

@@ -1,4 +1,4 @@
-"""Named accounts: who may sign in, as what, with which password. Each change is in the record, with who made it."""
+"""Named accounts with roles and passwords. Each change is recorded in the audit log with its author."""
 
 import re
 import time
@@ -16,11 +16,11 @@ from app.services import audit, passwords
 from r2c2r_core.errors import InputError
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9._@+-]{0,59}")
-NO_PASSWORD = ""  # of who is let in by others' word
+NO_PASSWORD = ""  # of accounts authenticated by a proxy or provider
 
 
 def add(engine: Engine, name: str, role: str, password: str, *, by: str = audit.COMMAND_LINE) -> None:
-    """A new account; raises Conflict when the name is taken."""
+    """Add an account; raises Conflict when the name is taken."""
     name = _checked(name)
     passwords.refuse_weak(name, password)
     account = Account(name=name, role=known_role(role), password=_hashed(password), created=time.time())
@@ -32,7 +32,7 @@ def add(engine: Engine, name: str, role: str, password: str, *, by: str = audit.
 
 
 def seen(session: Session, name: str, role: str, *, by: str) -> Account:
-    """The account of that name; at first sight a new one that no password opens. Raises InputError."""
+    """The account of that name, created without a password on first use. Raises InputError."""
     name = _checked(name)
     found = session.exec(select(Account).where(Account.name == name)).first()
     if found is not None:
@@ -45,9 +45,9 @@ def seen(session: Session, name: str, role: str, *, by: str) -> Account:
 
 
 def of_subject(session: Session, subject: str, name: str, role: str | None, default: str, *, by: str) -> Account:
-    """Whom an OpenID provider means, with the role it gives, if it gives any; at first sight a new account of that name.
+    """The account of an OpenID subject, with the provider's role, if any; created on first use.
 
-    Raises Conflict for a name that is somebody else's: who may choose names at the provider becomes nobody by it.
+    Raises Conflict for another account's name, so that choosing a name at the provider gives no access to it.
     """
     found = session.exec(select(Account).where(Account.subject == subject)).first()
     if found is None:
@@ -70,7 +70,7 @@ def everyone(engine: Engine) -> list[Person]:
 
 
 def remove(engine: Engine, name: str, *, by: str = audit.COMMAND_LINE) -> None:
-    """Delete the account and end its sessions; what the person did keeps the name. Raises Conflict for the last admin."""
+    """Delete the account and end its sessions; the history keeps the name. Raises Conflict for the last admin."""
     with writing(engine) as session:
         account = row(session, name)
         _refuse_last_admin(session, account)
@@ -82,7 +82,7 @@ def remove(engine: Engine, name: str, *, by: str = audit.COMMAND_LINE) -> None:
 def change(
     engine: Engine, name: str, *, role: str | None = None, password: str | None = None, by: str = audit.COMMAND_LINE
 ) -> None:
-    """Another role, from now on; another password, which ends the account's sessions. Both or neither.
+    """Change role and password, the latter ending the account's sessions, both or neither.
 
     Raises Conflict for the role of the last admin.
     """
@@ -104,9 +104,9 @@ def change(
 
 
 def verified(engine: Engine, name: str, password: str) -> Account | None:
-    """The account, when the password is its own; an unknown name takes as long as a wrong password.
+    """The account if the password is correct; an unknown name takes as long as a wrong password.
 
-    It takes 64 MiB and a third of a second of processor time: call it behind the gate of passwords.
+    It takes 64 MiB and a third of a second of processor time: call it behind the password gate.
     """
     from argon2.exceptions import InvalidHashError, VerificationError
 
@@ -121,7 +121,7 @@ def verified(engine: Engine, name: str, password: str) -> Account | None:
 
 
 def person(account: Account) -> Person:
-    """The person behind an account."""
+    """The Person of an account."""
     role: Any = account.role  # the column holds no other
     return Person(account.name, role, account=True)
 
@@ -135,7 +135,7 @@ def row(session: Session, name: str) -> Account:
 
 
 def _refuse_last_admin(session: Session, account: Account) -> None:
-    """Somebody may always let people in; asked in the transaction of the change, so that two at once do not both pass."""
+    """Raise Conflict for the last admin, checked in the transaction of the change, so that two concurrent ones cannot pass."""
     admins = session.exec(select(Account.name).where(Account.role == "admin")).all()
     if admins == [account.name]:
         raise Conflict(f"{account.name} is the only admin", hint="make somebody else admin first")
@@ -167,6 +167,6 @@ def _nobodys_password() -> str:
 
 @cache
 def _hasher() -> Any:
-    from argon2 import PasswordHasher  # only where there are accounts
+    from argon2 import PasswordHasher  # imported only if there are accounts
 
     return PasswordHasher(parallelism=1)

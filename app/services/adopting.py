@@ -1,6 +1,6 @@
-"""A project's rows made anew from what its folder says: after its database was lost, or an older one was restored.
+"""Restoring a project's rows from its folder, after the database was lost or an older one restored.
 
-Nothing that is stored is lost by it: objects are matched by name, and what changes about one that is there can be undone.
+No stored data are lost: objects are matched by name, and changes of existing ones can be undone.
 """
 
 import json
@@ -49,7 +49,7 @@ _ID = re.compile(r"[0-9a-f]{12}")
 
 
 def adopt_all(engine: Engine, data_dir: Path, who: str) -> list[str]:
-    """Adopt every project folder that the database does not know, where it is; lines that say what became of each."""
+    """Adopt every project folder that is not in the database, in place; returns a line about each."""
     said = []
     for folder in sorted(path for path in (data_dir / "projects").glob("*") if path.is_dir()):
         try:
@@ -63,7 +63,7 @@ def adopt_all(engine: Engine, data_dir: Path, who: str) -> list[str]:
 
 
 def described(folder: Path) -> Description:
-    """What a folder says it is; InputError for one that is no project's."""
+    """A folder's description; InputError if it is not a project's."""
     try:
         return read_description(folder / "project.json")
     except FileNotFoundError:
@@ -71,7 +71,7 @@ def described(folder: Path) -> Description:
 
 
 def adopt(session: Session, data_dir: Path, description: Description, who: str) -> Project:
-    """The project that the description tells of, its files already in their place; one that is stored gets what is missing."""
+    """Restore the described project, whose files are in place; an existing one is completed."""
     files = project_files(data_dir, description.id, description.project.get("work_path"))
     project = session.get(Project, description.id)
     known, now = project is not None, time.time()
@@ -79,7 +79,7 @@ def adopt(session: Session, data_dir: Path, description: Description, who: str) 
     if project is None:
         project = Project(**_fields(Project, {"status": "failed", "created": now, **row, "id": description.id, "updated": now}))
         session.add(project)
-    project.review_state = "draft"  # what was approved is closed to changes until all of it is back
+    project.review_state = "draft"  # an approved project is closed to changes, so approval is restored last
     session.flush()
     items = _adopt_objects(session, project, files, description, who, deleted_too=not known)
     about = _still_known(session, project, description) | items
@@ -102,7 +102,7 @@ def adopt(session: Session, data_dir: Path, description: Description, who: str) 
 def _adopt_objects(
     session: Session, project: Project, files: ProjectFiles, description: Description, who: str, *, deleted_too: bool
 ) -> dict[int | None, SceneObject]:
-    """The project's objects as described, by the number they had; deleted ones first, for their names may be others' since."""
+    """The project's described objects, by old number; deleted ones first, as their names may have been reused."""
     stored = select(SceneObject).where(SceneObject.project_id == project.id, col(SceneObject.deleted).is_(False))
     by_name = {item.name.casefold(): item for item in session.exec(stored)}
     deleted = [entry for entry in description.objects if entry.deleted and deleted_too]
@@ -112,7 +112,7 @@ def _adopt_objects(
         item = known or _new_object(session, project, entry)
         for scope, write in _WRITERS.items():
             changing = history.change(session, item, scope, "adopt", f"adopted {entry.name}", who=who)
-            with changing if known else nullcontext():  # an undo takes no object away that was only found again
+            with changing if known else nullcontext():  # an undo must not remove a rediscovered object
                 write(session, item, entry, files)
         session.flush()
         keys.note_object(session, item, project.segmenter, clicks_of(session, item.id), history.override_data(session, item))
@@ -127,10 +127,10 @@ def _adopt_objects(
 
 
 def _renumber_masks(files: ProjectFiles, items: dict[int | None, SceneObject]) -> None:
-    """Masks are kept by the number of their object: those of objects that got another one follow it."""
+    """Move masks, which are stored by object number, of objects with a new number."""
     moved = {str(old): str(item.id) for old, item in items.items() if old is not None and item.id != old}
     there = [old for old in moved if (files.masks / old).is_dir()]
-    for old in there:  # aside first: one's new number may be another's old one
+    for old in there:  # in two steps, as a new number may be another's old one
         (files.masks / old).rename(files.masks / f".{old}")
     for old in there:
         delete_folder(files.masks / moved[old])
@@ -159,7 +159,7 @@ _WRITERS: dict[history.Scope, Callable[[Session, SceneObject, DescribedObject, P
 
 
 def _new_object(session: Session, project: Project, entry: DescribedObject) -> SceneObject:
-    """An object, under its old number where that is free: masks are kept by it."""
+    """A new object, with its old number if it is free, as masks are stored by it."""
     free = entry.id is not None and session.get(SceneObject, entry.id) is None
     item = SceneObject(project_id=project.id, name=entry.name, category=entry.category, colour=entry.colour, deleted=True)
     item.id = entry.id if free else None
@@ -169,7 +169,7 @@ def _new_object(session: Session, project: Project, entry: DescribedObject) -> S
 
 
 def _still_known(session: Session, project: Project, description: Description) -> dict[int | None, SceneObject]:
-    """The objects that have the number and name they had, deleted ones too: what is said of them stays theirs."""
+    """Stored objects with unchanged number and name, including deleted ones, which keep their comments."""
     stored = {row.id: row for row in session.exec(select(SceneObject).where(SceneObject.project_id == project.id))}
     had = ((entry.id, entry.name) for entry in description.objects)
     return {number: stored[number] for number, name in had if number in stored and stored[number].name == name}
@@ -182,7 +182,7 @@ def _adopt_said(
     told: list[dict[str, Any]],
     items: dict[int | None, SceneObject],
 ) -> None:
-    """Rows for what somebody said at a time at which the database has nothing of theirs."""
+    """Add rows of user statements whose times are not in the database."""
     stored = {(row.who, row.at) for row in session.exec(select(table).where(table.project_id == project.id))}
     for entry in told:
         if (entry.get("who"), entry.get("at")) not in stored:
@@ -191,7 +191,7 @@ def _adopt_said(
 
 
 def _adopt_bundles(session: Session, project: Project, files: ProjectFiles, description: Description) -> None:
-    """Rows for the finished bundles that are there and have none."""
+    """Add rows for existing bundle files without one."""
     stored = set(session.exec(select(Bundle.version).where(Bundle.project_id == project.id)))
     told = {entry.get("path"): entry for entry in description.bundles}
     for kept in files.bundles.glob("v*.zip"):
@@ -203,7 +203,7 @@ def _adopt_bundles(session: Session, project: Project, files: ProjectFiles, desc
 
 
 def _adopt_people(session: Session, project: Project, description: Description) -> None:
-    """Its owner and members as far as they have accounts here: whose name nobody has is not let in."""
+    """Restore owner and members that have accounts here."""
     if description.members is None:
         return
     told = {*description.members, *filter(None, [description.owner, description.assignee])}
@@ -219,7 +219,7 @@ def _adopt_people(session: Session, project: Project, description: Description) 
 
 
 def _read_again(session: Session, project: Project, files: ProjectFiles, who: str) -> None:
-    """The recording's facts as they were read, else a job that reads it, else why the project shows none."""
+    """Restore the recording's facts, else queue a job that reads it, else store the reason."""
     if files.facts.is_file() and files.frames.is_file():
         adopt_capture(project, files)
     elif project.source_path and Path(project.source_path).exists():
@@ -231,7 +231,7 @@ def _read_again(session: Session, project: Project, files: ProjectFiles, who: st
 
 
 def _of_an_older_version(files: ProjectFiles) -> Description:
-    """What can be told of a folder without a project.json: the recording's facts, and its last run's prompts."""
+    """Description of a folder without a project.json, from the recording's facts and the last run's prompts."""
     found, sources = _json(files.facts), sorted(files.source.glob("*"))
     if not found and not sources:
         raise InputError(f"{files.root}: neither project.json nor a recording in it", hint="take out of it what you need")
@@ -266,7 +266,7 @@ def _of_prompts(entry: PromptsFileObject, colour: int, override: dict[str, Any])
 
 
 def _json(path: Path) -> dict[str, Any]:
-    """A JSON table that our own workers wrote; empty where there is none."""
+    """A JSON object written by our own workers; empty where there is none."""
     try:
         found = json.loads(path.read_text())
     except (OSError, ValueError):
@@ -275,5 +275,5 @@ def _json(path: Path) -> dict[str, Any]:
 
 
 def _fields(table: type[SQLModel], row: dict[str, Any]) -> dict[str, Any]:
-    """What of a described row this version's table has."""
+    """The fields of a described row that this version's table has."""
     return {name: value for name, value in row.items() if name in table.model_fields}

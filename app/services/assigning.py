@@ -1,4 +1,4 @@
-"""Whose turn a project or an object of it is, and who can be named in it."""
+"""Assignment of projects and objects to users, and the names available for it."""
 
 import time
 
@@ -14,14 +14,14 @@ from r2c2r_core.errors import InputError
 
 
 def names(context: Context, project_id: str) -> list[str]:
-    """Everybody with an account who sees the project, by name."""
+    """Names of all accounts that may see the project."""
     with reading(context.engine) as session:
         queries.project_row(session, project_id)
         return _names(context, session, project_id)
 
 
 def require_name(context: Context, session: Session, project_id: str, name: str) -> str:
-    """The name as accounts have it; InputError for one who does not see the project."""
+    """The account's name; InputError for a user who may not see the project."""
     if name.lower() not in _names(context, session, project_id):
         hint = "choose a name of the list, or make them a member"
         raise InputError(f"nobody called {name.lower()} sees this project", hint=hint)
@@ -29,7 +29,7 @@ def require_name(context: Context, session: Session, project_id: str, name: str)
 
 
 def assign(context: Context, project_id: str, body: schemas.AssigneeIn) -> schemas.Project:
-    """Make it somebody's turn, or nobody's; InputError for one who does not see the project."""
+    """Assign the project to a user, or to none; InputError for a user who may not see it."""
     with writing(context.engine) as session:
         row = queries.project_row(session, project_id)
         name = require_name(context, session, project_id, body.name) if body.name else None

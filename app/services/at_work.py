@@ -1,4 +1,4 @@
-"""Which uploads a request is at work on, so that no two undo each other's work."""
+"""Locks on uploads being processed, so that concurrent requests do not interfere."""
 
 import contextlib
 import threading
@@ -10,7 +10,7 @@ from app.errors import Unavailable
 
 Work = Literal["sent", "finished", "deleted"]
 
-_WAIT_FOR: dict[Work, tuple[Work, ...]] = {  # who gives up may do so while it is still being sent
+_WAIT_FOR: dict[Work, tuple[Work, ...]] = {  # an upload may be given up while it is still being sent
     "sent": ("sent", "finished", "deleted"),
     "finished": ("sent", "finished", "deleted"),
     "deleted": ("finished", "deleted"),
@@ -24,14 +24,14 @@ _SAID: dict[Work, tuple[str, str]] = {
 
 @dataclass(slots=True)
 class AtWork:
-    """Of one server; a data folder has one server at a time."""
+    """Upload locks of one server, as a data folder has one server at a time."""
 
     _under_way: dict[str, list[Work]] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @contextlib.contextmanager
     def on(self, upload_id: str, work: Work) -> Iterator[None]:
-        """Do that to the upload; raises Unavailable while something is done to it that this would undo."""
+        """Context of work on the upload; raises Unavailable during conflicting work."""
         with self._lock:
             others = self._under_way.get(upload_id, [])
             for other in _WAIT_FOR[work]:

@@ -1,4 +1,4 @@
-"""How fast passwords may be guessed: the first guesses are heard at once, then each waits longer, and nobody is locked out."""
+"""Rate limit of password attempts: the first ones are immediate, later ones delayed, and no account is locked."""
 
 import math
 import threading
@@ -10,7 +10,7 @@ from app.errors import TooMany
 
 
 class Pace(NamedTuple):
-    """A leaky bucket (the generic cell rate algorithm): so many guesses at once, then one each so many seconds."""
+    """A leaky bucket (generic cell rate algorithm): a burst of free attempts, then one per interval."""
 
     free: int
     every_s: float
@@ -21,12 +21,12 @@ PACES = {
     "client": Pace(30, 0.5),  # one address, which may be that of everybody behind a proxy
     "name": Pace(20, 2.0),  # one account, from anywhere
 }
-MOST_WAIT_S = 15.0  # that a guess is kept waiting; the right password is in after that, whatever was guessed before
+MOST_WAIT_S = 15.0  # maximum delay of an attempt, after which the correct password is accepted regardless of earlier ones
 Key = tuple[str, str, str]
 
 
 class Attempts:
-    """Guesses of the last minutes, in memory. A guess is counted before it is looked at, so that many at once are no more."""
+    """Recent attempts, in memory. An attempt is counted before it is checked, so that concurrent ones gain nothing."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -34,9 +34,9 @@ class Attempts:
         self._lock = threading.Lock()
 
     def take(self, name: str, client: str) -> float:
-        """Count a guess; the seconds it waits before it is looked at, at most MOST_WAIT_S.
+        """Count an attempt and return its delay in seconds, at most MOST_WAIT_S.
 
-        Raises TooMany where more guesses than that wait already, of this account from this address: it is not counted then.
+        Raises TooMany, without counting it, if more attempts on this account from this address are already waiting.
         """
         now = self._clock()
         with self._lock:
@@ -53,7 +53,7 @@ class Attempts:
             return min(max(waits), MOST_WAIT_S)
 
     def succeeded(self, name: str, client: str) -> None:
-        """It was no guess: who knows the password may mistype it again."""
+        """Reset after a correct password, so that its user may mistype it again."""
         with self._lock:
             pair, *others = _keys(name, client)
             self._due.pop(pair, None)
@@ -62,7 +62,7 @@ class Attempts:
                     self._due[key] -= PACES[key[0]].every_s
 
     def _wait(self, key: Key, now: float) -> float:
-        """Seconds until one more fits the pace of the key."""
+        """Seconds until another attempt fits the key's rate."""
         pace = PACES[key[0]]
         return max(self._due.get(key, now) - now - (pace.free - 1) * pace.every_s, 0.0)
 

@@ -1,4 +1,4 @@
-"""The record of who was let in, who was refused, and who changed whose account; admins read it on the page People."""
+"""Audit log of sign-ins, refusals and account changes, shown to admins on the page People."""
 
 import contextlib
 import time
@@ -12,18 +12,18 @@ from app.db.tables import Account, AuditEntry
 from r2c2r_core.errors import R2C2RError
 
 COMMAND_LINE = "the command line"  # of the machine that serves
-MOST_REFUSALS = 5000  # kept: whoever guesses for a month fills no disk
+MOST_REFUSALS = 5000  # maximum stored, so that guessing for a month fills no disk
 REFUSED: schemas.AuditAction = "refused"
 
 
 def note(session: Session, action: schemas.AuditAction, *, account: str, who: str, client: str = "", detail: str = "") -> None:
-    """One line of the record, in the transaction of what it is about; `account` is whose, `who` did it."""
+    """Add an entry in the transaction of the event; `account` is the affected one, `who` the author."""
     session.add(AuditEntry(at=time.time(), action=action, account=account, who=who, client=client, detail=detail))
 
 
 def note_refusal(engine: Engine, name: str, client: str, detail: str) -> None:
-    """A sign-in that was refused; a name that no account has is not stored, for people type passwords there."""
-    with contextlib.suppress(R2C2RError), writing(engine) as session:  # a full disk lets nobody in, and refuses as before
+    """Record a refused sign-in; an unknown name is not stored, as users type passwords there by mistake."""
+    with contextlib.suppress(R2C2RError), writing(engine) as session:  # on a full disk, refusals continue without a record
         known = session.exec(select(Account.name).where(Account.name == name.lower())).first() or ""
         note(session, REFUSED, account=known, who="", client=client, detail=detail)
         session.flush()
@@ -35,7 +35,7 @@ def note_refusal(engine: Engine, name: str, client: str, detail: str) -> None:
 
 
 def entries(engine: Engine, before: int | None, limit: int) -> schemas.AuditPage:
-    """The newest lines before one."""
+    """The newest entries before a given one."""
     with reading(engine) as session:
         query = select(AuditEntry).order_by(col(AuditEntry.id).desc()).limit(limit)
         if before is not None:

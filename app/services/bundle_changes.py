@@ -1,4 +1,4 @@
-"""What differs between two bundles, for a person: read from their manifests."""
+"""Readable differences between two bundles, from their manifests."""
 
 import math
 from typing import Any
@@ -9,7 +9,7 @@ Manifest = dict[str, Any]
 
 
 def changes(older: Manifest, newer: Manifest) -> list[schemas.BundleChange]:
-    """Objects that came, went or became something else, in the newer one's order."""
+    """Added, removed and changed objects, in the newer bundle's order."""
     before, after = _by_name(older), _by_name(newer)
     found = [schemas.BundleChange(object=name, text="taken out") for name in before if name not in after]
     for name, entry in after.items():

@@ -1,4 +1,4 @@
-"""What a bundle holds for robots: each object alone, what robots did in it, and how it is taken into a simulator."""
+"""A bundle's content for robots: single objects, robot trials, and loading code for simulators."""
 
 import io
 import json
@@ -18,7 +18,7 @@ from r2c2r_core.robot.arm_certificate import MAP
 
 
 def inside(context: Context, project_id: str, version: int) -> schemas.BundleInside:
-    """Of one version."""
+    """Robot content of one version."""
     bundle = file(context, project_id, version).path
     said = manifest(bundle)
     with zipfile.ZipFile(bundle) as archive:
@@ -39,7 +39,7 @@ def inside(context: Context, project_id: str, version: int) -> schemas.BundleIns
 
 
 def object_alone(context: Context, project_id: str, version: int, name: str) -> BundleFile:
-    """A zip with one object's assets and meshes, made once."""
+    """A zip with one object's assets and meshes, created once."""
     whole = file(context, project_id, version)
     if name not in {entry["name"] for entry in manifest(whole.path).get("objects", [])}:
         raise NotFound(f"the bundle has no object {name[:60]!r}", hint="see its list of objects")
@@ -47,7 +47,7 @@ def object_alone(context: Context, project_id: str, version: int, name: str) -> 
 
 
 def _only(bundle: Path, name: str) -> bytes:
-    """The object's files, in the folders in which they find each other."""
+    """Zip of the object's files, with relative paths preserved."""
     made = io.BytesIO()
     with zipfile.ZipFile(bundle) as archive, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as out:
         top = root_of(archive)
@@ -65,7 +65,7 @@ def _asset(entry: dict[str, Any], names: list[str], at: str) -> schemas.ObjectAs
 
 
 def _trial(name: str, folder: str, said: dict[str, Any] | None, at: str) -> schemas.RobotTrial | None:
-    """None where it was not tried."""
+    """A robot's trial; None where it was not tried."""
     if not said or not said.get("grips"):
         return None
     keys = ("kind", "name", "method", "passed", "grip_n", "opened", "why")

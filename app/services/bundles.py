@@ -56,7 +56,7 @@ def file(context: Context, project_id: str, version: int) -> BundleFile:
 
 
 def part(context: Context, project_id: str, version: int, formats: frozenset[str]) -> BundleFile:
-    """A bundle with some formats only, made once, so that a download of it can go on where it stopped."""
+    """A bundle with some formats only, created once, so that a download can be resumed."""
     whole = file(context, project_id, version)
     names = {entry.name for entry in known_formats()}
     if unknown := formats - names:
@@ -69,7 +69,7 @@ def part(context: Context, project_id: str, version: int, formats: frozenset[str
 def kept_part(
     context: Context, project_id: str, whole: BundleFile, version: int, key: str, made: Callable[[], bytes]
 ) -> BundleFile:
-    """A part of a bundle as a zip of its own, made once."""
+    """A part of a bundle as a separate zip, created once."""
     with reading(context.engine) as session:
         files = context.files(queries.project_row(session, project_id))
     target = files.previews / f"bundle-v{version}" / f"{key}.zip"
@@ -78,7 +78,7 @@ def kept_part(
 
 
 def check(context: Context, project_id: str, version: int) -> schemas.BundleCheck:
-    """Look at a bundle now: are its bytes those that were certified, and what does the linter say."""
+    """Check a stored bundle now: checksums and linter."""
     from r2c2r_core.export.archive import opened_bundle
     from r2c2r_core.export.lint import lint
     from r2c2r_core.export.seal import check_seal
@@ -92,7 +92,7 @@ def check(context: Context, project_id: str, version: int) -> schemas.BundleChec
 
 
 def compare(context: Context, project_id: str, older: int, newer: int) -> list[schemas.BundleChange]:
-    """What differs between two versions."""
+    """Differences between two versions."""
     return changes(*(manifest(file(context, project_id, version).path) for version in (older, newer)))
 
 
@@ -118,7 +118,7 @@ def certificate(context: Context, project_id: str) -> schemas.Certificate:
 
 
 def member(context: Context, project_id: str, name: str) -> Path:
-    """A file of the newest bundle, taken out of the zip once."""
+    """A file of the newest bundle, extracted once."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         row = queries.newest_bundle(session, project_id)
@@ -129,7 +129,7 @@ def member(context: Context, project_id: str, name: str) -> Path:
 
 
 def picture(context: Context, project_id: str, version: int, name: str) -> Path:
-    """A picture of one version, taken out of the zip once."""
+    """A picture of one version, extracted once."""
     bundle = file(context, project_id, version)
     with reading(context.engine) as session:
         files = context.files(queries.project_row(session, project_id))
@@ -149,7 +149,7 @@ def _taken_out(files: ProjectFiles, version: int, bundle: Path, name: str) -> Pa
 
 
 def folder(context: Context, project_id: str) -> Path | None:
-    """The newest bundle unpacked, for loaders that want files; None when there is none."""
+    """The newest bundle unpacked, for loaders that need files; None without one."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         row = queries.newest_bundle(session, project_id)
@@ -173,12 +173,12 @@ def folder(context: Context, project_id: str) -> Path | None:
 
 
 def root_of(archive: zipfile.ZipFile) -> str:
-    """What every path of the bundle begins with in its zip."""
+    """Path prefix of the bundle's root in its zip."""
     return _inside(archive, "manifest.json").removesuffix("manifest.json")
 
 
 def _inside(archive: zipfile.ZipFile, name: str) -> str:
-    """The member called `name`, wherever the bundle's root is in the zip."""
+    """The member called `name` below the bundle's root in the zip."""
     for member_name in sorted(archive.namelist(), key=len):
         if member_name == name or member_name.endswith(f"/{name}"):
             return member_name
@@ -186,7 +186,7 @@ def _inside(archive: zipfile.ZipFile, name: str) -> str:
 
 
 def _with_formats(bundle: Path, formats: frozenset[str]) -> bytes:
-    """The zip without the other formats' scenes; without their meshes too, where no chosen format has use for them."""
+    """The zip without other formats' scenes, and without meshes if no chosen format uses them."""
     others = [entry for entry in known_formats() if entry.name not in formats]
     meshes = any(entry.reads_meshes for entry in known_formats() if entry.name in formats)
     made = io.BytesIO()
@@ -206,7 +206,7 @@ def _with_formats(bundle: Path, formats: frozenset[str]) -> bytes:
 
 
 def _listing_only(manifest: bytes, stays: Callable[[str], bool]) -> bytes:
-    """The manifest without the checksums of files that were left out."""
+    """The manifest without checksums of omitted files."""
     document = json.loads(manifest)
     if "files" in document:
         document["files"] = {name: sha256 for name, sha256 in document["files"].items() if stays(name)}

@@ -1,4 +1,4 @@
-"""Frames' cameras in the recording's own world, in which people draw, and what relates that world to the levelled one."""
+"""Frames' cameras in the recording's own world, in which users draw, and its transform to the levelled world."""
 
 from dataclasses import asdict
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from r2c2r_core.model.capture import Capture
 
 
 class Levelled(NamedTuple):
-    """The world of a recording: where it lies, and which way its walls run."""
+    """Levelling of a recording: transform and Manhattan yaw."""
 
     world_from_capture: Rigid3
     manhattan_yaw_rad: float
@@ -38,12 +38,12 @@ def camera(context: Context, project_id: str, index: int) -> schemas.FrameCamera
 
 
 def pinhole(camera: Intrinsics) -> dict[str, Any]:
-    """The fields of a frame's camera that do not depend on where it stood."""
+    """The intrinsics fields of a frame's camera."""
     return asdict(camera)
 
 
 def levelled(files: ProjectFiles) -> Levelled | None:
-    """How the recording was levelled; None while it is being read."""
+    """Levelling of the recording; None while it is being read."""
     told = views.facts(files, "ingest", "scene", _told_level)
     return Levelled(Rigid3.from_matrix(np.array(told[0])), told[1]) if told is not None else None
 

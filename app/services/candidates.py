@@ -1,4 +1,4 @@
-"""What was made for each object: candidates with their evidence, the choice, and what people said about them."""
+"""Candidates of each object with evidence, choice and user verdicts."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,7 +23,7 @@ from r2c2r_core.workspace import noun_path
 
 
 class _Said(NamedTuple):
-    """What people said about objects, by object."""
+    """User corrections and verdicts, by object."""
 
     overrides: dict[int, dict[str, Any]]
     verdicts: dict[int, dict[str, Verdict]]  # by candidate
@@ -68,7 +68,7 @@ def _group(
     known = {c["candidate_id"] for c in facts["candidates"]}
     chosen: str = by_person if by_person is not None and by_person in known else facts["chosen_id"]
     if placement and by_person and chosen != by_person:
-        chosen = placement["candidate_id"]  # an uploaded mesh: its id is known once it was placed
+        chosen = placement["candidate_id"]  # an uploaded mesh: its id is known after placement
     address, version = f"/media/{project.id}/candidates/{item.id}", generate_key(files, item.result_name)
     return schemas.CandidateGroup(
         object=item.id or 0,
@@ -92,7 +92,7 @@ def _group(
 
 
 def _choice_without(files: ProjectFiles, name: str, rejected: tuple[str, ...]) -> dict[str, Any]:
-    """What the next run chooses where people rejected some, by the pipeline's own rule; nothing where all are."""
+    """The next run's choice without rejected candidates, by the pipeline's rule; empty if all are rejected."""
     from r2c2r_core.config import ReconstructConfig
     from r2c2r_core.generate.candidates import select_candidate
 
@@ -135,7 +135,7 @@ def _placement(facts: dict[str, Any]) -> schemas.Placement:
 
 
 def override_shape(data: dict[str, Any]) -> schemas.OverrideData:
-    """The corrections as they are shown: of an uploaded mesh its name, not where it lies."""
+    """The corrections for display, with an uploaded mesh's name instead of its path."""
     shown = {"candidate": Path(data["candidate"]).name} if data.get("candidate") else {}
     return schemas.OverrideData.model_validate({**data, **shown})
 
@@ -165,6 +165,6 @@ def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:
 
 
 def generate_key(files: ProjectFiles, name: str) -> str:
-    """Changes whenever the object's candidates do."""
+    """Key that changes whenever the object's candidates do."""
     path = noun_path(files.work, "generate", name)
     return f"{path.stat().st_mtime_ns:x}" if path.is_file() else "0"

@@ -1,4 +1,4 @@
-"""An object's points in 3D, while it is still being clicked: the depth under its masks, seen from its surest frames."""
+"""Live 3D points of an object during annotation: depth under its masks in the most confident frames."""
 
 import base64
 from typing import Any
@@ -21,12 +21,12 @@ from r2c2r_core.ingest.store import depth_path, rgb_path
 
 VIEWS = 10
 POINTS_A_VIEW = 1200
-_ROOM_M = 0.02  # about the points, in the box they are offered
-_CORE_PERCENT = 2.0  # what lies outside, at either end, is depth noise along the outline
+_ROOM_M = 0.02  # margin of the suggested crop box around the points
+_CORE_PERCENT = 2.0  # percentile at both ends that is treated as depth noise along the outline
 
 
 def object_points(context: Context, project_id: str, object_id: int) -> schemas.ObjectPoints:
-    """The object's points; none while it has no masks."""
+    """The object's points; empty without masks."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -55,7 +55,7 @@ def object_points(context: Context, project_id: str, object_id: int) -> schemas.
 
 
 def _crop_around(files: ProjectFiles, points: Points) -> schemas.PromptsFileCrop | None:
-    """A box along the room's directions with some room around world points, in the recording's own world."""
+    """A box aligned with the room around world points with a margin, in the recording's own world."""
     level = cameras.levelled(files)
     if level is None:
         return None
@@ -80,7 +80,7 @@ def _seen_in(files: ProjectFiles, entry: dict[str, Any]) -> tuple[Points, np.nda
         return nothing
     depth, camera = decode_depth(raw), frame.depth_camera
     mask = cv2.resize(bits_mask(entry["mask"]).astype(np.uint8), depth.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    mask = cv2.erode(mask, np.ones((3, 3), np.uint8)).astype(bool)  # along the outline the depth is of what lies behind
+    mask = cv2.erode(mask, np.ones((3, 3), np.uint8)).astype(bool)  # depth along the outline belongs to the background
     rows, columns = np.nonzero(mask & (depth > 0))
     if not len(rows):
         return nothing

@@ -1,4 +1,4 @@
-"""What people say about a spot, and whether it is settled."""
+"""Comments with positions, and their resolution."""
 
 import time
 from typing import Any
@@ -25,7 +25,7 @@ def list_comments(context: Context, project_id: str) -> list[schemas.Comment]:
 
 
 def add(context: Context, project_id: str, body: schemas.CommentIn) -> schemas.Comment:
-    """Say something about the project, an object, a pixel or a point; where a pixel shows the object's mesh, that point too."""
+    """Add a comment on the project, an object, a pixel or a point; a pixel on the object's mesh also gets its 3D point."""
     point = body.point_world
     if point is None and body.object is not None and body.frame is not None:
         found = overlays.point_under(context, project_id, body.object, body.frame, body.x or 0.0, body.y or 0.0)
@@ -46,7 +46,7 @@ def add(context: Context, project_id: str, body: schemas.CommentIn) -> schemas.C
 
 
 def change(context: Context, project_id: str, comment_id: int, body: schemas.CommentPatch) -> schemas.Comment:
-    """Resolve it, or open it again."""
+    """Resolve or reopen a comment."""
     with writing(context.engine) as session:
         queries.project_row(session, project_id)
         row = session.get(Comment, comment_id)
@@ -76,5 +76,5 @@ def _tell(context: Context, project_id: str) -> None:
 
 
 def shape(row: Comment) -> schemas.Comment:
-    """A comment as it goes over the wire."""
+    """A comment as an API schema."""
     return schemas.Comment.model_validate({**row.model_dump(exclude={"project_id", "object_id"}), "object": row.object_id})

@@ -1,4 +1,4 @@
-"""What every use case works with."""
+"""Context of all services."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,28 +42,28 @@ class Context:
     uploads: AtWork
     descriptions: Descriptions
     posting: Posting
-    person: Person  # who asks; outside a request, who started the server
+    person: Person  # user of the request; outside a request, the user who started the server
     runner: Runner
     live: LiveSegmenters
     viewer: Viewer
-    gates: Gates  # where requests wait for heavy work
+    gates: Gates  # concurrency limits of heavy requests
     probes: Workers
     metrics: Metrics
-    provider: Provider | None  # of people's identities
+    provider: Provider | None  # OpenID provider
     static: Path
 
     @property
     def who(self) -> str:
-        """Who asks, as the history says it."""
+        """Name of the current user, as in the history."""
         return self.person.name
 
     def require(self, role: Role) -> None:
-        """Raise Forbidden unless who asks may do what that role may."""
+        """Raise Forbidden unless the current user has that role's rights."""
         if not self.person.may(role):
             raise Forbidden(
                 f"{self.who} is {self.person.role}; this needs a role of {role}", hint="ask an admin of this server"
             )
 
     def files(self, project: Project | DrawnIn) -> ProjectFiles:
-        """Where the project's files are."""
+        """The project's files."""
         return project_files(self.settings.data_dir, project.id, project.work_path)

@@ -1,6 +1,6 @@
-"""A second project that is as the first: with its recording, clicks, corrections, verdicts, masks, results and bundles.
+"""Duplication of a project with recording, clicks, corrections, verdicts, masks, results and bundles.
 
-Or with its recording alone, and whatever was made of that without a person.
+Alternatively with its recording only, and data computed from it without user input.
 """
 
 import json
@@ -24,10 +24,14 @@ from app.services import adopting, crossing, imports, projects, quotas
 from app.services.context import Context
 from r2c2r_core.workspace import write_atomically
 
-_NEVER_WRITTEN = ("source", "bundles", "variants")  # files in these are replaced, never changed: two projects may share them
+_NEVER_WRITTEN = (
+    "source",
+    "bundles",
+    "variants",
+)  # files in these are replaced, never modified, so two projects may share them
 _RECORDED = ("source", "proposals.json", "awaited-frames.json", "frames.json", "facts.json")  # and pictures of the scan
 _RECORDED_WORK = ("capture", "nouns/ingest")
-_OWN = ("previews", "requests", "logs", "project.json")  # made anew, or of jobs that the copy never had
+_OWN = ("previews", "requests", "logs", "project.json")  # recreated, or of jobs that the copy never had
 
 
 def duplicate(
@@ -38,9 +42,9 @@ def duplicate(
     name: str | None = None,
     mark: Callable[[Session, Project], None] = lambda session, made: None,
 ) -> schemas.Project:
-    """A draft of the same, or of its recording; raises Conflict while a job writes what is to be copied.
+    """Duplicate a project, or its recording, as a draft; raises Conflict while a job writes its files.
 
-    `mark` says what else the copy is, in the transaction that makes it: whoever asks again is answered the same.
+    `mark` sets further fields of the copy in the same transaction, so that a repeated request gets the same answer.
     """
     with reading(context.engine) as session:
         row = queries.project_row(session, project_id)
@@ -78,7 +82,7 @@ def duplicate(
 
 
 def _copy_files(files: ProjectFiles, copy: ProjectFiles, recording_only: bool) -> None:
-    """Everything that the copy needs; what was read of the recording says where the copy's own one is."""
+    """Copy all needed files, with the recording's paths adapted to the copy."""
     pictures = [path.name for path in files.scan_pictures]
     copy.root.mkdir(parents=True)
     copy.half_made_mark.touch()
@@ -102,7 +106,7 @@ def _copy_files(files: ProjectFiles, copy: ProjectFiles, recording_only: bool) -
 
 
 def _link(source: str, target: str) -> None:
-    """One file under two names where the disk can, a copy where not."""
+    """Hard link, or copy where the disk does not support it."""
     try:
         os.link(source, target)
     except OSError:

@@ -1,4 +1,4 @@
-"""What the servers that share a database tell each other, beside what tabs are told: who may see what, and what ends."""
+"""Control messages between servers that share a database: access changes and shutdowns."""
 
 from typing import Any
 
@@ -7,31 +7,31 @@ from app.services.context import Context
 
 
 def sees_changed(context: Context) -> None:
-    """Who sees which project is otherwise now, at every server."""
+    """Reload access rights at every server."""
     context.access.look_again()
     context.hub.carry("sees", {})
 
 
 def shut(context: Context, project_id: str) -> None:
-    """End the project's live segmenter and its 3D views, wherever they run."""
+    """Stop the project's live segmenter and 3D views at every server."""
     _shut(context, project_id)
     context.hub.carry("shut", {"project": project_id})
 
 
 def stop_segmenting(context: Context, project_id: str) -> None:
-    """End the project's live segmenter, wherever it runs."""
+    """Stop the project's live segmenter at every server."""
     context.live.close(project_id)
     context.hub.carry("stop-segmenting", {"project": project_id})
 
 
 def show_out(context: Context, project_id: str, why: str) -> None:
-    """Lead away whoever does not see the project any more, from its pages and 3D views, at every server."""
+    """Close pages and 3D views of users who may not see the project any more, at every server."""
     _show_out(context, project_id, why)
     context.hub.carry("show-out", {"project": project_id, "why": why})
 
 
 def hear_others(context: Context, channel: Channel) -> None:
-    """Do the same when another server says so."""
+    """Handle these messages from other servers."""
 
     def look_again(_sender: str, _said: dict[str, Any]) -> None:
         context.access.look_again()

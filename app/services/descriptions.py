@@ -1,7 +1,7 @@
-"""Each project's folder says what it is: `project.json` is written anew after what a person changed was committed.
+"""Updates of `project.json` in each project's folder after committed changes.
 
-A thread of its own writes, at most every PAUSE_S and for at most a SHARE of the time: clicks come faster than that, and a large
-project's file takes longer to write than a small one's. What a crash leaves behind is made good at the next start.
+A background thread writes at most every PAUSE_S and for at most a SHARE of the time, as clicks come faster than that, and a
+large project's file takes longer to write. Updates missed in a crash are made at the next start.
 """
 
 import logging
@@ -29,7 +29,7 @@ SHARE = 0.05
 
 
 class Descriptions:
-    """Keeps the files up to date. `note` may be called from any thread and does not wait."""
+    """Keeps the files up to date. `note` is thread-safe and does not wait."""
 
     def __init__(self, engine: Engine, settings: Settings) -> None:
         self._engine, self._settings = engine, settings
@@ -40,17 +40,17 @@ class Descriptions:
         engine.update_execution_options(projects_changed=self.note)
 
     def start(self) -> None:
-        """Describe what was changed since it was last described, then what changes from now on."""
+        """Write outdated descriptions, then watch for changes."""
         self._thread.start()
 
     def note(self, projects: Iterable[str]) -> None:
-        """These were changed, and the change is committed."""
+        """Record projects with committed changes."""
         with self._changed:
             self._waiting.update(projects)
             self._changed.notify()
 
     def stop(self) -> None:
-        """Write what waits, and end."""
+        """Write pending descriptions, and end."""
         self._stopping.set()
         self.note(())
         if self._thread.is_alive():
@@ -64,7 +64,7 @@ class Descriptions:
                 found, self._waiting = self._waiting, set()
             began = time.monotonic()
             self._each(self._write, found)
-            if not found:  # nothing waits any more, and it stops
+            if not found:  # nothing is pending, and it is stopping
                 return
             self._stopping.wait(max(PAUSE_S, (time.monotonic() - began) / SHARE))
 
@@ -84,9 +84,9 @@ class Descriptions:
             return []
 
     def _catch_up(self, project_id: str) -> None:
-        """Write the file where it is older than the rows, or of an r2c2r that told less.
+        """Write the file if it is older than the rows, or of an older version.
 
-        A newer one tells of a restored database, and is set aside.
+        A newer file indicates a restored database, and is set aside.
         """
         files = project_files(self._settings.data_dir, project_id)
         with reading(self._engine) as session:
@@ -104,7 +104,7 @@ class Descriptions:
             self._write(project_id)
 
     def _write(self, project_id: str) -> None:
-        """Describe the project as it is now, where it has a folder."""
+        """Write the project's current description if it has a folder."""
         with reading(self._engine) as session:
             row = session.get(Project, project_id)
             if row is None:
@@ -116,7 +116,7 @@ class Descriptions:
 
 
 def _described(files: ProjectFiles) -> Description | None:
-    """What project.json says; None where it says nothing that can be read."""
+    """Content of project.json; None where it is missing or unreadable."""
     try:
         return read_description(files.description)
     except (FileNotFoundError, InputError):

@@ -1,4 +1,4 @@
-"""What tells an object's candidates apart: each from all sides, where it lies off another, the crops they were made from."""
+"""Comparison of an object's candidates: turntables, surface differences, and their input crops."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,15 +21,15 @@ from app.services.meshes import upright
 from r2c2r_core.arrays import Mask, Points, Vector3
 from r2c2r_core.model.track import MaskTrack
 
-OFF = 0.012  # of the longest side: what lies further off than that differs
-_SAMPLES = 60_000  # points of a surface: less than `OFF` apart
-_FRONT = [0, 2]  # axes of the side that was filmed
-_FACES_AHEAD = 0.9  # of a normal's length to the front
-_LEAST_FRONT = 0.02  # of the surface: what is round has hardly any front
+OFF = 0.012  # distance, as a fraction of the longest side, above which surfaces differ
+_SAMPLES = 60_000  # surface points, with a spacing below `OFF`
+_FRONT = [0, 2]  # axes of the filmed side
+_FACES_AHEAD = 0.9  # minimum normal component towards the front
+_LEAST_FRONT = 0.02  # minimum fraction of surface facing the front: round objects have hardly any
 
 
 def differences(context: Context, project_id: str, object_id: int, against: str) -> schemas.Differences:
-    """By how much every candidate lies off one of them, and the frames that any of them was made from."""
+    """Differences of all candidates from one of them, and the frames from which they were made."""
     files, name = _files_of(context, project_id, object_id)
     made, track = views.latest(files, "generate", name), views.latest(files, "segment", name)
     if made is None:
@@ -46,7 +46,7 @@ def differences(context: Context, project_id: str, object_id: int, against: str)
 
 
 def strip(context: Context, project_id: str, object_id: int, candidate: str, against: str) -> Path:
-    """A candidate from all sides, one beside the other; in another colour what lies off `against`, unless that is empty."""
+    """Turntable of a candidate, with differences from `against` coloured, unless that is empty."""
     files, name = _files_of(context, project_id, object_id)
     stem = f"{candidate}-{against}-turns-{generate_key(files, name)}"
     return kept_file(
@@ -65,12 +65,12 @@ class _Upright(NamedTuple):
     """A candidate that stands upright, with its front at -Y."""
 
     surface: Points
-    low: Vector3  # of its box; y: where most of its front is, whatever stands out of it
+    low: Vector3  # of its box; y: at most of its front, ignoring protrusions
     high: Vector3
 
 
 class _Model:
-    """The candidate that others are laid onto, by the side that was filmed: behind it they differ."""
+    """The reference candidate, to which others are aligned by the filmed side, as they differ behind it."""
 
     def __init__(self, files: ProjectFiles, name: str, candidate: str) -> None:
         self._files, self._name = files, name
@@ -79,7 +79,7 @@ class _Model:
         self._tree = cKDTree(self._shape.surface)
 
     def difference(self, candidate: str) -> schemas.Difference:
-        """How far that candidate lies off."""
+        """Difference of a candidate from the reference."""
         shape = self._stood(candidate)
         laid = self._laid(shape.surface, shape)
         there, back = self._tree.query(laid)[0], cKDTree(laid).query(self._shape.surface)[0]
@@ -90,7 +90,7 @@ class _Model:
         )
 
     def marker(self, candidate: str) -> Callable[[Points], Mask]:
-        """Tells of points of that candidate, upright, which lie off."""
+        """Predicate on a candidate's upright points that differ from the reference."""
         shape = self._stood(candidate)
 
         def off(places: Points) -> Mask:
@@ -120,7 +120,7 @@ class _Model:
 
 
 def _longest_m(files: ProjectFiles, name: str) -> float | None:
-    """The longest side of the placed candidate, as large as it was found; None before it was placed."""
+    """Longest side of the placed candidate in metres; None before placement."""
     placement = views.latest(files, "align", name)
     if placement is None:
         return None
@@ -129,7 +129,7 @@ def _longest_m(files: ProjectFiles, name: str) -> float | None:
 
 
 def _crop(files: ProjectFiles, track: MaskTrack, index: int) -> schemas.Crop | None:
-    """Where the object is in a frame; None where it has no mask there."""
+    """Crop of the object in a frame; None without a mask there."""
     mask, frame = track.masks.get(index), views.frame_of(files, index)
     if mask is None or frame is None or not mask.area_px:
         return None

@@ -1,4 +1,4 @@
-"""What each object cost each person: clicks, verdicts, corrections, comments and minutes, read from the record of changes."""
+"""Effort per object and user: clicks, verdicts, corrections, comments and minutes, from the event history."""
 
 from dataclasses import dataclass
 
@@ -11,11 +11,11 @@ from app.db.tables import Event
 from app.services import honeypots, spreadsheets
 from app.services.context import Context
 
-IDLE_S = 120.0  # whoever changes nothing for longer is taken to have done something else
+IDLE_S = 120.0  # a longer pause between changes does not count as work
 _HEAD = ["project", "person", "object", "category", "clicks", "verdicts and corrections", "comments", "minutes"]
 _TRUTH = ["true object", "mask IoU", "same category"]  # of a honeypot
 _COUNTED = {"prompts": "clicks", "proposals": "clicks", "review": "verdicts", "comments": "comments"}
-_NO_CLICKS = {"prompts/import", "prompts/assign", "proposals/restore"}  # nobody clicked an object for it
+_NO_CLICKS = {"prompts/import", "prompts/assign", "proposals/restore"}  # actions without clicks
 
 
 @dataclass(slots=True)
@@ -27,7 +27,7 @@ class _Cost:
 
 
 def table(context: Context, project_id: str) -> str:
-    """CSV: a line a person and object, those of the project as a whole under an empty name."""
+    """CSV with a line per user and object; project-level effort has an empty name."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = {item.id: item for item in queries.live_objects(session, project_id, deleted=True)}
@@ -57,7 +57,7 @@ def table(context: Context, project_id: str) -> str:
 
 
 def _really(one: schemas.TrueObject | None) -> list[str]:
-    """What an object of a honeypot is in truth; nothing where it is none."""
+    """Truth columns of a honeypot's object; empty for others."""
     if one is None:
         return ["", "", ""]
     same = "" if one.same_category is None else "yes" if one.same_category else "no"

@@ -1,4 +1,4 @@
-"""Elevations, as the live segmenter drew them, and the fronts that were found."""
+"""Elevations drawn by the live segmenter, and detected fronts."""
 
 import json
 from pathlib import Path
@@ -14,7 +14,7 @@ from app.services.context import Context
 
 
 def current(context: Context, project_id: str) -> schemas.Elevations:
-    """Those of the project's scan; to open the live segmenter has them drawn."""
+    """Elevations of the project's scan; opening the live segmenter creates them."""
     with reading(context.engine) as session:
         files = context.files(queries.project_row(session, project_id))
     index = files.elevations / INDEX
@@ -28,7 +28,7 @@ def current(context: Context, project_id: str) -> schemas.Elevations:
 
 
 def picture(context: Context, project_id: str, number: int) -> Path:
-    """The picture of one of them."""
+    """The picture of one elevation."""
     with reading(context.engine) as session:
         files: ProjectFiles = context.files(queries.drawn_in(session, project_id))
     path = picture_path(files.elevations, number)
@@ -38,7 +38,7 @@ def picture(context: Context, project_id: str, number: int) -> Path:
 
 
 def found_fronts(context: Context, project_id: str) -> list[schemas.FoundFront]:
-    """The flat fronts of the project's objects, as far as their masks are done."""
+    """The flat fronts of objects with completed masks."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = queries.live_objects(session, project_id)

@@ -1,4 +1,4 @@
-"""Whether this server can do its work."""
+"""Readiness check of this server."""
 
 from sqlmodel import select
 
@@ -8,6 +8,6 @@ from app.services.context import Context
 
 
 def require_ready(context: Context) -> None:
-    """Raise Unavailable or DatabaseUnusable while the rows cannot be read."""
+    """Raise Unavailable or DatabaseUnusable while the database cannot be read."""
     with reading(context.engine) as session:
         session.exec(select(Project.id).limit(1)).first()

@@ -1,4 +1,4 @@
-"""Sample kitchens slipped into a person's queue, scored against what is really there. Only admins may call this."""
+"""Honeypots: sample kitchens inserted into a user's queue, scored against truth. Admins only."""
 
 import json
 from collections.abc import Hashable
@@ -20,21 +20,21 @@ from app.services.overlap import Bits, Overlaps, spread
 from r2c2r_core.evaluate.iou import MIN_TRUTH_PX, read_mask
 from r2c2r_core.geometry.masks import pack_mask
 
-MOST_FRAMES = 30  # each is a picture for every object
+MOST_FRAMES = 30  # each is a picture per object
 FOUND_IOU = 0.5
 TRUTH, MASKS = "truth.json", "truth_masks"
-SOURCE_NAME = "scan.r3d"  # shown of it: as if it had been uploaded
+SOURCE_NAME = "scan.r3d"  # displayed name, like an uploaded recording
 
 
 def listed(context: Context) -> list[schemas.Honeypot]:
-    """All of them, the newest first."""
+    """All honeypots, newest first."""
     with reading(context.engine) as session:
         of = select(Project).where(col(Project.honeypot).is_(True), col(Project.trashed).is_(None))
         return [_shape(session, row) for row in session.exec(of.order_by(col(Project.created).desc(), col(Project.id)))]
 
 
 def slip(context: Context, project_id: str, body: schemas.HoneypotIn) -> schemas.Honeypot:
-    """The recording of a sample kitchen as a project of its own, assigned to a person who is told nothing of its truth."""
+    """Create a project from a sample kitchen's recording, assigned to a user without access to its truth."""
     with reading(context.engine) as session:
         sample = queries.project_row(session, project_id)
         context.store.fetch(project_id, recording=True)
@@ -44,7 +44,7 @@ def slip(context: Context, project_id: str, body: schemas.HoneypotIn) -> schemas
 
     def mark(session: Session, row: Project) -> None:
         row.source_name, row.honeypot, row.tags = SOURCE_NAME, True, []
-        row.assignee_id, row.members_only = person.id, False  # whoever sees the sample
+        row.assignee_id, row.members_only = person.id, False  # visible to all users of the sample
         session.add(row)
         audit.note(session, "honeypot", account=person.name, who=context.who, detail=body.name)
 
@@ -54,7 +54,7 @@ def slip(context: Context, project_id: str, body: schemas.HoneypotIn) -> schemas
 
 
 def score(context: Context, project_id: str) -> schemas.HoneypotScore:
-    """What the person made of it so far; it reads many pictures: call it behind the gate of looks."""
+    """The user's current score; it reads many pictures, so call it behind the gate of looks."""
     context.store.fetch(project_id, recording=True)
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
@@ -100,7 +100,7 @@ def _frames(folder: Path) -> set[int]:
 
 
 def _truth_on(folder: Path, frame: int, width: int) -> dict[Hashable, Bits]:
-    """The true masks of a frame, by object; of so few pixels that none need be seen, none."""
+    """The true masks of a frame, by object, without those too small to be required."""
     found = {path.parent.name: read_mask(path) for path in (folder / MASKS).glob(f"*/{frame:06d}.png")}
     large = {name: mask for name, mask in found.items() if np.count_nonzero(mask) >= MIN_TRUTH_PX}
     return {name: mask_bits(pack_mask(mask), width) for name, mask in large.items()}

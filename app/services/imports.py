@@ -1,4 +1,4 @@
-"""How recordings get in: by upload, by a path on this machine, or made up."""
+"""Import of recordings: by upload, by a local path, or as a synthetic sample."""
 
 import time
 from pathlib import Path
@@ -18,7 +18,7 @@ from r2c2r_core.errors import CaptureError, InputError
 
 
 def from_finished_upload(context: Context, upload: Upload, received: Path) -> schemas.Project:
-    """A project from a file that arrived; may be called again when it was interrupted."""
+    """A project from a completed upload; may be repeated after an interruption."""
     file_name = safe_name(upload.file_name)
     files = project_files(context.settings.data_dir, upload.id)
     target = files.source / file_name
@@ -26,7 +26,7 @@ def from_finished_upload(context: Context, upload: Upload, received: Path) -> sc
         target.parent.mkdir(parents=True, exist_ok=True)
         files.half_made_mark.touch()
         received.replace(target)
-    context.store.keep(upload.id)  # before a job can look for it
+    context.store.keep(upload.id)  # before a job can read it
     with writing(context.engine) as session:
         quotas.check_project(context, session)
         name = _name(upload.name, upload.file_name)
@@ -48,7 +48,7 @@ def require_awaited(context: Context, project_id: str) -> None:
 
 
 def into_project(context: Context, project_id: str, upload: Upload, received: Path) -> schemas.Project:
-    """The recording of a project that has none; it is read, and refused where its frames are others."""
+    """Add the recording of a project that has none; it is refused if its frames do not match."""
     name = safe_name(upload.file_name)
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
@@ -57,7 +57,7 @@ def into_project(context: Context, project_id: str, upload: Upload, received: Pa
         target = context.files(project).source / name
         target.parent.mkdir(parents=True, exist_ok=True)
         received.replace(target)
-        context.store.keep(project_id)  # before a job can look for it
+        context.store.keep(project_id)  # before a job can read it
         now = time.time()
         project.source_path, project.source_name, project.status, project.error = str(target), name, "importing", None
         session.add(Event(project_id=project_id, scope="project", action="recording", text=name, who=context.who, at=now))
@@ -67,7 +67,7 @@ def into_project(context: Context, project_id: str, upload: Upload, received: Pa
 
 
 def from_path(context: Context, body: schemas.ImportPath) -> schemas.Project:
-    """A project from a recording on this machine; it is read where it is."""
+    """A project from a recording on this machine, read in place."""
     if context.settings.store:
         raise InputError("this server's jobs run on other machines, which have no such path", hint="upload the recording")
     source = allowed_path(context, body.path)
@@ -103,7 +103,7 @@ def from_sample(context: Context, body: schemas.SampleRequest) -> schemas.Projec
 
 
 def queue_job(context: Context, session: Session, project: Project, kind: str, payload: dict[str, object]) -> Job:
-    """Put a job into the queue."""
+    """Queue a job."""
     quotas.check_job(context, session)
     job = Job(project_id=project.id, kind=kind, state="queued", payload=payload, who=context.who, created=time.time())
     job.message = "waiting"
@@ -113,7 +113,7 @@ def queue_job(context: Context, session: Session, project: Project, kind: str, p
 
 
 def account_of(context: Context, session: Session) -> int | None:
-    """The account of who asks; None for whoever started the server."""
+    """The current user's account; None for the user who started the server."""
     mine = select(Account.id).where(Account.name == context.who)
     return session.exec(mine).first() if context.person.account else None
 

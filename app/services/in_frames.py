@@ -1,4 +1,4 @@
-"""What people say of frames, held against the table of frames that the recording has."""
+"""Validation of frame references against the recording's frame table."""
 
 from typing import Any
 
@@ -14,26 +14,26 @@ Table = dict[int, dict[str, Any]]
 
 
 def table_of(context: Context, project: Project) -> Table:
-    """The project's; NotReady until the recording was read."""
+    """The project's frame table; NotReady until the recording was read."""
     return {entry["index"]: entry for entry in frame_table(context.files(project))}
 
 
 def check_frame(table: Table, frame: int) -> tuple[int, int]:
-    """The frame's width and height; raises PromptError for a number that is none of the recording's."""
+    """The frame's width and height; raises PromptError for an unknown frame."""
     if frame not in table:
         raise PromptError(f"the recording has no frame {frame}", hint=f"its {len(table)} frames are listed under /frames")
     return table[frame]["width"], table[frame]["height"]
 
 
 def check_said(table: Table, name: str, frame: int, mask: PromptsFileMask | None) -> None:
-    """Raise PromptError for a frame that the recording lacks, and for a mask that does not fit it."""
+    """Raise PromptError for an unknown frame, and for a mask that does not fit it."""
     size = check_frame(table, frame)
     if mask is not None:
         check_mask_size(f"{name}: frame {frame}", mask, size)
 
 
 def check_point(table: Table, frame: int, x: float, y: float) -> None:
-    """Raise PromptError for a click that is on no frame or outside its image."""
+    """Raise PromptError for a click in an unknown frame or outside its image."""
     width, height = check_frame(table, frame)
     if not (0 <= x < width and 0 <= y < height):
         raise PromptError(
@@ -42,7 +42,7 @@ def check_point(table: Table, frame: int, x: float, y: float) -> None:
 
 
 def check_file(table: Table, file: PromptsFile) -> None:
-    """Raise PromptError for the first click or painted mask of a prompts.json that is on no frame."""
+    """Raise PromptError for the first invalid click or painted mask of a prompts.json."""
     for entry in file.objects:
         for point in entry.points:
             check_point(table, point.frame, point.x, point.y)

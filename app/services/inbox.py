@@ -1,4 +1,4 @@
-"""What waits for one person, over all projects that they see."""
+"""A user's inbox over all visible projects."""
 
 import re
 from typing import Any
@@ -14,7 +14,7 @@ from app.services.context import Context
 
 
 def inbox(context: Context) -> schemas.Inbox:
-    """Projects and objects whose turn is the person's, and open comments that name them; nothing for who has no account."""
+    """Projects and objects assigned to the user, and open comments that mention them; empty without an account."""
     if not context.person.account:
         return schemas.Inbox(returned=[], assigned=[], objects=[], mentions=[])
     with reading(context.engine) as session:
@@ -38,12 +38,12 @@ def inbox(context: Context) -> schemas.Inbox:
 
 
 def names(name: str, text: str) -> bool:
-    """Whether the text mentions that person: `@ann`, whatever follows that is no part of a longer name."""
+    """Whether the text mentions that user as `@ann`, not as part of a longer name."""
     return re.search(rf"(?<![\w.@+-])@{re.escape(name)}(?![\w@+-]|\.\w)", text, re.IGNORECASE) is not None
 
 
 def _in_work(session: Session, shown: Any) -> list[tuple[Project, list[Event]]]:
-    """Projects that are not approved, longest untouched first, with the steps that each took, oldest first."""
+    """Unapproved projects, least recently changed first, with their state events, oldest first."""
     projects = session.exec(
         select(Project).where(shown, Project.review_state != "approved").order_by(col(Project.updated))
     ).all()
@@ -67,7 +67,7 @@ def _shape(project: Project, steps: list[Event]) -> schemas.InboxProject:
 
 
 def _objects(context: Context, session: Session, shown: Any) -> list[schemas.InboxObject]:
-    """Of projects that are not approved, longest untouched first, by project."""
+    """The user's objects in unapproved projects, least recently changed project first."""
     mine = (col(SceneObject.assignee) == context.who, col(SceneObject.deleted).is_(False))
     query = select(SceneObject, Project).join(Project).where(shown, *mine, Project.review_state != "approved")
     found = session.exec(query.order_by(col(Project.updated), col(Project.id), col(SceneObject.id))).all()
@@ -88,7 +88,7 @@ def _objects(context: Context, session: Session, shown: Any) -> list[schemas.Inb
 
 
 def _mentions(context: Context, session: Session, shown: Any) -> list[schemas.InboxMention]:
-    """Newest first."""
+    """Open comments that mention the user, newest first."""
     open_ones = col(Comment.resolved_at).is_(None) & (col(Comment.who) != context.who)
     query = select(Comment, Project).join(Project).where(shown, open_ones, col(Comment.text).icontains(f"@{context.who}"))
     return [

@@ -18,7 +18,7 @@ from r2c2r_core.errors import PromptError
 
 
 def run(context: Context, project_id: str, body: schemas.RunRequest) -> schemas.Job:
-    """Queue a reconstruction of the project as it is now."""
+    """Queue a reconstruction of the project's current state."""
     _check_backends(body)
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
@@ -29,9 +29,9 @@ def run(context: Context, project_id: str, body: schemas.RunRequest) -> schemas.
 
 
 def queue_run(context: Context, session: Session, project: Project, body: schemas.RunRequest, about: Sequence[int] = ()) -> Job:
-    """A waiting run with everything said so far; one under way that already knows it all is that run.
+    """A queued run of the current input, or an active run that already includes it.
 
-    `about` are the objects whose correction starts it: of the others it takes the clicks of the last run.
+    `about` are the objects whose correction starts it; for other objects the clicks of the last run are used.
     """
     if project.status != "ready":
         raise NotReady("the recording has not been read yet", hint="wait for the import")
@@ -46,7 +46,7 @@ def queue_run(context: Context, session: Session, project: Project, body: schema
     active = select(Job).where(Job.project_id == project.id, Job.kind == "run", col(Job.state).in_(("queued", "running")))
     for job in session.exec(active):
         if job.state == "queued" and job.started is None:
-            job.payload = _joined(job.payload, payload)  # it reads the clicks when it starts
+            job.payload = _joined(job.payload, payload)  # the clicks are read when it starts
             session.add(job)
             return job
         if job.payload == payload:
@@ -55,7 +55,7 @@ def queue_run(context: Context, session: Session, project: Project, body: schema
 
 
 def _joined(waiting: dict[str, Any], added: dict[str, Any]) -> dict[str, Any]:
-    """What a waiting run is given once another is asked for: everything, unless both are about single objects."""
+    """Merged payload of a waiting run and a further request: everything, unless both concern single objects."""
     if "about" not in added:
         return added
     if "about" not in waiting:
@@ -86,7 +86,7 @@ def cancel(context: Context, job_id: int) -> schemas.Job:
 
 
 def retry(context: Context, job_id: int) -> schemas.Job:
-    """Queue a failed or cancelled job again; a run takes the clicks of now."""
+    """Queue a failed or cancelled job again; a run uses the current clicks."""
     with writing(context.engine) as session:
         row = queries.job_row(session, job_id)
         project = queries.project_row(session, row.project_id)
@@ -108,7 +108,7 @@ def retry(context: Context, job_id: int) -> schemas.Job:
 
 
 def events(context: Context, job_id: int, after: int) -> list[schemas.JobEvent]:
-    """The job's history after an event."""
+    """The job's events after a given one."""
     with reading(context.engine) as session:
         queries.job_row(session, job_id)
         rows = session.exec(
@@ -136,7 +136,7 @@ def log(context: Context, job_id: int, tail: int) -> str:
 
 
 def _check_backends(body: schemas.RunRequest) -> None:
-    """An unknown backend is refused before anything is queued."""
+    """Refuse unknown backends before anything is queued."""
     for seam, registry in projects.SEAMS.items():
         if (name := getattr(body, seam)) is not None:
             registry.get(name)

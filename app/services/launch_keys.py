@@ -1,7 +1,7 @@
-"""Keys in printed addresses: whoever opens one first is whoever started the server, and it opens nothing after that.
+"""One-time keys in printed addresses: the first use signs in as the user who started the server.
 
-Each server forgets those of the ones before it. `r2c2r key` prints another while the server runs: who may write its database
-may as well sign in.
+Each server deletes keys of earlier ones. `r2c2r key` prints another while the server runs, since write access to its
+database implies the right to sign in.
 """
 
 import hashlib
@@ -16,19 +16,19 @@ from app.db.tables import LaunchKey
 
 
 def forget(engine: Engine) -> None:
-    """Drop earlier servers' keys; before the new one says where it is, for a key that is made from then on opens it."""
+    """Delete earlier servers' keys, before the new server publishes its address, as later keys are valid for it."""
     with writing(engine) as session:
         session.exec(delete(LaunchKey))
 
 
 def keep(engine: Engine, key: str) -> None:
-    """Store the first key of a server, which it prints."""
+    """Store the server's first, printed key."""
     with writing(engine) as session:
         _store(session, key)
 
 
 def new(engine: Engine) -> str:
-    """One more key."""
+    """Create another key."""
     key = secrets.token_urlsafe(24)
     with writing(engine) as session:
         _store(session, key)
@@ -36,7 +36,7 @@ def new(engine: Engine) -> str:
 
 
 def use(session: Session, key: str) -> bool:
-    """Whether the key opens: only once, for it goes with the transaction."""
+    """Whether the key is valid; it is deleted in the transaction, so it works only once."""
     found = session.get(LaunchKey, _digest(key))
     if found is not None:
         session.delete(found)

@@ -1,8 +1,8 @@
-"""What lies in the data folder and no row knows of: set aside for an admin to look at, never deleted.
+"""Files in the data folder without a database row: set aside for an admin, never deleted.
 
-A row may be missing because a crash came before it, but also because the database was lost or an older one restored. Only
-what says itself that it is half made goes: a mesh that was still being received, the folder of an upload whose sender gave
-it up while it was being made a project.
+A row may be missing because of a crash, but also because the database was lost or an older one restored. Only files marked
+as incomplete are deleted: a mesh that was being received, the folder of an upload that was given up while it was becoming
+a project.
 """
 
 import logging
@@ -19,11 +19,11 @@ from app.services.context import Context
 
 _log = logging.getLogger(__name__)
 
-OLD_S = 3600.0  # what begins just now has no row yet
+OLD_S = 3600.0  # minimum age, as new files have no row yet
 
 
 def tidy(context: Context) -> None:
-    """Delete what is marked as half made and nobody's any more; move what else is unknown to `unknown/`."""
+    """Delete abandoned incomplete files; move other unknown ones to `unknown/`."""
     data = context.settings.data_dir
     with reading(context.engine) as session:
         uploads = set(session.exec(select(Upload.id)))
@@ -46,7 +46,7 @@ def tidy(context: Context) -> None:
 
 
 def set_aside(unknown: Path, path: Path) -> Path:
-    """Move a file or folder to `unknown/`, under a name that is free; where it is now."""
+    """Move a file or folder to an unused name in `unknown/`, and return its path."""
     target = free_name(unknown, path.name)
     unknown.mkdir(parents=True, exist_ok=True)
     shutil.move(path, target)

@@ -1,4 +1,4 @@
-"""Lengths that people measured in the room, what the scan says of them, and the scale that follows."""
+"""True lengths measured in the room, their values in the scan, and the resulting scale."""
 
 import time
 from typing import Any
@@ -19,14 +19,14 @@ _SIDES = ("width", "depth", "height")
 
 
 def list_lengths(context: Context, project_id: str) -> schemas.TrueLengths:
-    """All of a project's, oldest first, each beside what the scan says now."""
+    """All true lengths of a project, oldest first, with their current values in the scan."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         return _all(context, session, project)
 
 
 def add(context: Context, project_id: str, body: schemas.TrueLengthIn) -> schemas.TrueLengths:
-    """Keep a length."""
+    """Add a length."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         text = body.text or "between two points"
@@ -53,7 +53,7 @@ def add(context: Context, project_id: str, body: schemas.TrueLengthIn) -> schema
 
 
 def remove(context: Context, project_id: str, length_id: int) -> schemas.TrueLengths:
-    """Forget a length; what it said stays in the history."""
+    """Delete a length; the history keeps it."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         row = session.get(TrueLength, length_id)
@@ -68,7 +68,7 @@ def remove(context: Context, project_id: str, length_id: int) -> schemas.TrueLen
 
 
 def best_scale(pairs: list[tuple[float, float]]) -> float:
-    """By what to multiply measured lengths to come nearest to true ones, relative to each: pairs are (measured, true)."""
+    """Scale factor of measured lengths with the least relative squared error: pairs are (measured, true)."""
     ratios = np.array([measured / true for measured, true in pairs])
     return float(ratios.sum() / (ratios**2).sum())
 
@@ -102,7 +102,7 @@ def _mean_error(pairs: list[tuple[float, float]], scale: float) -> float | None:
 
 
 def points_now(row: TrueLength, scale: float) -> list[list[float]] | None:
-    """The two points of a length in the world as it is read with that scale; None for an object's side."""
+    """The two points of a length in the world at a given scale; None for an object's side."""
     return row.points_world and [[float(value) * scale / row.scale for value in point] for point in row.points_world]
 
 

@@ -1,4 +1,4 @@
-"""What is pointed at in the 3D view: axes of joints, findings of the certificate, open comments."""
+"""Marks in the 3D view: joint axes, certificate findings, open comments."""
 
 from typing import Any
 
@@ -11,18 +11,18 @@ from app.files import ProjectFiles
 from app.services import views
 from r2c2r_core.model.scene import SceneObject
 
-_REACH_M = 0.08  # an axis sticks out of its box by this much
+_REACH_M = 0.08  # length by which an axis extends beyond its box
 _AXIS, _FINDING, _COMMENT = (86, 180, 233), (230, 90, 60), (255, 225, 77)
 _CHOSEN = (255, 225, 77)
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _LONGEST_TEXT = 44
-_LINE_M = 0.07  # between two findings of one object, so that neither hides the other
+_LINE_M = 0.07  # distance between two findings of one object
 
 
 def marks(
     session: Session, files: ProjectFiles, project_id: str, name: str | None
 ) -> tuple[list[dict[str, Any]], list[float] | None]:
-    """Marks of one object, or with None of all, and what to look at."""
+    """Marks of one object, or of all with None, and the camera target."""
     items = [item for item in _scene_objects(files) if name is None or item.name == name]
     bundle = queries.newest_bundle(session, project_id)
     findings = (bundle.certificate or {}).get("findings", []) if bundle else []
@@ -43,7 +43,7 @@ def marks(
 
 
 def _axes(item: SceneObject) -> list[dict[str, Any]]:
-    """Each joint's axis through its origin, as long as the object is along it; a slide's begins there and shows its travel."""
+    """Each joint's axis through its origin, as long as the object; a slide's starts there and shows its travel."""
     pose = item.world_from_object
     found = []
     for joint in item.joints:

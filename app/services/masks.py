@@ -1,4 +1,4 @@
-"""Masks that follow from the clicks: live ones while annotating, else those of the last run."""
+"""Masks of the current clicks: live ones during annotation, else those of the last run."""
 
 import json
 from collections.abc import Sequence
@@ -32,28 +32,28 @@ from r2c2r_core.model.inputs import PromptPoint
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace, noun_path
 
-_INDEX_BYTES = 64 << 20  # of where masks are: 3000 objects of 500 frames
+_INDEX_BYTES = 64 << 20  # of mask indices: 3000 objects of 500 frames
 _STORED: FileCache[StoredMasks | None] = FileCache(_INDEX_BYTES)
 _FINISHED: FileCache[dict[str, str]] = FileCache(1 << 20)
 
 
-FrameMask = dict[str, Any]  # schemas.FrameMask: hundreds are shown at once, and what is stored is what goes over the wire
+FrameMask = dict[str, Any]  # schemas.FrameMask, sent as stored, since hundreds are shown at once
 
 
 class Places(NamedTuple):
-    """Where a project's masks are."""
+    """Locations of a project's masks."""
 
     files: ProjectFiles
     masks: str  # the folder of live ones, as text
 
     @classmethod
     def of(cls, files: ProjectFiles) -> "Places":
-        """The places of a project's files."""
+        """Mask locations in a project's files."""
         return cls(files, str(files.masks))
 
 
 class Found(NamedTuple):
-    """The masks that belong to an object's clicks, how far they are, and where they come from."""
+    """Masks of an object's current clicks, with state and source."""
 
     state: schemas.SegmentState
     masks: Masks
@@ -61,14 +61,14 @@ class Found(NamedTuple):
 
 
 def status(context: Context, project_id: str) -> schemas.LiveStatus:
-    """Whether masks can be drawn at once."""
+    """Status of the live segmenter."""
     with reading(context.engine) as session:
         queries.project_row(session, project_id)
     return context.live.status(project_id)
 
 
 def open_live(context: Context, project_id: str) -> schemas.LiveStatus:
-    """Start preparing the live segmenter, and compute the masks of what is clicked and has none: imported clicks, say."""
+    """Start preparing the live segmenter, and compute missing masks, e.g. of imported clicks."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = queries.live_objects(session, project_id)
@@ -78,20 +78,20 @@ def open_live(context: Context, project_id: str) -> schemas.LiveStatus:
     places = Places.of(context.files(project))
     tell_objects(context, project, starts=True)
     missing = [item for item in items if item.masks_key and _is_missing(found_of(context, project, item, places))]
-    for item in reversed(missing):  # what is asked for last is computed first
+    for item in reversed(missing):  # the last request is computed first
         _start(context, project, item, clicks.get(item.id or 0, []), tells=item is missing[0])
         context.live.on_object(project_id, item.id or 0)
     return context.live.status(project_id)
 
 
 def prepare(context: Context, project_id: str) -> None:
-    """Prepare a recording that was just read, so that nobody waits for it in Annotate; one project at a time."""
+    """Prepare a newly read recording, to avoid waiting in Annotate; one project at a time."""
     if not context.live.preparing:
         open_live(context, project_id)
 
 
 def segment(context: Context, project_id: str, object_id: int) -> None:
-    """Compute the object's masks now, also when there are some for these clicks."""
+    """Compute the object's masks now, even if they exist for these clicks."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -109,7 +109,7 @@ def cancel(context: Context, project_id: str, object_id: int) -> None:
 
 
 def segment_again(context: Context, project_id: str, object_id: int, key: str) -> bool:
-    """Compute the masks of these clicks of the object anew; False, and nothing, where it has others by now."""
+    """Recompute the object's masks for these clicks; False, without effect, if its clicks have changed."""
     with reading(context.engine) as session:
         item = queries.object_row(session, project_id, object_id)
     if item.masks_key != key:
@@ -119,9 +119,9 @@ def segment_again(context: Context, project_id: str, object_id: int, key: str) -
 
 
 def tell_objects(context: Context, project: Project, *, starts: bool = False) -> None:
-    """Tell the live segmenter what is clicked by now: a click on one object may part another's front, or leave it whole again.
+    """Send the current clicks to the live segmenter, as a click on one object may split another's front, or reunite it.
 
-    It is started for that where it is asked to, and where masks were drawn with clicks that are gone.
+    It is started for this if `starts` is set, and if masks depend on deleted clicks.
     """
     with context.live.telling:
         objects = _objects(context, project)
@@ -131,9 +131,9 @@ def tell_objects(context: Context, project: Project, *, starts: bool = False) ->
 
 
 def follow(context: Context, project_id: str, object_id: int, *, tells: bool = True) -> None:
-    """Compute the masks of changed clicks, unless they are already there (after an undo, say) or nothing is clicked.
+    """Compute the masks of changed clicks, unless they exist (e.g. after an undo) or there are no clicks.
 
-    Without `tells` another object follows at once, with which all are told.
+    Without `tells` another object follows at once, which sends all objects.
     """
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
@@ -146,7 +146,7 @@ def follow(context: Context, project_id: str, object_id: int, *, tells: bool = T
         return
     if not wanted:
         context.live.cancel(project_id, object_id)
-    elif found is not None and done and found.source == "live":  # a run's are shown anyway
+    elif found is not None and done and found.source == "live":  # a run's masks are shown anyway
         context.live.cancel(project_id, object_id)
         _show(context, project_id, object_id, found.masks)
     if tells:
@@ -154,7 +154,7 @@ def follow(context: Context, project_id: str, object_id: int, *, tells: bool = T
 
 
 def resume(context: Context) -> None:
-    """Go on with masks that were being computed when the server went away."""
+    """Resume masks that were being computed when the server stopped."""
     with reading(context.engine) as session:
         drawn = select(Project.id, Project.work_path, SceneObject.id, SceneObject.masks_key).join(SceneObject)
         drawn = drawn.where(Project.status == "ready", col(SceneObject.deleted).is_(False), SceneObject.masks_key != "")
@@ -167,7 +167,7 @@ def resume(context: Context) -> None:
 
 
 class MasksState(NamedTuple):
-    """How far the object's masks are, on how many frames it is seen, what went wrong, and what is doubtful about it."""
+    """State of the object's masks: progress, number of frames, errors and doubts."""
 
     state: schemas.SegmentState
     frames: int = 0
@@ -176,7 +176,7 @@ class MasksState(NamedTuple):
 
 
 def state_of(context: Context, project: Project, item: SceneObject, places: Places | None = None) -> MasksState:
-    """How the object's masks stand."""
+    """State of the object's masks."""
     found = found_of(context, project, item, places)
     if found is None:
         return MasksState("none")
@@ -186,7 +186,7 @@ def state_of(context: Context, project: Project, item: SceneObject, places: Plac
 
 
 def state_after_follow(context: Context, project: Project, item: SceneObject) -> MasksState:
-    """`state_of` as it will be once `follow` was there."""
+    """`state_of` as it will be after `follow`."""
     found = found_of(context, project, item)
     done = found is not None and found.state == "done"
     if item.masks_key and not item.deleted and not done and project.status == "ready":
@@ -195,7 +195,7 @@ def state_after_follow(context: Context, project: Project, item: SceneObject) ->
 
 
 def lanes(context: Context, project_id: str) -> list[schemas.Lane]:
-    """Where each object is seen."""
+    """Frames with masks of each object."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = queries.live_objects(session, project_id)
@@ -226,7 +226,7 @@ def on_frames(context: Context, project_id: str, frames: set[int]) -> dict[int, 
 def found_of(
     context: Context, project: Project | DrawnIn, item: SceneObject | Drawn, places: Places | None = None
 ) -> Found | None:
-    """The masks that belong to the object's clicks; None while there are none. Who asks for many gives the places."""
+    """Masks of the object's current clicks, or None. `places` avoids repeated path lookups."""
     number, key, places = item.id or 0, item.masks_key, places or Places.of(context.files(project))
     if not key:
         return None
@@ -245,7 +245,7 @@ def found_of(
 
 
 def front_of(context: Context, project: Project, item: SceneObject, places: Places) -> dict[str, Any] | None:
-    """The object's flat front: as its masks were drawn with it, else as the last run measured it from the same clicks."""
+    """The object's flat front from its masks, else from the last run with the same clicks."""
     found = found_of(context, project, item, places)
     if found is None or found.masks.front is not None or found.source == "run":
         return found.masks.front if found is not None else None
@@ -254,7 +254,7 @@ def front_of(context: Context, project: Project, item: SceneObject, places: Plac
 
 
 def _is_missing(found: Found | None) -> bool:
-    """Whether masks were never asked for, are of an older version, or were left when their process vanished."""
+    """Whether masks were never requested, are of an older version, or incomplete after a crash."""
     if found is None or found.masks.end == mask_store.OUTDATED:
         return True
     return found.state == "partial" and found.masks.end is None
@@ -273,7 +273,7 @@ def _start(context: Context, project: Project, item: SceneObject, clicks: list[q
 
 
 def _show(context: Context, project_id: str, object_id: int, masks: Masks) -> None:
-    """Draw masks that are there in every tab."""
+    """Publish existing masks to all tabs."""
     counts = {"done": len(masks), "total": len(masks)}
     context.hub.publish("segment", project_id, object=object_id, state="done", error=None, restart=True, **counts)
     for frame in masks.seen()[:, 0].astype(int).tolist():
@@ -283,7 +283,7 @@ def _show(context: Context, project_id: str, object_id: int, masks: Masks) -> No
 
 
 def _objects(context: Context, project: Project) -> list[dict[str, Any]]:
-    """The project's objects as app.jobs.disputes reads them: what is clicked, and what finished masks were drawn with."""
+    """The project's objects in the format of app.jobs.disputes: prompts, and other clicks used for finished masks."""
     with reading(context.engine) as session:
         items = [item for item in queries.live_objects(session, project.id) if item.masks_key]
         clicks = queries.clicks_by_object(session, project.id)
@@ -296,13 +296,13 @@ def _object_line(
 ) -> dict[str, Any]:
     found = found_of(context, project, item, places)
     prompt = prompt_entry(item, clicks)
-    prompt.pop("frames", None)  # large, and nobody else's
+    prompt.pop("frames", None)  # large, and irrelevant for other objects
     others = found.masks.others if found is not None and found.state == "done" else None
     return {"object": item.id, "key": item.masks_key, "prompt": prompt, "others": others}
 
 
 def _miss_clicks(objects: list[dict[str, Any]]) -> bool:
-    """Whether masks were drawn with clicks on others that are on none any more."""
+    """Whether masks depend on other objects' clicks that no longer exist."""
     there = {(point["frame"], point["x"], point["y"]) for line in objects for point in line["prompt"]["points"]}
     return any(tuple(click) not in there for line in objects for click in line["others"] or ())
 
@@ -317,12 +317,14 @@ def _lane(item: SceneObject, found: Found | None) -> schemas.Lane:
         source=found.source,  # type: ignore[arg-type]  # it is one of the two
         complete=found.state == "done",
         frames=seen[:, 0].astype(int).tolist(),
-        confidences=(np.floor(seen[:, 1] * 100 + 1e-9) / 100).tolist(),  # a lane shows no more; what is doubtful stays it
+        confidences=(
+            np.floor(seen[:, 1] * 100 + 1e-9) / 100
+        ).tolist(),  # a lane shows no more digits; rounded down, so that doubtful frames stay doubtful
     )
 
 
 def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, width: int) -> StoredMasks | None:
-    """The last run's masks, when it ran with these clicks and this segmenter; made for the browser once."""
+    """The last run's masks if it used these clicks and this segmenter, converted for the browser once."""
     if _finished_key(files, segmenter, item.result_name) != item.masks_key:
         return None
     noun = noun_path(files.work, "segment", item.result_name)
@@ -344,8 +346,8 @@ def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, w
 
 
 def _run_others(files: ProjectFiles, name: str) -> mask_store.Others:
-    """With which clicks on other objects the last run drew the object."""
-    from r2c2r_core.pipeline import DISPUTED  # it brings all stages: not when the server starts
+    """Other objects' clicks used by the last run for the object."""
+    from r2c2r_core.pipeline import DISPUTED  # imports all stages: not at server start
 
     disputed: dict[str, tuple[PromptPoint, ...]] = Workspace(files.work).load_latest("segment", DISPUTED) or {}
     return others_line(disputed.get(name, ()))
@@ -357,7 +359,7 @@ def _world_from_capture(files: ProjectFiles) -> Rigid3:
 
 
 def _entries(track: MaskTrack, width: int) -> list[Entry]:
-    """A run's masks as live ones are stored."""
+    """A run's masks in the format of live ones."""
     return [
         {
             "frame": frame,
@@ -370,7 +372,7 @@ def _entries(track: MaskTrack, width: int) -> list[Entry]:
 
 
 def _finished_key(files: ProjectFiles, segmenter: str, name: str) -> str | None:
-    """Key of the masks that the last run drew of the object, had that segmenter drawn them."""
+    """Key of the last run's masks of the object, assuming that segmenter."""
     path = files.finished_prompts
     keys = _FINISHED.get(path, lambda: _keys_in(path, segmenter), lambda keys, _: 100 * len(keys), about=segmenter)
     return keys.get(name) if keys is not None else None

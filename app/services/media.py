@@ -1,4 +1,4 @@
-"""Pixels and meshes for the browser, made once and kept in the project's previews."""
+"""Images and meshes for the browser, created once and cached in the project's previews."""
 
 import threading
 from collections.abc import Callable
@@ -24,7 +24,7 @@ _LOCKS = [threading.Lock() for _ in range(16)]
 
 
 def frame(context: Context, project_id: str, index: int, width: int | None) -> Path:
-    """A frame's JPEG, at its stored size or at one of the kept widths."""
+    """A frame's JPEG, at its stored size or at one of the cached widths."""
     files = _files(context, project_id)
     stored, size = _stored_frame(files, index)
     if width is None or width >= size[0]:
@@ -36,7 +36,7 @@ def frame(context: Context, project_id: str, index: int, width: int | None) -> P
 
 
 def depth(context: Context, project_id: str, index: int) -> Path:
-    """A frame's depth in colours, at the size of its preview; what was not measured is filled in faintly."""
+    """A frame's depth in colours, at preview size; unmeasured pixels are filled in faintly."""
     files = _files(context, project_id)
     colour, _ = _stored_frame(files, index)
     stored = depth_path(views.frames_folder(files), index)
@@ -64,7 +64,7 @@ def arriving(context: Context, project_id: str) -> Path:
 
 
 def scan(context: Context, project_id: str, side: str) -> Path:
-    """The fused scan from above ("plan") or from where it was filmed ("view"), drawn when the recording was read."""
+    """The fused scan from above ("plan") or from the filming side ("view"), rendered when the recording was read."""
     path = _files(context, project_id).root / f"scan-{side}.png"
     if not path.is_file():
         raise NotFound("the scan was not drawn", hint="import the recording again")
@@ -109,7 +109,7 @@ def _stored_frame(files: ProjectFiles, index: int) -> tuple[Path, tuple[int, int
 
 
 def kept_file(files: ProjectFiles, target: Path, make: Callable[[], bytes]) -> Path:
-    """The project's file, made if it is not there; two who ask at once make it once."""
+    """The project's file, created if missing, and only once for concurrent requests."""
     if target.is_file():
         return target
     with _LOCKS[hash(target) % len(_LOCKS)]:

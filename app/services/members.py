@@ -1,6 +1,6 @@
-"""Who may sign in at this server: what an admin sees of the accounts and changes about them.
+"""Account management for admins.
 
-What takes a password hashes it: call it behind the gate of passwords.
+Functions that take a password hash it: call them behind the password gate.
 """
 
 from sqlalchemy import func
@@ -20,25 +20,25 @@ def everyone(context: Context) -> list[schemas.AccountInfo]:
 
 
 def record(context: Context, before: int | None, limit: int) -> schemas.AuditPage:
-    """Sign-ins, refusals and changes of accounts, newest first."""
+    """Audit entries of sign-ins, refusals and account changes, newest first."""
     return audit.entries(context.engine, before, limit)
 
 
 def add(context: Context, body: schemas.AccountIn) -> schemas.AccountInfo:
-    """A new account."""
+    """Add an account."""
     accounts.add(context.engine, body.name, body.role, body.password, by=context.who)
     return _one(context, body.name)
 
 
 def change(context: Context, name: str, body: schemas.AccountPatch) -> schemas.AccountInfo:
-    """Another role, another password; both hold at once, on open connections too."""
+    """Change role or password, effective at once, also on open connections."""
     accounts.change(context.engine, name, role=body.role, password=body.password, by=context.who)
     context.people.look_again()
     return _one(context, name)
 
 
 def remove(context: Context, name: str) -> None:
-    """Delete the account: its sessions and open connections end; what the person did keeps the name."""
+    """Delete the account and end its sessions and connections; the history keeps the name."""
     accounts.remove(context.engine, name, by=context.who)
     context.people.look_again()
     crossing.sees_changed(context)

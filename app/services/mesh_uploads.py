@@ -1,4 +1,4 @@
-"""A mesh that a person made, as a candidate: received, looked at, and only then kept."""
+"""Upload of a user's mesh as a candidate: received, validated, then stored."""
 
 import contextlib
 import re
@@ -30,21 +30,23 @@ async def upload(
     rerun: bool,
     version: int | None = None,
 ) -> schemas.Reviewed:
-    """The object's candidate from a mesh file; nothing of it stays when it is refused or breaks off."""
+    """Add a candidate from a mesh file; nothing is kept if it is refused or interrupted."""
     name = _mesh_name(filename)
     context.gates.looks.check(context.who)  # before a byte is received
     folder = await anyio.to_thread.run_sync(_folder_for, context, project_id, object_id, version)
     stem = re.sub(r"[^A-Za-z0-9_]+", "_", Path(name).stem)[:40] or "mesh"
     async with _received(context, name, stream) as (received, _):
         target = folder / f"{stem}-{secrets.token_hex(4)}{received.suffix}"
-        wish = schemas.OverridePatch.model_construct(candidate=str(target), rerun=rerun, version=version)  # ours, however long
+        wish = schemas.OverridePatch.model_construct(
+            candidate=str(target), rerun=rerun, version=version
+        )  # our own path, of any length
         return await anyio.to_thread.run_sync(_adopt, context, project_id, object_id, received, wish)
 
 
 async def look(
     context: Context, project_id: str, object_id: int, filename: str, stream: AsyncIterator[bytes]
 ) -> schemas.MeshLook:
-    """What a mesh file would be used as, beside the size of what the object's masks show; nothing of it is kept."""
+    """Preview of a mesh file as a candidate, with the object's size from its masks; nothing is stored."""
     name = _mesh_name(filename)
     context.gates.looks.check(context.who)
     await anyio.to_thread.run_sync(_folder_for, context, project_id, object_id, None)
@@ -54,7 +56,7 @@ async def look(
 
 
 def _mesh_name(filename: str) -> str:
-    """The file's name, made safe; raises OverrideError for what is no mesh by its ending."""
+    """The file's sanitised name; raises OverrideError if its extension is not a mesh format."""
     name = safe_name(filename, "mesh")
     if Path(name).suffix.lower() not in SUFFIXES:
         raise OverrideError(f"{filename!r} is not a mesh this app reads", hint=f"send one of {', '.join(SUFFIXES)}")
@@ -63,7 +65,7 @@ def _mesh_name(filename: str) -> str:
 
 @contextlib.asynccontextmanager
 async def _received(context: Context, name: str, stream: AsyncIterator[bytes]) -> AsyncIterator[tuple[Path, dict[str, Any]]]:
-    """The file while it is used, and what was seen of it; what is still there afterwards is deleted."""
+    """Context with the received file and its probe result; the file is deleted afterwards unless moved."""
     received = receiving(context.settings.uploads, f"{secrets.token_hex(4)}{Path(name).suffix.lower()}")
     try:
         await _receive(stream, received)
@@ -76,7 +78,7 @@ async def _received(context: Context, name: str, stream: AsyncIterator[bytes]) -
 
 
 def _folder_for(context: Context, project_id: str, object_id: int, version: int | None) -> Path:
-    """Where the object's uploaded meshes are; raises what can be known to be wrong before a byte is received."""
+    """Folder of the object's uploaded meshes, with all checks possible before receiving."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -100,16 +102,16 @@ async def _receive(stream: AsyncIterator[bytes], target: Path) -> None:
 
 
 def _adopt(context: Context, project_id: str, object_id: int, received: Path, wish: schemas.OverridePatch) -> schemas.Reviewed:
-    """Keep the file for as long as the correction that names it is stored."""
+    """Move the file into place and store the correction that refers to it."""
     target = Path(wish.candidate or "")
     target.parent.mkdir(parents=True, exist_ok=True)
     received.replace(target)
     try:
-        context.store.keep(project_id)  # before a row names it
+        context.store.keep(project_id)  # before a row refers to it
         job, text = reviews.store_override(context, project_id, object_id, wish)
-    except BaseException:  # whatever it was: nothing names the file
+    except BaseException:  # any error: nothing refers to the file
         target.unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # others lie in it
+        with contextlib.suppress(OSError):  # it may contain other files
             target.parent.rmdir()
         raise
     return reviews.reviewed_shape(context, project_id, object_id, job, text)

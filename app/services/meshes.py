@@ -1,10 +1,10 @@
-"""A candidate's mesh for a person's eyes: upright and facing the camera where its placement is known."""
+"""A candidate's mesh for display: upright and facing the camera if its placement is known."""
 
 from itertools import permutations, product
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree  # here, not where it is used: two first requests at once would meet it half imported
+from scipy.spatial import cKDTree  # not imported lazily: two concurrent first requests would see it half imported
 
 from app.drawing import textured, unit
 from app.files import ProjectFiles
@@ -14,7 +14,7 @@ from r2c2r_core.model.mesh import MeshAsset, TexturedMesh
 
 SAMPLES = 1500
 
-_BOX_TURNS = [  # the 24 ways to lay a box onto a box
+_BOX_TURNS = [  # the 24 rotations that map a box onto a box
     np.eye(3)[list(order)] * np.array(signs)[:, None]
     for order in permutations(range(3))
     for signs in product((1.0, -1.0), repeat=3)
@@ -23,9 +23,9 @@ _BOX_TURNS = [  # the 24 ways to lay a box onto a box
 
 
 def upright(files: ProjectFiles, name: str, candidate: str) -> Matrix3:
-    """Rotation from the mesh's arbitrary frame to one with +Z up and the front at -Y; identity while nothing is known.
+    """Rotation from the mesh's arbitrary frame to one with +Z up and the front at -Y; identity if unknown.
 
-    Only the chosen candidate was aligned with the scan; the others are turned until they look like it.
+    Only the chosen candidate is aligned with the scan; the others are rotated to look most like it.
     """
     placement = views.latest(files, "align", name)
     if placement is None:
@@ -40,7 +40,7 @@ def upright(files: ProjectFiles, name: str, candidate: str) -> Matrix3:
 
 
 def turned_like(mesh: TexturedMesh, model: TexturedMesh) -> Matrix3:
-    """The rotation that makes `mesh` look most like `model`, among those that lay its box onto the model's box."""
+    """The rotation that makes `mesh` most similar to `model`, among those that align their boxes."""
     points, colours, axes = _sampled(mesh)
     model_points, model_colours, model_axes = _sampled(model)
     tree = cKDTree(model_points)
@@ -88,7 +88,7 @@ def _sampled(mesh: TexturedMesh) -> tuple[np.ndarray, np.ndarray, Matrix3]:
 
 
 def _object_axes(files: ProjectFiles, name: str) -> Matrix3:
-    """world_from_object rotation as the masks say it; identity where they do not."""
+    """world_from_object rotation from the masks; identity without one."""
     track = views.latest(files, "segment", name)
     if track is None:
         return np.eye(3)

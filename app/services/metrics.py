@@ -1,4 +1,4 @@
-"""What Prometheus reads of this server: what it counted, and the state of what all servers share."""
+"""Prometheus metrics of this server, and of the state shared by all servers."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ _OPEN = ("queued", "running", "cancelling")
 
 
 def exposed(context: Context) -> str:
-    """All metrics in the text format; raises Forbidden but for an admin, or a program with a token for them."""
+    """All metrics in the text format; raises Forbidden except for an admin, or a token with the metrics scope."""
     if context.person.scope != "metrics":
         context.require("admin")
     counted = context.metrics
@@ -24,7 +24,7 @@ def exposed(context: Context) -> str:
 
 
 def _states(context: Context) -> Iterator[str]:
-    """Of the database: the same at every server that shares it."""
+    """Gauges of the database, equal at all servers that share it."""
     with reading(context.engine) as session:
         rows = session.exec(select(Job.state, func.count()).where(col(Job.state).in_(_OPEN)).group_by(Job.state))
         jobs = dict(rows.all())
@@ -35,7 +35,7 @@ def _states(context: Context) -> Iterator[str]:
 
 
 def _machine(context: Context) -> Iterator[str]:
-    """Of this server."""
+    """Gauges of this server."""
     settings, memory = context.settings, psutil.Process().memory_info()
     yield from gauge("r2c2r_build_info", "The version that runs", [((("version", __version__),), 1)])
     seats = settings.heavy_jobs if settings.run_jobs else 0

@@ -1,4 +1,4 @@
-"""What others did to a project since a person last said that all was read, or did something there."""
+"""Changes of a project by others since a user last marked them as read, or made a change there."""
 
 import time
 from collections import Counter
@@ -14,11 +14,11 @@ from app.db.tables import Event, Seen
 from app.services import imports, projects
 from app.services.context import Context
 
-SHOWN = 50  # entries; how much each person did counts all
+SHOWN = 50  # maximum entries; counts per user include all
 
 
 def news(context: Context, project_id: str) -> schemas.News:
-    """Of who asks; empty for who has no account, and before the first `mark_seen`."""
+    """News of the current user; empty without an account, and before the first `mark_seen`."""
     with reading(context.engine) as session:
         queries.project_row(session, project_id)
         last = session.exec(select(func.max(Event.id)).where(Event.project_id == project_id)).one() or 0
@@ -38,7 +38,7 @@ def news(context: Context, project_id: str) -> schemas.News:
 
 
 def mark_seen(context: Context, project_id: str, body: schemas.SeenIn) -> schemas.News:
-    """The news up to that event were read; one that was read before is no step back."""
+    """Mark the news up to an event as read; an earlier event has no effect."""
     with writing(context.engine) as session:
         queries.project_row(session, project_id)
         account = imports.account_of(context, session)
@@ -50,7 +50,7 @@ def mark_seen(context: Context, project_id: str, body: schemas.SeenIn) -> schema
 
 
 def _read(context: Context, session: Session, project_id: str) -> tuple[int, float] | None:
-    """The last event that the person knows of, and when that was."""
+    """The last event known to the user, and its time."""
     account = imports.account_of(context, session)
     if account is None:
         return None

@@ -1,6 +1,6 @@
-"""Signing in at the lab's identity provider: OpenID Connect's code flow with PKCE, by authlib.
+"""Sign-in at an identity provider: OpenID Connect's code flow with PKCE, by authlib.
 
-What a sign-in was begun with (state, nonce, verifier) stays in the browser's own cookie: any server of several may end it.
+State, nonce and verifier of a sign-in are stored in the browser's cookie, so that any of several servers can complete it.
 """
 
 import hmac
@@ -21,28 +21,28 @@ Result = TypeVar("Result")
 
 
 class Begun(NamedTuple):
-    """A sign-in on its way."""
+    """A sign-in in progress."""
 
     state: str
     nonce: str
     verifier: str
-    wanted: str  # the path that was asked for before
+    wanted: str  # the originally requested path
 
     def cookie(self) -> str:
-        """As the browser keeps it."""
+        """Cookie value."""
         return ".".join((self.state, self.nonce, self.verifier, quote(self.wanted, safe="")))
 
 
 class Named(NamedTuple):
-    """Who the provider says it is."""
+    """Identity from the provider."""
 
-    subject: str  # never another person's
+    subject: str  # never reassigned
     name: str
-    role: Role | None  # by groups; None where none are mapped
+    role: Role | None  # by groups; None if none is mapped
 
 
 class Provider:
-    """The one that the settings name. Raises Unavailable where it does not answer."""
+    """The configured OpenID provider. Raises Unavailable where it does not answer."""
 
     def __init__(self, settings: Settings) -> None:
         try:
@@ -62,14 +62,14 @@ class Provider:
         )
 
     async def begin(self, back: str, wanted: str) -> tuple[str, Begun]:
-        """The provider's page, which sends the browser back to the address `back`, and what that must fit."""
+        """The provider's sign-in page, which redirects to `back`, and the state to verify afterwards."""
         metadata = await self._metadata()
         scope = " ".join(["openid", "profile", "email", *({"groups"} & set(metadata.get("scopes_supported", ())))])
         made = await self._asked(self._app.create_authorization_url(back, scope=scope))
         return made["url"], Begun(made["state"], made["nonce"], made["code_verifier"], wanted)
 
     async def end(self, back: str, said: Mapping[str, str], begun: Begun | None) -> Named:
-        """Who it is; raises Unauthorised for an answer that does not belong to what was begun, Forbidden for who may not in."""
+        """Complete a sign-in; raises Unauthorised for an answer that does not match it, Forbidden for users without access."""
         if begun is None or not hmac.compare_digest(said.get("state", "").encode(), begun.state.encode()):
             raise Unauthorised("this sign-in was not begun in this browser, or over ten minutes ago", hint=BEGIN)
         if said.get("iss", self.issuer) != self.issuer:
@@ -87,7 +87,7 @@ class Provider:
         return self._named(await self._whole(token, claims))
 
     async def leave(self, back: str) -> str:
-        """Where the provider's own session ends and the browser goes on to `back`, if it has such a page; else `back`."""
+        """The provider's sign-out page, which redirects to `back`, or `back` itself without one."""
         page = (await self._metadata()).get("end_session_endpoint")
         said = urlencode({"client_id": self._client_id, "post_logout_redirect_uri": back})
         return f"{page}{'&' if '?' in page else '?'}{said}" if page else back
@@ -103,7 +103,7 @@ class Provider:
         return found
 
     async def _whole(self, token: dict[str, Any], claims: dict[str, Any]) -> dict[str, Any]:
-        """With what the provider keeps for its page of the person."""
+        """The claims completed from the provider's userinfo endpoint."""
         if {"preferred_username", "groups"} <= claims.keys() or "userinfo_endpoint" not in await self._metadata():
             return claims
         further = await self._asked(self._app.userinfo(token=token))
@@ -127,7 +127,7 @@ class Provider:
         return max(reached, key=ROLES.index)
 
     async def _asked(self, answer: Awaitable[Result]) -> Result:
-        """What the provider answers; whatever is wrong with it is said in one line."""
+        """The provider's answer, with all failures turned into one-line errors."""
         import httpx2
         from authlib.integrations.base_client import OAuthError
         from joserfc.errors import JoseError
@@ -145,7 +145,7 @@ class Provider:
 
 
 def begun(cookie: str) -> Begun | None:
-    """What a browser kept; None where it kept nothing of it."""
+    """The sign-in stored in a cookie, or None."""
     match cookie.split(".", 3):
         case [state, nonce, verifier, wanted] if state and nonce and verifier:
             return Begun(state, nonce, verifier, unquote(wanted))

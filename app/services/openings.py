@@ -1,4 +1,4 @@
-"""How leaves were filmed to move, with what people marked of it: shown before any run knows it."""
+"""Filmed motion of leaves with manual marks, shown before a run."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,7 +20,7 @@ States = Mapping[str, Marks]
 
 
 def openings(context: Context, project_id: str) -> list[schemas.Opening]:
-    """How the objects' leaves were filmed to move, as far as their masks are done, and as people said."""
+    """Motion of the objects' leaves from completed masks and manual marks."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = queries.live_objects(session, project_id)
@@ -37,12 +37,12 @@ def openings(context: Context, project_id: str) -> list[schemas.Opening]:
 
 
 def states_said(override: Mapping[str, Any]) -> States:
-    """What people marked of an object, from what is stored of its corrections."""
+    """Manually marked states of an object, from its stored corrections."""
     return {joint: {mark["frame"]: mark["state"] for mark in marks} for joint, marks in (override.get("states") or {}).items()}
 
 
 def built(files: ProjectFiles, stage: str, name: str, said: States) -> SceneObject | None:
-    """An object of a stage's newest scene, its joints as people marked them; None where it has none of that name."""
+    """An object of a stage's newest scene, with joints updated by manual marks; None for an unknown name."""
     scene = views.latest(files, stage, "scene")
     item: SceneObject | None = next((one for one in scene.objects if one.name == name), None) if scene is not None else None
     if item is None:
@@ -53,7 +53,7 @@ def built(files: ProjectFiles, stage: str, name: str, said: States) -> SceneObje
 
 
 def opening_of(object_id: int, item: SceneObject, joint: Joint) -> schemas.Opening | None:
-    """How a joint was filmed to move, or was marked; None where it was not."""
+    """Filmed or marked motion of a joint; None without any."""
     if joint.motion is None:
         return None
     (line,) = motion_lines([joint.motion])
@@ -61,7 +61,7 @@ def opening_of(object_id: int, item: SceneObject, joint: Joint) -> schemas.Openi
 
 
 def _with_marks(files: ProjectFiles, name: str, lines: list[dict[str, Any]], said: States) -> list[dict[str, Any]]:
-    """The lines as they follow from the marks, and others for what was marked and is in none of them."""
+    """The motions updated by the marks, with additional ones for marks without a motion."""
     item = built(files, "warp", name, said) if said else None
     if item is None:
         return lines

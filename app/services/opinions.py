@@ -1,4 +1,4 @@
-"""Second opinions: copies of a recording that people work on apart, and how far what they made agrees."""
+"""Second opinions: independently annotated copies of a recording, and their agreement."""
 
 import time
 from collections import Counter
@@ -20,19 +20,19 @@ from app.services.overlap import Overlaps, Pair, spread
 
 MOST_FRAMES = 200  # spread over the recording
 LONGEST_TITLE = 120
-LEAST_IOU = 0.1  # less in common, and two objects are two
+LEAST_IOU = 0.1  # minimum overlap of two annotations of one object
 _HEAD = ["first object", "first category", "second object", "second category", "mask IoU", "frames of both", "same category"]
 
 
 def listed(context: Context, project_id: str) -> list[schemas.Opinion]:
-    """The other projects of the recording that were made as a second opinion of it, or it of them, oldest first."""
+    """Other projects related to this one as second opinions, oldest first."""
     with reading(context.engine) as session:
         rows = _others(context, session, queries.project_row(session, project_id))
         return [_shape(session, row) for row in rows]
 
 
 def ask(context: Context, project_id: str, body: schemas.OpinionIn) -> schemas.Project:
-    """A copy of the recording, without anything that people made of it, assigned to somebody."""
+    """Create a copy of the recording without user input, assigned to a user."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         root, title = project.opinion_of or project.id, project.name
@@ -51,7 +51,7 @@ def ask(context: Context, project_id: str, body: schemas.OpinionIn) -> schemas.P
 
 
 def agreement(context: Context, project_id: str, other_id: str) -> schemas.Agreement:
-    """How far what people made of one recording agrees; it reads all masks: call it behind the gate of looks."""
+    """Agreement of two annotations of one recording; it reads all masks, so call it behind the gate of looks."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         others = {row.id: row for row in _others(context, session, project)}
@@ -71,7 +71,7 @@ def agreement(context: Context, project_id: str, other_id: str) -> schemas.Agree
 
 
 def table(context: Context, project_id: str, other_id: str) -> str:
-    """The same as CSV, a line an object."""
+    """The same as CSV, one line per object."""
     found = agreement(context, project_id, other_id)
     rows = []
     for line in found.objects:
@@ -83,14 +83,14 @@ def table(context: Context, project_id: str, other_id: str) -> str:
 
 
 class Side(NamedTuple):
-    """One of two projects: its objects, and the masks that are there of them."""
+    """One of two compared projects: objects with available masks."""
 
     objects: dict[Hashable, schemas.AgreedObject]
     masks: dict[Hashable, Masks]
 
     @property
     def frames(self) -> set[int]:
-        """In which any object has a mask."""
+        """Frames in which any object has a mask."""
         return {int(frame) for found in self.masks.values() for frame in found.seen()[:, 0]}
 
     def on(self, frame: int) -> dict[Hashable, dict[str, Any]]:
@@ -100,7 +100,7 @@ class Side(NamedTuple):
 
 
 def side(context: Context, session: Session, project: Project) -> Side:
-    """A project as one of two that are compared."""
+    """A project as one side of a comparison."""
     items = {item.id: item for item in queries.live_objects(session, project.id)}
     places = masks.Places.of(context.files(project))
     found = {number: masks.found_of(context, project, item, places) for number, item in items.items()}
@@ -152,12 +152,12 @@ def _agreed(first: schemas.AgreedObject | None, second: schemas.AgreedObject | N
 
 
 def same_category(first: str, second: str) -> bool:
-    """Whether two words name one category."""
+    """Whether two words name the same category."""
     return _meant(first) == _meant(second)
 
 
 def _meant(category: str) -> str:
-    """The category that the word names; one that the table does not know is itself."""
+    """The category named by a word; an unknown word is its own category."""
     from r2c2r_core.kitchen.names import named
 
     found = named(category)

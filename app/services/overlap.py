@@ -1,4 +1,4 @@
-"""Masks of two sets of objects on the frames of one recording, as pixels that they share: counted in the masks' boxes."""
+"""IoU of two sets of masks over the frames of a recording, counted within bounding boxes."""
 
 from collections import Counter
 from collections.abc import Hashable, Iterable
@@ -13,16 +13,16 @@ Bits = dict[str, Any]  # schemas.MaskBits
 
 
 class Pair(NamedTuple):
-    """An object of each set that have pixels in common."""
+    """A pair of overlapping objects, one of each set."""
 
     first: Hashable
     second: Hashable
-    iou: float  # pixels in both of those in either, over all frames
+    iou: float  # over all frames
     frames: int  # in which both have a mask
 
 
 class Overlaps:
-    """What is counted, a frame at a time."""
+    """Accumulated pixel counts, updated per frame."""
 
     def __init__(self) -> None:
         self._shared: Counter[tuple[Hashable, Hashable]] = Counter()
@@ -41,7 +41,7 @@ class Overlaps:
                     self._shared[one, other] += shared
 
     def matched(self, least: float) -> list[Pair]:
-        """Each object with at most one of the other set, the most alike first, down to that IoU."""
+        """Greedy one-to-one matching by descending IoU, down to `least`."""
         pairs = [self._pair(one, other) for one, other in self._shared]
         taken: tuple[set[Hashable], set[Hashable]] = (set(), set())
         found = []
@@ -59,7 +59,7 @@ class Overlaps:
 
 
 def spread(frames: Iterable[int], most: int) -> list[int]:
-    """At most so many of the frames, as far apart as can be."""
+    """At most `most` of the frames, evenly spread."""
     ordered = sorted(frames)
     if len(ordered) <= most:
         return ordered
@@ -67,7 +67,7 @@ def spread(frames: Iterable[int], most: int) -> list[int]:
 
 
 class _Box(NamedTuple):
-    """The box that a mask lies in, and the mask within it."""
+    """A mask with its bounding box."""
 
     left: int
     top: int
@@ -83,7 +83,7 @@ class _Box(NamedTuple):
         return int(np.count_nonzero(self.mask))
 
     def shared(self, other: "_Box") -> int:
-        """Pixels in both."""
+        """Number of pixels in both masks."""
         left, top = max(self.left, other.left), max(self.top, other.top)
         mine = self.mask[top - self.top :, left - self.left :]
         theirs = other.mask[top - other.top :, left - other.left :]

@@ -1,4 +1,4 @@
-"""The object's mesh drawn over the photos it was seen in: ghost, outline, and how far it is from the measured depth."""
+"""Renderings of an object's mesh over photos: ghost, outline, and residual to the measured depth."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,14 +28,16 @@ from r2c2r_core.synthesize.filmed import widest
 from r2c2r_core.synthesize.marked import part_of
 from r2c2r_core.workspace import content_key
 
-WIDTH = 1920  # pixels: those of the largest photos, and smooth where a part of a smaller one fills the screen
-_LINE_OF = 960  # pixels of a photo's width for each pixel of a line's
+WIDTH = 1920  # pixels: the size of the largest photos, and smooth when zooming into smaller ones
+_LINE_OF = 960  # line width is the photo's width divided by this
 PHOTOS = 12
-_AT_BORDER = 0.01  # of the image: what reaches nearer to its edge may go on beyond
-FAR_M = 0.03  # a residual of this much has its full colour
-_FAINT = 0.25  # of its opacity, what something else covers: it is there, and not in front
+_AT_BORDER = 0.01  # fraction of the image: closer to its edge, an object may be cut off
+FAR_M = 0.03  # residual with full colour
+_FAINT = 0.25  # opacity factor of occluded parts
 _OUTLINE = (77, 225, 255)  # BGR
-_EDGE = 0.0002  # Laplacian of the inverse depth over its largest value: edges between faces; flat ones have less than 0.0001
+_EDGE = (
+    0.0002  # threshold of the inverse depth's Laplacian over its maximum for edges between faces; flat faces are below 0.0001
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +52,7 @@ class Part:
 
 
 def photos(context: Context, project_id: str, object_id: int) -> schemas.ObjectPhotos:
-    """The frames that show most of the object, and what can be laid over them."""
+    """The frames that show most of the object, and the available overlays."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -83,7 +85,7 @@ def photos(context: Context, project_id: str, object_id: int) -> schemas.ObjectP
 def overlay(
     context: Context, project_id: str, object_id: int, index: int, of: schemas.OverlayOf, look: schemas.OverlayLook
 ) -> Path:
-    """The object drawn for one frame: a PNG with a transparent ground, kept until the object is placed or fitted anew."""
+    """Overlay of the object for one frame: a PNG with transparent background, cached until the object changes."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id, deleted=True)
@@ -95,7 +97,7 @@ def overlay(
 
 
 def point_under(context: Context, project_id: str, object_id: int, index: int, x: float, y: float) -> list[float] | None:
-    """The point of the object's mesh, in the world, under a pixel of the stored frame; None where the mesh is not there."""
+    """World point of the object's mesh under a pixel of the stored frame, or None."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -120,7 +122,7 @@ def point_under(context: Context, project_id: str, object_id: int, index: int, x
 
 
 def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf, index: int, said: openings.States) -> list[Part]:
-    """The object's meshes in the world as they stood in a frame, filmed or marked; NotReady before that stage made them."""
+    """The object's meshes in the world at a frame's joint states, filmed or marked; NotReady before that stage."""
     if of == "placed":
         placement, made = (views.latest(files, stage, name) for stage in ("align", "generate"))
         asset = (
@@ -144,7 +146,7 @@ def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf, index: int, 
 
 
 def _scene_parts(item: SceneObject, index: int) -> list[Part]:
-    """Its links where they stood in a frame, as far as that was measured; closed where it was not."""
+    """The object's links at a frame's measured joint states; closed where unknown."""
     parts = []
     for link in item.links:
         world_from_link = item.world_from_object @ _moved(item, link.name, index) @ link.object_from_link
@@ -161,7 +163,7 @@ def _scene_parts(item: SceneObject, index: int) -> list[Part]:
 
 
 def _moved(item: SceneObject, link: str, index: int) -> Rigid3:
-    """How a link stood away from its closed place in a frame, in the object's frame."""
+    """Motion of a link from its closed pose in a frame, in the object's coordinates."""
     joint = next((joint for joint in item.joints if joint.child == link), None)
     if joint is None:
         return Rigid3()
@@ -174,13 +176,13 @@ def _moved(item: SceneObject, link: str, index: int) -> Rigid3:
 
 
 def _state(joint: Joint, index: int) -> float:
-    """Its position in a frame, as it was filmed; 0 where that is not known."""
+    """Filmed joint position in a frame; 0 if unknown."""
     state = joint.motion.states.get(index) if joint.motion is not None else None
     return state.value if state is not None and state.value is not None else 0.0
 
 
 def _opened_frames(item: SceneObject) -> set[int]:
-    """For each joint that was filmed open, a frame half way and one at its widest."""
+    """For each joint filmed open, a frame half way and one at the widest opening."""
     chosen = set()
     for joint in item.joints:
         known = {f: s.value for f, s in joint.motion.states.items() if s.value} if joint.motion is not None else {}
@@ -207,14 +209,14 @@ def _drawn(files: ProjectFiles, index: int, look: schemas.OverlayLook, parts: li
 
 
 def _camera_of(frame: Frame) -> Intrinsics:
-    """The photo's camera, at the size in which overlays are drawn."""
+    """The photo's camera at overlay resolution."""
     return frame.rgb_camera.resized(WIDTH, round(WIDTH * frame.rgb_camera.height / frame.rgb_camera.width))
 
 
 def _covered(files: ProjectFiles, index: int, depth: np.ndarray) -> np.ndarray:
-    """Where something that was measured stands before the drawn surface; nowhere in a frame without a depth image.
+    """Mask of measured occluders in front of the rendered surface; empty without a depth image.
 
-    An outline's rim lies a pixel beside the surface too: what covers the nearest part of it covers the rim.
+    An outline's rim extends a pixel beyond the surface: occluders of the nearest surface also occlude the rim.
     """
     raw = cv2.imread(str(depth_path(views.frames_folder(files), index)), cv2.IMREAD_UNCHANGED)
     if raw is None:
@@ -223,7 +225,7 @@ def _covered(files: ProjectFiles, index: int, depth: np.ndarray) -> np.ndarray:
     metres, weight = (
         cv2.resize(one.astype(np.float32), depth.shape[::-1], interpolation=cv2.INTER_LINEAR) for one in (known, known > 0)
     )
-    measured = metres / np.maximum(weight, 1e-6)  # between pixels: borders without the stairs of the coarser depth image
+    measured = metres / np.maximum(weight, 1e-6)  # interpolated, to avoid stair-stepped borders of the coarser depth image
     spread = cv2.dilate(depth, np.ones((5, 5), np.uint8))
     drawn = np.where(depth > 0, depth, spread)
     covered: np.ndarray = (weight > 0) & (drawn > measured + FAR_M)
@@ -231,7 +233,7 @@ def _covered(files: ProjectFiles, index: int, depth: np.ndarray) -> np.ndarray:
 
 
 def _render(parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) -> tuple[np.ndarray, np.ndarray]:
-    """BGR (h, w, 3) and z-depth (h, w) of what is nearest."""
+    """BGR (h, w, 3) and z-depth (h, w) of the nearest surface."""
     colours = np.zeros((camera.height, camera.width, 3), np.uint8)
     depth = np.zeros((camera.height, camera.width), np.float32)
     for part in parts:
@@ -247,7 +249,7 @@ def _render(parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) ->
 
 
 def _outline(depth: np.ndarray) -> np.ndarray:
-    """BGRA: the silhouette's rim and the edges inside it, dark-edged so that it shows on any photo.
+    """BGRA: silhouette and inner edges, with dark borders for visibility on any photo.
 
     The inverse depth of a plane is affine in the pixels: its Laplacian is zero on every face, however oblique.
     """
@@ -266,7 +268,7 @@ def _widened(line: np.ndarray, width_px: int) -> np.ndarray:
 
 
 def _residual(files: ProjectFiles, index: int, parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) -> np.ndarray:
-    """BGRA at depth size: red where the mesh stands before the measured surface, blue where behind, pale where they agree."""
+    """BGRA at depth size: red where the mesh is in front of the measured surface, blue where behind, pale in agreement."""
     raw = cv2.imread(str(depth_path(views.frames_folder(files), index)), cv2.IMREAD_UNCHANGED)
     if raw is None:
         raise NotFound(f"frame {index} has no depth image")
@@ -276,7 +278,7 @@ def _residual(files: ProjectFiles, index: int, parts: list[Part], camera: Intrin
     _, depth = _render(parts, camera, camera_from_world)
     both = (depth > 0) & (measured > 0)
     off = np.clip((measured - depth) / FAR_M, -1, 1)
-    occluded = off < -0.999  # something stands before the object there: no word about the object
+    occluded = off < -0.999  # an occluder: no information about the object
     strength = np.abs(off)
     before, behind = np.array([40, 40, 220.0]), np.array([220, 120, 30.0])
     pale = np.array([235, 245, 235.0])
@@ -311,7 +313,7 @@ def _photo(
 
 
 def _leaf(object_id: int, item: SceneObject, joint: Joint) -> schemas.Leaf:
-    """What it moves, closed: about its front boards, or about all of it where it has none."""
+    """The part moved by a joint, closed: box of its front boards, or of all boards without any."""
     link = next(link for link in item.links if link.name == joint.child)
     boxes = link.of_role("front") or link.boxes
     corners = [box.link_from_box.apply(box_mesh(-box.size_m / 2, box.size_m / 2)[0]) for box in boxes]
@@ -339,7 +341,7 @@ def _path(files: ProjectFiles, stage: str, name: str) -> Path:
 
 
 def _version(files: ProjectFiles, name: str, said: openings.States) -> str:
-    """Changes whenever one of the stages made the object anew, or somebody marked how far it stands open."""
+    """Key that changes whenever a stage recomputes the object, or a state is marked."""
     times = [
         path.stat().st_mtime_ns for stage in ("align", "synthesize", "warp") if (path := _path(files, stage, name)).is_file()
     ]

@@ -1,4 +1,4 @@
-"""Tokens as people make and revoke them on the server's pages and routes: their own, and an admin everybody's."""
+"""Token management by users: their own tokens, and all tokens for admins."""
 
 from app import schemas
 from app.errors import Forbidden
@@ -7,12 +7,12 @@ from app.services.context import Context
 
 
 def listed(context: Context) -> list[schemas.ApiToken]:
-    """The tokens of who asks; an admin's list has everybody's."""
+    """The current user's tokens; for an admin, everyone's."""
     return tokens.everyone(context.engine, of=_only(context))
 
 
 def add(context: Context, body: schemas.ApiTokenIn) -> schemas.NewApiToken:
-    """A token of who asks; raises Forbidden for a program: what it has been lent it lends nobody."""
+    """Create a token of the current user; raises Forbidden for a token user, which may not delegate its rights."""
     _require_in_person(context)
     owner = context.who if context.person.account else None
     secret, shape = tokens.add(context.engine, owner, body.name, body.scope, by=context.who)
@@ -20,14 +20,14 @@ def add(context: Context, body: schemas.ApiTokenIn) -> schemas.NewApiToken:
 
 
 def revoke(context: Context, number: int) -> None:
-    """Revoke one's own, or as an admin anybody's; open connections with it end."""
+    """Revoke one's own token, or any as an admin, and end its connections."""
     _require_in_person(context)
     tokens.revoke(context.engine, number, of=_only(context), by=context.who)
     context.people.look_again()
 
 
 def _only(context: Context) -> str | None:
-    """Whose tokens who asks may see; None: everybody's."""
+    """The user whose tokens are visible; None: everyone's."""
     return None if context.person.may("admin") else context.who
 
 

@@ -1,7 +1,7 @@
-"""The one HTML page, with what its address will ask for first said in its head: nothing waits for a script to ask.
+"""The single HTML page with preload hints for the resources that its address needs first.
 
-Without this a browser learns of the modules level by level, of the frames from a module, and of the first picture from
-the frames: a round trip each, which a busy machine makes seconds.
+Otherwise the browser discovers modules level by level, the frames from a module, and the first picture from the frames:
+a round trip each, which take seconds on a busy machine.
 """
 
 import re
@@ -19,12 +19,12 @@ from app.services import projects
 from app.services.context import Context
 
 OF_A_PROJECT = ("annotate", "elevation", "run", "review", "download", "agreement")
-SHOWN_WIDTH = 960  # of a frame, as static/js/annotate/frames.js asks for it
+SHOWN_WIDTH = 960  # of a frame, as requested by static/js/annotate/frames.js
 _IMPORTED = re.compile(r'^(?:import|export)\b[^;]*?from "(\.[^"]+)";', re.MULTILINE)
 
 
 def html(context: Context, path: str, frame: str = "", person: Person | None = None) -> str:
-    """The page at a path, asking at once for that page's modules and, where frames are clicked, for the one shown first."""
+    """The page at a path, preloading its modules and, on annotation pages, the first frame."""
     page, project = shown_at(path)
     shown = page == "annotate" and context.access.sees(person or context.person, project)
     head = _first_frame(context, project, frame) if shown else []
@@ -34,7 +34,7 @@ def html(context: Context, path: str, frame: str = "", person: Person | None = N
 
 
 def sign_in(context: Context, refused: str = "") -> str:
-    """The page on which people sign in: at the identity provider, where there is one, and why that was refused."""
+    """The sign-in page, with the identity provider if there is one, and the reason of a refusal."""
     text = (context.static / "login.html").read_text(encoding="utf-8")
     if context.provider is not None:
         host = escape(urlsplit(context.provider.issuer).netloc)
@@ -43,7 +43,7 @@ def sign_in(context: Context, refused: str = "") -> str:
 
 
 def shown_at(path: str) -> tuple[str, str]:
-    """Which page a path shows and of which project ("" for none), as static/js/router.js says."""
+    """Page and project of a path ("" for none), as in static/js/router.js."""
     first, project, page = [*(part for part in path.split("/") if part), "", "", ""][:3]
     if first in ("inbox", "people", "templates", "webhooks"):
         return first, ""
@@ -54,7 +54,7 @@ def shown_at(path: str) -> tuple[str, str]:
 
 @lru_cache(maxsize=16)
 def modules(static: Path, page: str) -> list[str]:
-    """The modules that the page needs to show itself, relative to the static folder: the shell's and its own."""
+    """The modules needed by the page, relative to the static folder: the shell's and its own."""
     waiting, found = ["js/main.js", f"js/pages/{page}.js"], dict[str, None]()
     while waiting:
         module = waiting.pop(0)
@@ -67,7 +67,7 @@ def modules(static: Path, page: str) -> list[str]:
 
 
 def _first_frame(context: Context, project_id: str, frame: str) -> list[str]:
-    """The picture that is seen first, and the table of frames; nothing for a project that is not there or not read yet."""
+    """The first picture and the frame table; empty for an unknown or unread project."""
     try:
         with reading(context.engine) as session:
             project = queries.project_row(session, project_id)

@@ -1,7 +1,7 @@
-"""Which passwords are refused: those that a guesser tries first. Pure functions.
+"""Refusal of weak passwords, which attackers try first. Pure functions.
 
-Length comes first (NIST SP 800-63B, 5.1.1.2: no rules about kinds of characters, but a list of what is commonly used and what
-can be told from the account).
+Length matters most (NIST SP 800-63B, 5.1.1.2: no composition rules, but a list of common passwords and of those derived from
+the account).
 """
 
 import re
@@ -11,29 +11,29 @@ from r2c2r_core.errors import InputError
 SHORTEST = 10
 LONGEST = 1000
 FEWEST_CHARACTERS = 4  # different ones
-FEWEST_OWN_LETTERS = 4  # beside the name of the account, or a common word
+FEWEST_OWN_LETTERS = 4  # besides the account's name or a common word
 _ROWS = ("0123456789", "abcdefghijklmnopqrstuvwxyz", "qwertyuiop", "qwertzuiop", "asdfghjkl", "1qaz2wsx3edc4rfv5tgb6yhn7ujm")
 _COMMON = (
     *("password", "passwort", "passwd", "qwerty", "qwertz", "letmein", "welcome", "willkommen", "iloveyou", "admin"),
     *("administrator", "changeme", "secret", "default", "login", "abc", "monkey", "dragon", "football", "baseball", "sunshine"),
     *("princess", "master", "superman", "trustno", "hello", "hallo", "test", "guest", "root", "kitchen", "rcr"),
 )
-_READ_AS = str.maketrans("013457@$!", "oieastasi")  # digits and signs that stand for letters
-_AT_THE_END = "0123456789!$.#*?-_"  # what people add because they must
+_READ_AS = str.maketrans("013457@$!", "oieastasi")  # digits and symbols substituted for letters
+_AT_THE_END = "0123456789!$.#*?-_"  # usual suffixes
 _HINT = (
     f"at least {SHORTEST} characters that nobody would try first, such as three words that have nothing to do with each other"
 )
 
 
 def refuse_weak(name: str, password: str) -> None:
-    """Raise InputError, with the reason, for a password that a guesser would try for the account of that name."""
+    """Raise InputError, with the reason, for a weak password of the account."""
     reason = weakness(name.casefold(), password)
     if reason:
         raise InputError(f"the password {reason}", hint=_HINT)
 
 
 def weakness(name: str, password: str) -> str:
-    """What is wrong with a password of the account `name`; empty when nothing is."""
+    """Weakness of a password of the account `name`; empty without any."""
     folded = password.casefold()
     if not SHORTEST <= len(password) <= LONGEST:
         return f"has {len(password)} characters"
@@ -53,7 +53,7 @@ def weakness(name: str, password: str) -> str:
 
 
 def _in_order(text: str, row: str) -> bool:
-    """Whether the text goes along the row, forwards or backwards, beginning anew where it ends."""
+    """Whether the text follows the row cyclically, forwards or backwards."""
     round_and_round = row * (len(text) // len(row) + 2)
     return text in round_and_round or text[::-1] in round_and_round
 

@@ -1,4 +1,4 @@
-"""Who is here: the browsers that were let in, by the printed key or by a password."""
+"""Sessions of signed-in browsers, by printed key, password, proxy or identity provider."""
 
 import asyncio
 import contextlib
@@ -26,49 +26,49 @@ from r2c2r_core.errors import R2C2RError
 
 _log = logging.getLogger(__name__)
 
-KEPT_S = 30 * 24 * 3600.0  # since it was last used
-PROVIDED_S = 24 * 3600.0  # the identity provider is asked again after a day: who left the lab is out by then
-REMEMBERED_S = 2.0  # a person is looked up again after this: `r2c2r user` changes the file from another process
-KEY_REFUSAL_S = 10.0  # a wrong key is noted at most this often: it costs its sender nothing
+KEPT_S = 30 * 24 * 3600.0  # since last use
+PROVIDED_S = 24 * 3600.0  # sign-in at the provider is repeated daily, to exclude former members
+REMEMBERED_S = 2.0  # cache time of users, as `r2c2r user` changes the file from another process
+KEY_REFUSAL_S = 10.0  # minimum interval of recorded wrong keys, which cost their sender nothing
 BY_PROXY = "a trusted proxy"
-LOOK_UPS = 4  # at a time, in threads of their own: slow requests take those of requests
+LOOK_UPS = 4  # concurrent, in separate threads, as slow requests occupy the request threads
 
 
 class People:
-    """Signs in, signs out, and knows whose a session is. What is no coroutine may be called from any thread."""
+    """Sign-in, sign-out, and lookup of sessions. Non-coroutine methods are thread-safe."""
 
     def __init__(self, engine: Engine, settings: Settings, passwords: Gate) -> None:
         self._engine, self._settings, self._passwords = engine, settings, passwords
         self._attempts = Attempts()
         self._known: dict[str, tuple[float, Person]] = {}
         self._threads = anyio.CapacityLimiter(LOOK_UPS)
-        self._changes = 0  # so that what was read before a change is not remembered after it
+        self._changes = 0  # to avoid caching data read before a change
         self._waiting: set[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = set()
-        self._ended: dict[str, tuple[str, str]] = {}  # digests of sessions that ended and may still be stored: who, from where
+        self._ended: dict[str, tuple[str, str]] = {}  # digests of ended sessions that may still be stored: user, client
         self._key_refused = -KEY_REFUSAL_S
-        self._proxied: dict[str, str] = {}  # sessions of those whom a trusted proxy names
+        self._proxied: dict[str, str] = {}  # sessions of users named by a trusted proxy
         self._proxied_lock = threading.Lock()
         if not settings.accounts_only:
             launch_keys.keep(engine, settings.launch_token)
 
     async def of(self, session_id: str) -> Person | None:
-        """Whose session it is; None when nobody's. Nobody else waits for the database meanwhile."""
+        """The session's user, or None, without blocking other requests on the database."""
         found = self._known.get(session_id)
         if found is not None and time.monotonic() < found[0]:
             return found[1]
         return await anyio.to_thread.run_sync(self.look_up, session_id, limiter=self._threads)
 
     async def named_by_proxy(self, name: str, client: str) -> str:
-        """The session of whom a trusted proxy names: at first sight they are given an account. Raises InputError."""
+        """The session of a user named by a trusted proxy, with an account created on first use. Raises InputError."""
         found = self._proxied.get(name)
         if found is None or await self.of(found) is None:
             found = await anyio.to_thread.run_sync(self._enter_by_proxy, name, client, limiter=self._threads)
         return found
 
     async def until_other(self, session_id: str, person: Person) -> Person | None:
-        """Wait until the session is not that person's any more: then whose it is, such as the same one's with another role.
+        """Wait until the session's user or role changes, and return the new one.
 
-        What this process did is noticed at once, what another did (`r2c2r user`) after REMEMBERED_S.
+        Changes by this process are detected at once, others (`r2c2r user`) after REMEMBERED_S.
         """
         woken = asyncio.Event()
         waiting = (asyncio.get_running_loop(), woken)
@@ -83,15 +83,15 @@ class People:
             self._waiting.discard(waiting)
 
     def look_again(self) -> None:
-        """Accounts or sessions changed: nobody is taken for who they were, on open connections neither."""
+        """Invalidate cached users after changes of accounts or sessions, also for open connections."""
         self._changes += 1
         self._known.clear()
         for loop, woken in tuple(self._waiting):
-            with contextlib.suppress(RuntimeError):  # its loop is gone
+            with contextlib.suppress(RuntimeError):  # its loop is closed
                 loop.call_soon_threadsafe(woken.set)
 
     def enter_with_key(self, key: str, client: str) -> str:
-        """A new session of whoever started the server; raises Unauthorised for a wrong key, or one that was used."""
+        """A new session of the user who started the server; raises Unauthorised for a wrong or used key."""
         with writing(self._engine) as session:
             if not self._settings.accounts_only and launch_keys.use(session, key):
                 return self._begin(session, None, self._settings.user, client, "by a printed address")
@@ -101,17 +101,17 @@ class People:
         raise Unauthorised("the key in this address is not valid any more", hint="r2c2r key prints a new address")
 
     async def sign_in(self, name: str, password: str, client: str) -> str:
-        """A new session; raises Unauthorised for a wrong name or password, TooMany while too many of them wait."""
+        """A new session; raises Unauthorised for a wrong name or password, TooMany while too many attempts are waiting."""
         return await self._guess(name, client, self._signed_in, name, password, client)
 
     async def change_password(self, person: Person, old: str, new: str, client: str) -> str:
-        """The person's own password; every session of theirs ends, and a new one is returned."""
+        """Change one's own password, end all own sessions, and return a new one."""
         if not person.account:
             raise Conflict("who started the server has no password", hint="make an account: r2c2r user add NAME --role admin")
         return await self._guess(person.name, client, self._changed_password, person.name, old, new, client)
 
     def enter_by_provider(self, named: Named, issuer: str, client: str) -> str:
-        """A new session of whom the identity provider names; raises Conflict, InputError."""
+        """A new session of a user named by the identity provider; raises Conflict, InputError."""
         with writing(self._engine) as session:
             given = (named.subject, named.name, named.role, self._settings.default_role)
             account = accounts.of_subject(session, *given, by=issuer)
@@ -120,17 +120,17 @@ class People:
         return entered
 
     def note_refusal(self, client: str, said: str) -> None:
-        """The identity provider let somebody go on who is not let in here."""
+        """Record the refusal of a user accepted by the identity provider."""
         audit.note_refusal(self._engine, "", client, said[:300])
 
     def sign_out(self, session_id: str, who: str, client: str) -> None:
-        """The session is nobody's from now on, also where a full disk keeps it stored."""
+        """End the session, even if a full disk prevents its deletion."""
         self._ended[_digest(session_id)] = (who, client)
         self.look_again()
         self.forget_ended()
 
     def forget_ended(self) -> None:
-        """Delete sessions that ended; what cannot be deleted now is tried again."""
+        """Delete ended sessions; failures are retried."""
         ended = dict(self._ended)
         if not ended:
             return
@@ -146,7 +146,7 @@ class People:
             del self._ended[digest]
 
     async def _guess(self, name: str, client: str, look: Callable[..., str], *arguments: str) -> str:
-        """What `look` returns when the password is right; it is counted before, and waits outside any thread."""
+        """Result of `look` for a correct password; the attempt is counted first, and its delay blocks no thread."""
         self._passwords.check(client)
         await pause(self._attempts.take(name, client))
         session_id = await self._passwords.run(client, look, *arguments)
@@ -162,7 +162,7 @@ class People:
             return self._begin(session, account.id, account.name, client, "by password")
 
     def _enter_by_proxy(self, name: str, client: str) -> str:
-        with self._proxied_lock:  # a page's first requests come together
+        with self._proxied_lock:  # a page's first requests are concurrent
             found = self._proxied.get(name)
             if found is None or self.look_up(found) is None:
                 with writing(self._engine) as session:
@@ -189,7 +189,7 @@ class People:
         return session_id
 
     def look_up(self, session_id: str) -> Person | None:
-        """Whose session it is, as stored, and remembered for a moment."""
+        """The session's user from the database, cached briefly."""
         until, changes = time.monotonic() + REMEMBERED_S, self._changes
         person = self._stored(session_id)
         if person is None:
@@ -213,7 +213,7 @@ class People:
         if account is not None and account.subject is not None and sign_in.created < now - PROVIDED_S:
             return None
         if now - sign_in.used > 3600.0:
-            with contextlib.suppress(R2C2RError), writing(self._engine) as session:  # a full disk keeps nobody out
+            with contextlib.suppress(R2C2RError), writing(self._engine) as session:  # a full disk must not prevent access
                 sign_in.used = now
                 session.merge(sign_in)
         return accounts.person(account) if account else Person(self._settings.user, "admin")

@@ -1,7 +1,7 @@
-"""Sends what webhooks are to hear of, in a thread of its own; what fails is tried again, less and less often, for two days.
+"""Delivery of webhook messages in a background thread, with retries at growing intervals for two days.
 
-A delivery is taken by moving its next try ahead, in a transaction: of servers that share a database one sends it, and a server
-that dies meanwhile loses nothing. Whoever listens may hear of something twice, and tells by its number.
+A delivery is claimed by moving its next attempt ahead in a transaction: only one of several servers sends it, and a crash
+loses nothing. Receivers may get a message twice, recognisable by its number.
 """
 
 import http.client
@@ -21,14 +21,14 @@ from r2c2r_core.errors import R2C2RError
 
 _log = logging.getLogger(__name__)
 
-LOOK_S = 30.0  # at the latest: tries that are due, and what another server stored
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 10.0, 6 * 3600.0  # before the second try, then three times as long each time
+LOOK_S = 30.0  # polling interval for due retries, and deliveries stored by other servers
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 10.0, 6 * 3600.0  # before the second attempt, tripled each time up to the longest
 TRIES = 14  # two days
 KEPT_S = 30 * 24 * 3600.0
 
 
 class Posting:
-    """The sender. `wake` may be called from any thread and does not wait."""
+    """Sender of deliveries. `wake` is thread-safe and does not wait."""
 
     def __init__(self, engine: Engine, settings: Settings) -> None:
         self._engine, self._allowed = engine, networks(settings.webhooks_to)
@@ -37,15 +37,15 @@ class Posting:
         engine.update_execution_options(announced=self.wake)
 
     def start(self) -> None:
-        """Send what waits, then what comes."""
+        """Start sending pending and new deliveries."""
         self._thread.start()
 
     def wake(self) -> None:
-        """There is something to send."""
+        """Signal a new delivery."""
         self._woken.set()
 
     def stop(self) -> None:
-        """End, after the POST that is under way; what waits is sent by the next server."""
+        """Stop after the current POST; pending deliveries are sent by the next server."""
         self._stopping.set()
         self.wake()
         if self._thread.is_alive():
@@ -57,14 +57,14 @@ class Posting:
             try:
                 while not self._stopping.is_set() and (number := self._take()) is not None:
                     self._send(number)
-            except R2C2RError as error:  # the database is away, or full: there is nothing else to do than to try again
+            except R2C2RError as error:  # the database is unavailable, or full: try again
                 _log.warning("webhooks: %s", error)
-            except Exception:  # the edge of the thread: whatever it was, other messages are still sent
+            except Exception:  # the edge of the thread: other messages are still sent after any error
                 _log.exception("webhooks")
             self._woken.wait(LOOK_S)
 
     def _take(self) -> int | None:
-        """The delivery that is due longest, which nobody else takes for a while."""
+        """Claim the longest overdue delivery, exclusively for a while."""
         with reading(self._engine) as session:
             if session.exec(_due(time.time())).first() is None:
                 return None
@@ -90,7 +90,7 @@ class Posting:
             _note(session, number, arrived, answer)
 
     def _post(self, row: Delivery, hook: Webhook) -> tuple[bool, str]:
-        """Whether it arrived, and what was said to it."""
+        """Whether it was delivered, and the answer."""
         content, timestamp = row.body.encode(), str(int(time.time()))
         headers = {
             "User-Agent": "r2c2r",
@@ -107,7 +107,7 @@ class Posting:
 
 
 def pause_s(attempts: int) -> float:
-    """How long after that many attempts the next one comes."""
+    """Delay in seconds before the next attempt."""
     return float(min(FIRST_PAUSE_S * 3 ** (attempts - 1), LONGEST_PAUSE_S))
 
 
@@ -122,6 +122,6 @@ def _note(session: Session, number: int, arrived: bool, answer: str) -> None:
     row.answer = answer
     if arrived:
         row.delivered, row.due = time.time(), None
-    elif row.attempts >= TRIES or row.event == "test":  # who sends one looks at its answer
+    elif row.attempts >= TRIES or row.event == "test":  # a test is not retried, as its sender sees the answer
         row.due = None
     session.add(row)

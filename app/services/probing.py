@@ -1,4 +1,4 @@
-"""A look at what people send, in a process of its own, before anything else believes it."""
+"""Validation of uploaded files in a separate process before further use."""
 
 import os
 import queue
@@ -16,24 +16,24 @@ _REFUSAL: dict[Kind, type[InputError]] = {"recording": CaptureError, "mesh": Ove
 
 
 def check_recording(context: Context, path: Path, name: str) -> None:
-    """Raise CaptureError, in one line, for what the import could not read. It waits for a process, as `look_at` does."""
+    """Raise CaptureError, in one line, for an unreadable recording. It waits for a process, as `look_at` does."""
     check_whole(context, path, name)
     look_at(context, "recording", path, name)
 
 
 def check_whole(context: Context, path: Path, name: str) -> None:
-    """Raise CaptureError unless all of a zip is there, and is what may be unpacked."""
+    """Raise CaptureError unless a zip is complete and safe to unpack."""
     settings = context.settings
     archives.check_archive(path, name, max_bytes=settings.max_unpacked_bytes, max_files=settings.max_unpacked_files)
 
 
 def look_at(context: Context, kind: Kind, path: Path, name: str) -> Any:
-    """What is seen of a file, which is called `name`: of a mesh its size, triangles, notes and picture, of a recording nothing.
+    """Probe result of a file called `name`: size, triangles, notes and picture for a mesh, None for a recording.
 
     Raises CaptureError or OverrideError, in one line, for a file that the core could not use.
 
-    It waits for a process: call it behind the gate of looks. Raises Unavailable when the server stops meanwhile, which says
-    nothing about the file.
+    It waits for a process: call it behind the gate of looks. Raises Unavailable when the server stops meanwhile, which is
+    not the file's fault.
     """
     command = (*context.runner.commands.probe, kind, str(path), name)
     with context.probes.running(command, Path(os.devnull)) as worker:
@@ -51,7 +51,7 @@ def look_at(context: Context, kind: Kind, path: Path, name: str) -> Any:
 
 
 def _refusal(kind: Kind, name: str, told: dict[str, str]) -> InputError:
-    """What the probe said; whatever else went wrong in it, the file is the cause."""
+    """The probe's error; any unexpected failure is attributed to the file."""
     said = told_body(told)
     message, hint = (" ".join(said[part].split())[:most] for part, most in (("message", 500), ("hint", 400)))
     if said["kind"] == "internal":

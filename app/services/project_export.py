@@ -1,6 +1,6 @@
-"""A project as one file that another server takes in: what people made, with the recording where that is asked for.
+"""Export of a project as one file for another server: user input, optionally with the recording.
 
-What the machine makes of these again (masks, candidates, bundles), who may see the project, and what was approved stay here.
+Recomputable results (masks, candidates, bundles), members and approvals are not exported.
 """
 
 import io
@@ -34,16 +34,16 @@ _NAMED = ("name", "tags", "segmenter", "generator", "matcher", "arm")
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """What a project's file holds, before any of its large files is read."""
+    """Content of a project's file, before any large file is read."""
 
     file_name: str
     documents: dict[str, bytes]
     meshes: dict[str, Path]
-    recording: Path | None  # a file or a folder; None: it is not kept here
+    recording: Path | None  # a file or a folder; None: not available
 
 
 def offer(context: Context, project_id: str) -> schemas.ProjectFileOffer:
-    """How large a project's file would be."""
+    """Size of a project's file."""
     found = _gathered(context, project_id, recording=True)
     said = sum(len(content) for content in found.documents.values())
     return schemas.ProjectFileOffer(
@@ -53,7 +53,7 @@ def offer(context: Context, project_id: str) -> schemas.ProjectFileOffer:
 
 
 def gathered(context: Context, project_id: str, *, recording: bool) -> Export:
-    """What goes into the file; raises NotFound where the recording is asked for and not kept."""
+    """Collect the file's content; raises NotFound if the recording is requested but not available."""
     found = _gathered(context, project_id, recording=recording)
     if recording and found.recording is None:
         raise NotFound("the recording is not kept here", hint="export the project without it")
@@ -79,7 +79,7 @@ def _gathered(context: Context, project_id: str, *, recording: bool) -> Export:
 
 
 def streamed(export: Export) -> Iterator[bytes]:
-    """The zip, a piece at a time: never more of it in memory than that."""
+    """The zip as a stream of pieces, with only one in memory."""
     sink = _Sink()
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as out:
         for name, content in export.documents.items():
@@ -92,13 +92,13 @@ def streamed(export: Export) -> Iterator[bytes]:
 
 
 def recording_name(source_name: str) -> str:
-    """What the recording is called in the file: a folder goes as a zip."""
+    """Name of the recording in the file; a folder becomes a zip."""
     name = safe_name(source_name)
     return name if Path(name).suffix.lower() in (".r3d", ".zip") else f"{name}.zip"
 
 
 def _recording(out: zipfile.ZipFile, source: Path, sink: "_Sink") -> Iterator[bytes]:
-    """The recording as it is, for pictures are compressed already; a folder as a zip in the zip."""
+    """The recording, stored uncompressed, as its images are compressed already; a folder as a zip in the zip."""
     name = RECORDING + recording_name(source.name)
     if source.is_file():
         yield from _copied(out, name, source, sink, zipfile.ZIP_STORED)
@@ -120,7 +120,7 @@ def _copied(
 
 
 def _given(session: Session, project: Project, files: ProjectFiles) -> tuple[dict[str, Any], dict[str, Any], dict[str, Path]]:
-    """prompts.json of all objects, overrides.json, and the meshes that it names, by their names in the zip."""
+    """prompts.json of all objects, overrides.json, and its meshes by their names in the zip."""
     clicks = queries.clicks_by_object(session, project.id)
     objects = [prompt_entry(item, clicks.get(item.id or 0, [])) for item in queries.live_objects(session, project.id)]
     overrides, meshes = overrides_document(session, project.id), {}
@@ -142,7 +142,7 @@ def _about(session: Session, project: Project, files: ProjectFiles, kept: Path |
         tool_version=tool_version(),
         project=schemas.ProjectPatch.model_construct(**{name: getattr(project, name) for name in _NAMED}),
         reading=schemas.ReadingIn(register_depth=project.register_depth, scale=project.scale),
-        recording=schemas.ProjectFileRecording.model_validate(  # all at once: frames are thousands
+        recording=schemas.ProjectFileRecording.model_validate(  # validated at once, as there are thousands of frames
             {"file_name": kept.name if kept else project.source_name, "frames": frames, "included": kept is not None}
         ),
         checklist=[schemas.ListedObject(**entry) for entry in project.checklist],
@@ -174,22 +174,22 @@ def _bytes(path: Path) -> int:
 
 
 class _Sink(io.RawIOBase):
-    """What a zip is written to that nobody can seek in: kept until it is taken."""
+    """Unseekable output buffer of a zip, emptied by `taken`."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
 
     def writable(self) -> bool:
-        """It is."""
+        """Always True."""
         return True
 
     def write(self, piece: Any) -> int:
-        """Keep it."""
+        """Buffer a piece."""
         self._pieces.append(bytes(piece))
         return len(piece)
 
     def taken(self) -> bytes:
-        """What was written since."""
+        """Return and clear the buffered bytes."""
         found = b"".join(self._pieces)
         self._pieces.clear()
         return found

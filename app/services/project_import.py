@@ -1,6 +1,6 @@
-"""A project's file (project_export.py) taken in: nothing in it is believed unchecked, and nothing of it speaks for people here.
+"""Import of a project's file (project_export.py), fully validated and without acting for local users.
 
-What others said is told by who imports it, with their names in the text; approvals and verdicts stay where they were given.
+Comments are attributed to the importing user, with the original names in the text; approvals and verdicts are not imported.
 """
 
 import json
@@ -47,29 +47,29 @@ MISSING = {
 
 @dataclass(frozen=True, slots=True)
 class _Given:
-    """The documents of a project's file, each as its schema says, and one with the other."""
+    """Validated and mutually consistent documents of a project's file."""
 
     about: schemas.ProjectFile
     prompts: PromptsFile
-    overrides: dict[str, dict[str, Any]]  # as stored about each object, by its name; meshes by their names in the zip
+    overrides: dict[str, dict[str, Any]]  # stored form by object name; meshes by their names in the zip
 
     @property
     def meshes(self) -> dict[str, str]:
-        """Members that are meshes, each with the object that it is a candidate of."""
+        """Mesh members, each with its object."""
         said = {name: str(entry.get("candidate", "")) for name, entry in self.overrides.items()}
         return {mesh: name for name, mesh in said.items() if mesh.startswith(MESHES)}
 
 
 def is_project(archive: Path) -> bool:
-    """Whether a zip that may be read is a project's file: a recording holds no corrections."""
+    """Whether a readable zip is a project's file, as a recording contains no corrections."""
     with zipfile.ZipFile(archive) as found:
         return {ABOUT, PROMPTS, OVERRIDES} <= set(found.namelist())
 
 
 def take_in(context: Context, upload: Upload, received: Path) -> schemas.Project:
-    """The project of such a file; InputError, in one line, for one that cannot be used. Nothing stays when it fails.
+    """Import a project's file; raises InputError, in one line, for an unusable one, and keeps nothing on failure.
 
-    It waits for processes: call it behind the gate of looks. It may be called again when it was interrupted.
+    It waits for processes: call it behind the gate of looks. It may be repeated after an interruption.
     """
     files = project_files(context.settings.data_dir, upload.id)
     name = safe_name(upload.file_name)
@@ -82,7 +82,7 @@ def take_in(context: Context, upload: Upload, received: Path) -> schemas.Project
             recording = _take_recording(context, archive, given, files, name)
             _take_meshes(context, archive, given, files)
             _await(files, given)
-            context.store.keep(upload.id)  # before a row names them
+            context.store.keep(upload.id)  # before a row refers to them
             project, job = _rows(context, upload, given, files, recording)
         except BaseException:
             delete_folder(files.root)
@@ -96,7 +96,7 @@ def take_in(context: Context, upload: Upload, received: Path) -> schemas.Project
 
 
 def _read(archive: zipfile.ZipFile, name: str) -> _Given:
-    """What the documents say, once they fit each other."""
+    """Read the documents and check their consistency."""
     about = _document(archive, ABOUT, schemas.ProjectFile, name, InputError)
     prompts = _document(archive, PROMPTS, PromptsFile, name, PromptError)
     overrides = _document(archive, OVERRIDES, OverridesFile, name, OverrideError)
@@ -123,7 +123,7 @@ def _document(
 
 
 def _check_places(given: _Given, name: str) -> None:
-    """Raise InputError for what is about a frame or an object that the file does not have."""
+    """Raise InputError for references to frames or objects that the file lacks."""
     about, objects = given.about, len(given.prompts.objects)
     table = {frame.index: frame.model_dump() for frame in about.recording.frames}
     in_frames.check_file(table, given.prompts)
@@ -138,7 +138,7 @@ def _check_places(given: _Given, name: str) -> None:
 
 
 def _check_members(archive: zipfile.ZipFile, given: _Given, name: str) -> None:
-    """Raise InputError for a mesh or recording that is named and not there, and for a candidate that may be a path."""
+    """Raise InputError for a missing mesh or recording, and for a candidate that may be a path."""
     members, recording = set(archive.namelist()), given.about.recording
     if recording.included and (wanted := _recording_member(given)) not in members:
         raise InputError(f"{name}: {ABOUT} names the recording {wanted!r}, which is not in it", hint=_HINT)
@@ -162,18 +162,20 @@ def _unpacked(archive: zipfile.ZipFile) -> int:
 
 
 def _take_recording(context: Context, archive: zipfile.ZipFile, given: _Given, files: ProjectFiles, name: str) -> Path | None:
-    """The recording of the file, looked at as any that is uploaded; None where it came without."""
+    """Extract the file's recording, validated like an upload; None without one."""
     if not given.about.recording.included:
         return None
     own = recording_name(given.about.recording.file_name)
-    target = files.source / (own if own != name else f"recording-{own}")  # an upload's file of its name would be that upload
+    target = files.source / (
+        own if own != name else f"recording-{own}"
+    )  # a file with the upload's name would be taken for the upload
     _copy_out(archive, _recording_member(given), target, name)
     probing.check_recording(context, target, own)
     return target
 
 
 def _take_meshes(context: Context, archive: zipfile.ZipFile, given: _Given, files: ProjectFiles) -> None:
-    """The meshes that corrections name, each looked at as any that is uploaded."""
+    """Extract the corrections' meshes, each validated like an upload."""
     for member, owner in given.meshes.items():
         target = files.uploads / owner / safe_name(member)
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -183,7 +185,7 @@ def _take_meshes(context: Context, archive: zipfile.ZipFile, given: _Given, file
 
 
 def _copy_out(archive: zipfile.ZipFile, member: str, target: Path, name: str) -> None:
-    """A member as a file, a piece of it in memory at a time."""
+    """Extract a member to a file in pieces."""
 
     def copy(source: Any) -> None:
         with explained_io(target), target.open("wb") as out:
@@ -194,7 +196,7 @@ def _copy_out(archive: zipfile.ZipFile, member: str, target: Path, name: str) ->
 
 
 def _opened(archive: zipfile.ZipFile, member: str, name: str, use: Callable[[Any], Any]) -> Any:
-    """What `use` makes of the open member; InputError for one that is damaged."""
+    """Result of `use` on the open member; InputError for a damaged one."""
     try:
         with archive.open(member) as source:
             return use(source)
@@ -203,7 +205,7 @@ def _opened(archive: zipfile.ZipFile, member: str, name: str, use: Callable[[Any
 
 
 def _await(files: ProjectFiles, given: _Given) -> None:
-    """Keep what the recording has to be, for whoever reads it."""
+    """Store the expected frames, to verify the recording when it is read."""
     frames = [frame.model_dump() for frame in given.about.recording.frames]
     write_atomically(files.awaited_frames, json.dumps(frames).encode())
 
@@ -211,7 +213,7 @@ def _await(files: ProjectFiles, given: _Given) -> None:
 def _rows(
     context: Context, upload: Upload, given: _Given, files: ProjectFiles, recording: Path | None
 ) -> tuple[str, int | None]:
-    """The project's rows in one transaction; its id and that of the job that reads the recording."""
+    """Store the project's rows in one transaction; returns its id and that of the reading job."""
     about = given.about
     with writing(context.engine) as session:
         quotas.check_project(context, session)
@@ -241,7 +243,7 @@ def _rows(
 
 
 def _choose(project: Project, about: schemas.ProjectFile) -> list[str]:
-    """How the project is worked on; what of it this server lacks."""
+    """Set the project's options; returns those that this server lacks."""
     absent = []
     for seam, registry in projects.SEAMS.items():
         wanted = getattr(about.project, seam)
@@ -257,7 +259,7 @@ def _choose(project: Project, about: schemas.ProjectFile) -> list[str]:
 
 
 def _say(context: Context, session: Session, project: Project, about: schemas.ProjectFile, items: list[SceneObject]) -> None:
-    """Comments and lengths, said by who imports them."""
+    """Add comments and lengths, attributed to the importing user."""
     now = time.time()
     for comment in about.comments:
         place, said = comment.said.object, comment.said.model_dump(exclude={"object", "text", "point_world"})

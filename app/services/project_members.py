@@ -1,4 +1,4 @@
-"""Members of a project: who they are, and naming them."""
+"""Members of a project."""
 
 import time
 
@@ -15,7 +15,7 @@ from r2c2r_core.errors import InputError
 
 
 def members(context: Context, project_id: str) -> schemas.ProjectMembers:
-    """Who may see the project."""
+    """Users who may see the project."""
     with reading(context.engine) as session:
         row = queries.project_row(session, project_id)
         owner, may_change = queries.owner(session, row), _may_change(context, session, row)
@@ -30,7 +30,7 @@ def members(context: Context, project_id: str) -> schemas.ProjectMembers:
 
 
 def set_members(context: Context, project_id: str, body: schemas.MembersIn) -> schemas.ProjectMembers:
-    """Open the project to everybody, or to these alone; by its owner or an admin."""
+    """Make the project visible to all, or only to these members; by its owner or an admin."""
     with writing(context.engine) as session:
         row = queries.project_row(session, project_id)
         if not _may_change(context, session, row):

@@ -1,4 +1,4 @@
-"""Projects as they go over the wire: as many queries for one as for a thousand."""
+"""Projects as API schemas, with a constant number of queries."""
 
 from collections.abc import Collection
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ _LEFT_OUT = (defer(Project.capture), defer(Project.notices))  # type: ignore[arg
 
 
 class _About(NamedTuple):
-    """What is shown of projects beside their rows, by project."""
+    """Related data of projects, by project."""
 
     frames: dict[str, int]
     counts: dict[str, schemas.ProjectCounts]
@@ -25,7 +25,7 @@ class _About(NamedTuple):
 
 
 def listed(session: Session, hidden: Collection[str]) -> list[schemas.ProjectSummary]:
-    """All projects but the hidden ones, last touched first, without what is only looked at one by one."""
+    """Summaries of all visible projects, most recently changed first."""
     shown = select(Project).where(col(Project.id).not_in(hidden)).options(*_LEFT_OUT)
     rows = session.exec(shown.order_by(col(Project.updated).desc())).all()
     about = _about(session, None)
@@ -33,7 +33,7 @@ def listed(session: Session, hidden: Collection[str]) -> list[schemas.ProjectSum
 
 
 def whole(session: Session, row: Project) -> schemas.Project:
-    """One project with what the doctor said of its recording, as far as this version still says it."""
+    """One project with its recording's facts, as far as this version supports them."""
     known = schemas.CaptureFacts.model_fields
     facts = schemas.CaptureFacts(**{name: row.capture[name] for name in known if name in row.capture}) if row.capture else None
     return schemas.Project(
@@ -48,12 +48,12 @@ def whole(session: Session, row: Project) -> schemas.Project:
 
 
 def awaits_recording(row: Project) -> bool:
-    """Whether a recording may be given to the project: it has none, and none is being read."""
+    """Whether the project has no recording and none is being read."""
     return row.status == "failed" and row.source_path is None
 
 
 def _about(session: Session, project_id: str | None) -> _About:
-    """Of one project, or with None of all."""
+    """Related data of one project, or of all with None."""
 
     def mine(column: Any) -> Any:
         return col(column) == project_id if project_id is not None else col(column).is_not(None)
@@ -72,7 +72,7 @@ def _about(session: Session, project_id: str | None) -> _About:
 
 
 def _shown_jobs(mine: Any) -> Any:
-    """The job under way of each project, else the last one."""
+    """Query of each project's active job, else the last one."""
     active = col(Job.state).in_(queries.ACTIVE)
     place = func.row_number().over(partition_by=col(Job.project_id), order_by=(active.desc(), col(Job.id).desc()))
     ranked = select(Job.id, place.label("place")).where(mine).subquery()
@@ -80,7 +80,7 @@ def _shown_jobs(mine: Any) -> Any:
 
 
 def counts_of(session: Session, project_id: str) -> schemas.ProjectCounts:
-    """What is in one project."""
+    """Content counts of one project."""
     return _counts(session, lambda column: col(column) == project_id).get(project_id, schemas.ProjectCounts())
 
 

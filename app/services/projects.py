@@ -26,7 +26,7 @@ from r2c2r_core.registry import Registry
 from r2c2r_core.robot.arms import ARMS
 from r2c2r_core.segment.stage import SEGMENTERS
 
-SEAMS: dict[str, Registry[Any]] = {  # what a person may choose for a project
+SEAMS: dict[str, Registry[Any]] = {  # selectable backends of a project
     "segmenter": SEGMENTERS,
     "generator": GENERATORS,
     "matcher": MATCHERS,
@@ -37,11 +37,11 @@ SEAMS: dict[str, Registry[Any]] = {  # what a person may choose for a project
 Shape = TypeVar("Shape", bound=schemas.ProjectSummary)
 
 _FRAMES: FileCache[list[dict[str, Any]]] = FileCache(64 << 20)
-_FRAMES_GROW = 4  # what a frame table takes in memory, over its file
+_FRAMES_GROW = 4  # ratio of a frame table's memory to its file size
 
 
 def list_projects(context: Context) -> list[schemas.ProjectSummary]:
-    """All projects that the person may see, last touched first."""
+    """All projects visible to the user, most recently changed first."""
     with reading(context.engine) as session:
         shapes = project_shapes.listed(session, context.access.hidden(context.person))
     return [_pictured(context, shape) for shape in shapes]
@@ -55,7 +55,7 @@ def get_project(context: Context, project_id: str) -> schemas.Project:
 
 
 def _pictured(context: Context, shape: Shape) -> Shape:
-    """The project with the newest frame of its sample for a thumbnail, while that is being rendered."""
+    """The project with the sample's newest frame as thumbnail while it is being rendered."""
     if shape.status != "importing":
         return shape
     try:
@@ -75,7 +75,7 @@ def new_project(
     began: float | None = None,
     owner_id: int | None = None,
 ) -> Project:
-    """A project's row, still importing; `began` is when its upload did."""
+    """A project's row in state importing; `began` is the start of its upload."""
     now, number = time.time(), project_id or secrets.token_hex(6)
     project = Project(id=number, name=name, status="importing", created=began or now, updated=now, source_name=source_name)
     project.source_path = str(source_path) if source_path else None
@@ -87,7 +87,7 @@ def new_project(
 
 
 def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> schemas.Project:
-    """What a person says of it, or other backends. A new segmenter starts on every object; what the other drew is kept."""
+    """Change a project's fields or backends. A new segmenter recomputes every object; the old one's masks are kept."""
     for seam, registry in SEAMS.items():
         if (wanted := getattr(body, seam)) is not None:
             registry.require(wanted)
@@ -114,7 +114,7 @@ def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> sch
         if changed:
             keys.note_project(session, row)
         objects = [item.id or 0 for item in queries.live_objects(session, project_id)] if body.segmenter else []
-    if "segmenter" in changed:  # once that is stored: to end a process that hangs takes seconds, and nobody could write
+    if "segmenter" in changed:  # after the transaction: ending a hanging process takes seconds, and would block writers
         crossing.stop_segmenting(context, project_id)
     for number in objects:
         masks.follow(context, project_id, number, tells=number == objects[-1])
@@ -123,7 +123,7 @@ def change(context: Context, project_id: str, body: schemas.ProjectPatch) -> sch
 
 
 def _note(context: Context, session: Session, row: Project, action: str, text: str, after: dict[str, Any]) -> None:
-    """Change fields of a project, with an event beside it."""
+    """Change fields of a project, with an event."""
     now = time.time()
     event = Event(project_id=row.id, scope="project", action=action, text=text, who=context.who, at=now)
     event.before, event.after = {key: getattr(row, key) for key in after}, dict(after)
@@ -149,7 +149,7 @@ def frame_table(files: ProjectFiles) -> list[dict[str, Any]]:
 def history(
     context: Context, project_id: str, object_id: int | None, before: int | None, limit: int
 ) -> list[schemas.HistoryEntry]:
-    """Who changed what, newest first."""
+    """Events of a project, newest first."""
     with reading(context.engine) as session:
         queries.project_row(session, project_id)
         query = select(Event).where(Event.project_id == project_id)
@@ -165,13 +165,13 @@ UNSHOWN = (defer(Event.before), defer(Event.after))  # type: ignore[arg-type]  #
 
 
 def tell(context: Context, project_id: str) -> None:
-    """Show every tab that the project changed."""
+    """Publish a change of the project to all tabs."""
     context.hub.publish("project", project_id)
     context.hub.publish("projects", None)
 
 
 def history_entry(row: Event) -> schemas.HistoryEntry:
-    """A line of the history as it goes over the wire."""
+    """An event as an API schema."""
     return schemas.HistoryEntry(
         id=row.id or 0,
         object=row.object_id,

@@ -1,4 +1,4 @@
-"""prompts.json: the clicks and drawn fronts as the command line reads and writes them."""
+"""Import and export of prompts.json, the command line's format of clicks and drawn fronts."""
 
 from app import schemas
 from app.db import queries
@@ -11,7 +11,7 @@ from app.services.prompts import after_changes, change_of
 
 
 def export(context: Context, project_id: str) -> schemas.PromptsFile:
-    """What people gave, as the command line reads it."""
+    """The project's prompts.json."""
     with reading(context.engine) as session:
         queries.project_row(session, project_id)
         clicks, items = queries.clicks_by_object(session, project_id), queries.live_objects(session, project_id)

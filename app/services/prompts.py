@@ -1,4 +1,4 @@
-"""Objects and clicks. Every change is stored, with what was before it, before the answer goes out."""
+"""Objects and clicks. Every change is stored with its previous state before the answer is sent."""
 
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ from r2c2r_core.workspace import noun_path
 
 
 class Change(NamedTuple):
-    """An object that was changed, and how it goes over the wire."""
+    """A changed object with its API schema."""
 
     project: Project
     item: SceneObject
@@ -30,7 +30,7 @@ class Change(NamedTuple):
 
 
 def list_objects(context: Context, project_id: str, deleted: bool) -> list[dict[str, Any]]:
-    """The project's objects in the order they were made, as schemas.SceneObject says: thousands of clicks, as stored."""
+    """The project's objects in order of creation, in the format of schemas.SceneObject, unvalidated for speed."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = queries.live_objects(session, project_id, deleted=deleted)
@@ -46,7 +46,7 @@ def list_objects(context: Context, project_id: str, deleted: bool) -> list[dict[
 
 
 def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: bool) -> schemas.SceneObject:
-    """A new object, with its first clicks if there are any."""
+    """Create an object, with its first clicks if given."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = create_in(context, session, project, body, "added")
@@ -57,7 +57,7 @@ def create(context: Context, project_id: str, body: schemas.ObjectIn, infer: boo
 def create_all(
     context: Context, project_id: str, bodies: list[schemas.ObjectIn], infer: bool, *, what: str
 ) -> list[schemas.SceneObject]:
-    """New objects, all or none; `what` was done, as the history says it."""
+    """Create objects, all or none; `what` is the action in the history."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         items = [create_in(context, session, project, body, what) for body in bodies]
@@ -69,7 +69,7 @@ def create_all(
 
 
 def edit(context: Context, project_id: str, object_id: int, body: schemas.ObjectPatch) -> schemas.SceneObject:
-    """Rename, recategorise, recolour."""
+    """Change an object's fields."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -85,14 +85,14 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
             session.add(item)
         change = answered_change(context, session, project, item, infer=bool(wanted.keys() & {"category", "front", "crop"}))
     if "assignee" in wanted:
-        context.hub.publish("projects", None)  # inboxes are counted anew
+        context.hub.publish("projects", None)  # inbox counts are updated
     return after_change(context, change)
 
 
 def refuse_overtaken(
     context: Context, session: Session, project: Project, item: SceneObject, body: schemas.ObjectPatch | schemas.UndoRequest
 ) -> None:
-    """Raise Conflict, with what is stored now, when somebody changed the object since the sender last looked."""
+    """Raise Conflict, with the stored state, if the object was changed since the sender's version."""
     if body.version is None or body.version == item.version:
         return
     current = _shape_of(context, session, project, item).model_dump()
@@ -100,7 +100,7 @@ def refuse_overtaken(
 
 
 def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
-    """Take the object out; undo brings it back."""
+    """Delete the object; undo restores it."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -112,7 +112,7 @@ def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneOb
 
 
 def add_point(context: Context, project_id: str, object_id: int, body: schemas.PointIn, infer: bool) -> schemas.SceneObject:
-    """One click."""
+    """Add one click."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -125,7 +125,7 @@ def add_point(context: Context, project_id: str, object_id: int, body: schemas.P
 
 
 def add_points(context: Context, project_id: str, object_id: int, body: schemas.PointsIn, infer: bool) -> schemas.SceneObject:
-    """Clicks that belong together, as one change."""
+    """Add several clicks as one change."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -159,7 +159,7 @@ def move_point(
 
 
 def delete_point(context: Context, project_id: str, object_id: int, point_id: int, infer: bool) -> schemas.SceneObject:
-    """Take a click away."""
+    """Delete a click."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -174,11 +174,11 @@ def delete_point(context: Context, project_id: str, object_id: int, point_id: in
 def say_of_frame(
     context: Context, project_id: str, object_id: int, frame: int, body: schemas.FrameIn | None
 ) -> schemas.SceneObject:
-    """Set an object right in one frame; None: it is as found there again."""
+    """Correct an object in one frame; None removes the correction."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
-        if body is not None:  # whatever is said of a frame that is not there can be taken back
+        if body is not None:  # a correction of a missing frame can still be removed
             check_said(table_of(context, project), item.name, frame, body.mask)
         others = {number: said for number, said in item.frames.items() if number != str(frame)}
         said = {} if body is None else {str(frame): body.mask.model_dump() if body.mask is not None else None}
@@ -192,13 +192,13 @@ def say_of_frame(
 
 
 def segment(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
-    """Compute the object's masks now, also when there are some for these clicks."""
+    """Compute the object's masks now, even if they exist for these clicks."""
     masks.segment(context, project_id, object_id)
     return tell_object(context, project_id, object_id)
 
 
 def segment_again(context: Context, project_id: str, object_id: int, key: str, others: list[int]) -> None:
-    """Compute the masks of these clicks anew, for others are clicked on its front, or none are any more, and say so."""
+    """Recompute the masks of these clicks after a change of other objects' clicks on its front, and publish it."""
     with reading(context.engine) as session:
         names = {item.id: item.name for item in queries.drawn(session, project_id)}
     if masks.segment_again(context, project_id, object_id, key):
@@ -208,7 +208,7 @@ def segment_again(context: Context, project_id: str, object_id: int, key: str, o
 
 
 def cancel_segment(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
-    """Stop computing the object's masks; those there stay."""
+    """Stop computing the object's masks; existing ones are kept."""
     masks.cancel(context, project_id, object_id)
     return tell_object(context, project_id, object_id)
 
@@ -238,7 +238,7 @@ def require_usable(name: str) -> None:
 
 
 def object_shape(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
-    """One object as it goes over the wire, also a deleted one."""
+    """One object as an API schema, including a deleted one."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id, deleted=True)
@@ -246,13 +246,13 @@ def object_shape(context: Context, project_id: str, object_id: int) -> schemas.S
 
 
 def tell_object(context: Context, project_id: str, object_id: int) -> schemas.SceneObject:
-    """Show the object's state to every tab."""
+    """Publish the object's state to all tabs."""
     with context.live.held():
         return _tell(context, object_shape(context, project_id, object_id))
 
 
 def change_of(context: Context, session: Session, project: Project, item: SceneObject, infer: bool) -> Change:
-    """An object that the transaction changes; with `infer`, its masks will follow."""
+    """The change of an object in the transaction; with `infer`, its masks will be recomputed."""
     shape = _shape_of(context, session, project, item)
     if infer:
         shape = _with_masks(shape, project, masks.state_after_follow(context, project, item))
@@ -260,19 +260,19 @@ def change_of(context: Context, session: Session, project: Project, item: SceneO
 
 
 def answered_change(context: Context, session: Session, project: Project, item: SceneObject, infer: bool) -> Change:
-    """`change_of`, whose shape is the answer: it is stored with the change."""
+    """`change_of`, with its schema stored as the idempotent answer."""
     change = change_of(context, session, project, item, infer)
     once.keep_answer(session, change.shape.model_dump_json())
     return change
 
 
 def after_changes(context: Context, changes: list[Change]) -> list[schemas.SceneObject]:
-    """`after_change` of changes that were stored together: what they mean for each other is looked at once, with the last."""
+    """`after_change` of changes stored together; their interactions are resolved once, with the last."""
     return [after_change(context, change, tells=change is changes[-1]) for change in changes]
 
 
 def after_change(context: Context, change: Change, *, tells: bool = True) -> schemas.SceneObject:
-    """What follows from a stored change: masks where asked for, of others where they depend on it, and every tab told."""
+    """Follow-up of a stored change: recompute masks if requested, also dependent ones, and publish to all tabs."""
     if change.infer:
         masks.follow(context, change.project.id, change.shape.id, tells=tells)
     elif tells and context.live.runs(change.project.id):
@@ -330,14 +330,14 @@ def _shape(
 
 
 def _with_masks(shape: schemas.SceneObject, project: Project, now: masks.MasksState) -> schemas.SceneObject:
-    """The object with its masks in that state."""
+    """The schema with the given mask state."""
     told: dict[str, object] = {"segment": now.state, "mask_frames": now.frames, "doubts": [*now.doubts]}
     told |= {"mask_backend": project.segmenter if now.frames else ""}
     return shape.model_copy(update=told | {"notices": [*now.notices, *_category_notice(shape.category)]})
 
 
 def _wanted(context: Context, session: Session, item: SceneObject, body: schemas.ObjectPatch) -> dict[str, object]:
-    """What the patch changes, checked."""
+    """Validated changes of a patch."""
     wanted: dict[str, object] = {}
     if body.name is not None and body.name != item.name:
         wanted["name"] = _name(session, item.project_id, body.name, item.id)
@@ -356,12 +356,12 @@ def _wanted(context: Context, session: Session, item: SceneObject, body: schemas
 
 
 def _has_results(files: ProjectFiles, *names: str) -> bool:
-    """Whether a run left something under one of these names: what stays the object's, or must not become it."""
+    """Whether a run has stored results under one of these names, which must stay with their object."""
     return any(noun_path(files.work, "segment", name).is_file() for name in names)
 
 
 def _said_of(item: SceneObject, key: str, value: object) -> str:
-    """A field's change in words."""
+    """Description of a field's change."""
     if key == "assignee":
         return f"{item.name} assigned to {value or 'nobody'}"
     if key == "crop":
@@ -383,7 +383,7 @@ def _point(session: Session, item: SceneObject, point_id: int) -> Point:
 
 
 def _name(session: Session, project_id: str, name: str, mine: int | None) -> str:
-    """The name, when simulators accept it and no other object has it."""
+    """The name, validated for simulators and uniqueness."""
     require_usable(name)
     if name.casefold() in _names(session, project_id, mine):
         raise PromptError(f"two objects named '{name}'", hint="names are unique: choose another one")

@@ -1,4 +1,4 @@
-"""Objects proposed without a click: confirmed ones become objects like any other, dismissals are remembered as events."""
+"""Proposed objects: confirmed ones become ordinary objects, dismissals are stored as events."""
 
 import time
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _SCOPE = "proposals"
 
 
 def current(context: Context, project_id: str) -> schemas.Proposals:
-    """What is proposed now."""
+    """The current proposals."""
     found = _look(context, project_id)
     left = _without_covered(context, project_id, found)
     return schemas.Proposals(
@@ -35,7 +35,7 @@ def current(context: Context, project_id: str) -> schemas.Proposals:
 
 
 def confirm(context: Context, project_id: str, ids: list[str], category: str | None = None) -> list[schemas.SceneObject]:
-    """Make objects of proposals: each its click, under its category or the one that is given for all."""
+    """Create objects from proposals, each with its click, and its own or the given category."""
     wanted = _wanted(context, project_id, ids)
     bodies = [
         schemas.ObjectIn(
@@ -49,7 +49,7 @@ def confirm(context: Context, project_id: str, ids: list[str], category: str | N
 
 
 def dismiss(context: Context, project_id: str, ids: list[str]) -> schemas.Proposals:
-    """Leave proposals out from now on."""
+    """Dismiss proposals."""
     wanted = _wanted(context, project_id, ids)
     with writing(context.engine) as session:
         for item in wanted:
@@ -60,7 +60,7 @@ def dismiss(context: Context, project_id: str, ids: list[str]) -> schemas.Propos
 
 
 def restore(context: Context, project_id: str) -> schemas.Proposals:
-    """Bring all dismissed proposals back."""
+    """Restore all dismissed proposals."""
     with writing(context.engine) as session:
         queries.project_row(session, project_id)
         if _dismissed(session, project_id):
@@ -71,7 +71,7 @@ def restore(context: Context, project_id: str) -> schemas.Proposals:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """What the segmenter proposed, less what was confirmed."""
+    """The segmenter's proposals without confirmed ones."""
 
     state: Literal["none", "running", "done"]
     fraction: float
@@ -97,7 +97,7 @@ def _look(context: Context, project_id: str) -> _Found:
 
 
 def _wanted(context: Context, project_id: str, ids: list[str]) -> list[schemas.Proposal]:
-    """The proposals with these ids; raises NotFound for one that is not open any more."""
+    """The proposals with these ids; raises NotFound for one that is no longer open."""
     found = _look(context, project_id)
     items = {line["id"]: _shape(line) for line in found.lines if line["id"] not in found.dismissed}
     for proposal in ids:
@@ -113,7 +113,7 @@ def _event(context: Context, project_id: str, action: str, text: str, frame: int
 
 
 def _dismissed(session: Session, project_id: str) -> set[str]:
-    """Those dismissed since all were restored last."""
+    """Ids dismissed since the last restore."""
     mine = (Event.project_id == project_id, Event.scope == _SCOPE)
     restored = select(func.coalesce(func.max(Event.id), 0)).where(*mine, Event.action == "restore").scalar_subquery()
     proposal = col(Event.after)["proposal"].as_string()
@@ -121,7 +121,7 @@ def _dismissed(session: Session, project_id: str) -> set[str]:
 
 
 def _without_covered(context: Context, project_id: str, found: _Found) -> list[dict[str, Any]]:
-    """The proposals that no object's mask covers, with a doubt where one covers a part."""
+    """The proposals not covered by an object's mask, with a doubt for partly covered ones."""
     shown = masks.on_frames(context, project_id, {line["frame"] for line in found.lines})
     left = []
     for line in found.lines:
@@ -133,12 +133,12 @@ def _without_covered(context: Context, project_id: str, found: _Found) -> list[d
             partly = [
                 f"shares {100 * share:.0f} % with {found.names.get(number)}" for number, share in shares.items() if share > most
             ]
-            left.append({**line, "doubts": [*line.get("doubts", ()), *partly]})  # none in files of older versions
+            left.append({**line, "doubts": [*line.get("doubts", ()), *partly]})  # missing in files of older versions
     return left
 
 
 def _may_cover(mask: dict[str, Any], outline: dict[str, Any]) -> bool:
-    """Whether their boxes meet: most of a kitchen's masks need not be unpacked."""
+    """Whether their bounding boxes overlap, to avoid unpacking most masks."""
     return (
         (mask["width"], mask["height"]) == (outline["width"], outline["height"])
         and mask["left"] < outline["left"] + outline["box_width"]

@@ -1,4 +1,4 @@
-"""What one person may take of the server at a time. Admins may take more: they could raise the quotas as well."""
+"""Quotas per user. Admins are exempt, as they could raise them anyway."""
 
 from sqlalchemy import func
 from sqlmodel import Session, col, select
@@ -8,12 +8,12 @@ from app.db.tables import Account, Job, Project, Upload
 from app.errors import Conflict, TooMany
 from app.services.context import Context
 
-SAMPLE = "sample"  # what the column source_name holds of a synthetic kitchen
+SAMPLE = "sample"  # value of the column source_name for a synthetic kitchen
 RAISE = "an admin can raise it: r2c2r serve --quota"
 
 
 def check_job(context: Context, session: Session) -> None:
-    """Raise TooMany when as many of the person's jobs wait or run as may."""
+    """Raise TooMany at the limit of the user's waiting and running jobs."""
     most = context.settings.quotas.jobs
     if _free(context):
         return
@@ -26,7 +26,7 @@ def check_job(context: Context, session: Session) -> None:
 
 
 def check_upload(context: Context, session: Session, size: int) -> None:
-    """Raise TooMany when so many uploads, or bytes of them, are under way already."""
+    """Raise TooMany at the limit of the user's unfinished uploads, or of their bytes."""
     quotas = context.settings.quotas
     if _free(context):
         return
@@ -43,7 +43,7 @@ def check_upload(context: Context, session: Session, size: int) -> None:
 
 
 def check_project(context: Context, session: Session, *, sample: bool = False) -> None:
-    """Raise Conflict when the person has as many projects, or samples, as may be."""
+    """Raise Conflict at the limit of the user's projects, or samples."""
     quotas = context.settings.quotas
     if _free(context):
         return

@@ -1,4 +1,4 @@
-"""A recording read again, in another way: with its depth moved onto the colour images, or as it was recorded."""
+"""Re-reading of a recording with other options: with or without registration of its depth."""
 
 import time
 
@@ -15,7 +15,7 @@ from app.services.context import Context
 
 
 def read_again(context: Context, project_id: str, body: schemas.ReadingIn) -> schemas.Project:
-    """Read the recording so; clicks stay, masks and results made from the other reading are stale."""
+    """Queue a new reading of the recording; clicks are kept, masks and results of the old reading become stale."""
     with writing(context.engine) as session:
         row = queries.project_row(session, project_id)
         before = {"register_depth": row.register_depth, "scale": row.scale}

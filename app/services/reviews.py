@@ -1,4 +1,4 @@
-"""What people say about candidates, and what they correct."""
+"""Verdicts on candidates, and manual corrections."""
 
 import json
 import time
@@ -43,7 +43,7 @@ def group(context: Context, project_id: str, object_id: int) -> schemas.Candidat
 
 
 def give_verdict(context: Context, project_id: str, object_id: int, body: schemas.VerdictIn) -> schemas.Reviewed:
-    """Accept, reject or clear one candidate; what follows from it runs again."""
+    """Accept, reject or clear one candidate, and rerun dependent stages."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -63,20 +63,20 @@ def give_verdict(context: Context, project_id: str, object_id: int, body: schema
 
 
 def get_override(context: Context, project_id: str, object_id: int) -> schemas.OverrideData:
-    """What was corrected about the object."""
+    """The object's corrections."""
     with reading(context.engine) as session:
         item = queries.object_row(session, project_id, object_id)
         return override_shape(history.override_data(session, item))
 
 
 def set_override(context: Context, project_id: str, object_id: int, body: schemas.OverridePatch) -> schemas.Reviewed:
-    """Correct the object; the fields that were sent are set, null clears."""
+    """Correct the object; given fields are set, null clears."""
     job, text = store_override(context, project_id, object_id, body)
     return reviewed_shape(context, project_id, object_id, job, text)
 
 
 def store_override(context: Context, project_id: str, object_id: int, body: schemas.OverridePatch) -> tuple[int | None, str]:
-    """Store the correction; the job that follows from it, and what was done in words."""
+    """Store the correction; returns the resulting job, and a description."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
@@ -99,7 +99,7 @@ def _store_override(
 
 
 def correct_made(context: Context, project_id: str, name: str, body: schemas.OverridePatch) -> schemas.Reviewed:
-    """Correct what the last run made from the scan and nobody clicked; from then on it is an object of its own."""
+    """Correct an unprompted object of the last run, which thereby becomes an ordinary object."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         known = {item.result_name: item.id for item in queries.live_objects(session, project_id)}
@@ -114,7 +114,7 @@ def correct_made(context: Context, project_id: str, name: str, body: schemas.Ove
 
 
 def _category_made(context: Context, project: Project, name: str) -> str:
-    """What the last run made under a name; NotFound where it made nothing of it."""
+    """Category of an object of the last run; NotFound for an unknown name."""
     scene = fitted(context.files(project)) or {"objects": []}
     category: str | None = next((item["category"] for item in scene["objects"] if item["name"] == name), None)
     if category is None:
@@ -129,7 +129,7 @@ def refuse_overtaken(
     item: SceneObject,
     body: schemas.VerdictIn | schemas.OverridePatch | schemas.UndoRequest,
 ) -> None:
-    """Raise Conflict, with what is stored now, when somebody reviewed the object since the sender last looked."""
+    """Raise Conflict, with the stored state, if the object was reviewed since the sender's version."""
     if body.version is None or body.version == history.version_of(session, item, "review"):
         return
     shown = groups_of(context, session, project, [item])
@@ -149,7 +149,7 @@ def refuse_overtaken(
 
 def _store_verdict(session: Session, item: SceneObject, body: schemas.VerdictIn, who: str) -> None:
     for old in session.exec(select(Verdict).where(Verdict.object_id == item.id)):
-        replaced = body.verdict == "accepted" and old.verdict == "accepted"  # one accepted candidate an object
+        replaced = body.verdict == "accepted" and old.verdict == "accepted"  # at most one accepted candidate per object
         if old.candidate == body.candidate or replaced:
             session.delete(old)
     session.flush()
@@ -161,7 +161,7 @@ def _store_verdict(session: Session, item: SceneObject, body: schemas.VerdictIn,
 
 
 def _override_after(before: dict[str, Any], body: schemas.VerdictIn, facts: dict[str, Any] | None) -> dict[str, Any]:
-    """The corrections that a verdict means."""
+    """The corrections implied by a verdict."""
     after = dict(before)
     rejected = [name for name in before.get("rejected", []) if name != body.candidate]
     if body.verdict == "rejected":
@@ -174,13 +174,13 @@ def _override_after(before: dict[str, Any], body: schemas.VerdictIn, facts: dict
     if not rejected:
         after.pop("rejected")
     known = {candidate["candidate_id"] for candidate in (facts or {}).get("candidates", [])}
-    if body.verdict == "rejected" and known and known <= set(rejected):  # none is left to choose
+    if body.verdict == "rejected" and known and known <= set(rejected):  # no candidate is left
         after["regenerate"] = min(before.get("regenerate", 0) + 1, MOST_BATCHES)
     return after
 
 
 def _check_override(context: Context, project: Project, item: SceneObject, merged: dict[str, Any]) -> None:
-    """Raise OverrideError for what the core would refuse."""
+    """Raise OverrideError for corrections that the core would refuse."""
     from r2c2r_core.overrides import overrides_from
 
     files = context.files(project)
@@ -197,7 +197,7 @@ def _check_override(context: Context, project: Project, item: SceneObject, merge
 
 
 def _rerun(context: Context, session: Session, project: Project, item: SceneObject) -> int | None:
-    """The run that a correction of an object starts; None where nothing is clicked."""
+    """Queue the run for a correction of an object; None without prompts."""
     try:
         return jobs.queue_run(context, session, project, schemas.RunRequest(), (item.id or 0,)).id
     except PromptError:
@@ -216,14 +216,14 @@ _WORDS = {
 
 
 def _in_words(key: str, value: Any) -> str:
-    """One correction, for the history and for who made it."""
+    """Description of one correction for the history and the user."""
     name = _WORDS.get(key, key)
     if key == "left_out":
         return name if value else "brought back"
     if value is None:
         return f"{name} computed again"
     if key == "candidate":
-        return f"{name} {Path(value).name}"  # of an uploaded mesh the name, not where it lies
+        return f"{name} {Path(value).name}"  # an uploaded mesh's name, not its path
     if key == "pose":
         return f"{name} ({', '.join(f'{row[3]:.3f}' for row in value[:3])}) m"
     if key == "dimensions_m":
@@ -237,7 +237,7 @@ def _in_words(key: str, value: Any) -> str:
 
 
 def reviewed_shape(context: Context, project_id: str, object_id: int, job_id: int | None, text: str) -> schemas.Reviewed:
-    """What follows from something stored: its job begins, every tab is told, and the object as it is now."""
+    """Follow-up of a stored review: start its job, publish to all tabs, and return the object's current state."""
     if job_id is not None:
         context.runner.queued(job_id)
     tell_object(context, project_id, object_id)

@@ -23,7 +23,7 @@ from r2c2r_core.model.scene import ArticulatedScene
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace
 
-_MOST_MANIFEST = 1 << 20  # bytes, about; a bundle may hold pictures and meshes of any size beside it
+_MOST_MANIFEST = 1 << 20  # approximate bytes; the bundle's size does not matter
 _MANIFESTS: FileCache[dict[str, Any]] = FileCache(32 << 20)
 
 
@@ -58,7 +58,7 @@ def summary(context: Context, project_id: str) -> schemas.SceneSummary:
 
 
 def fitted(files: ProjectFiles) -> dict[str, Any] | None:
-    """The scene after the fit (or before it, when there was no fit) as JSON, without its meshes."""
+    """The warped scene (or the unwarped one, if there was no warp) as JSON, without its meshes."""
     work = Workspace(files.work)
     for stage in ("warp", "synthesize"):
         if work.noun_path(stage, "scene").is_file():

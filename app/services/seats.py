@@ -1,4 +1,4 @@
-"""Where jobs run: each seat, what it does, what waits for one."""
+"""Seats with their jobs, and the queue."""
 
 from sqlmodel import Session, col, func, select
 
@@ -11,7 +11,7 @@ from app.services.context import Context
 
 
 def everyone(context: Context) -> schemas.Seats:
-    """The seats that live, and how many jobs wait."""
+    """The live seats, and the number of waiting jobs."""
     rows = seats.living(context.engine, context.settings) if context.runner.rows.shared else [_this(context)]
     with reading(context.engine) as session:
         waiting = session.exec(select(func.count()).where(Job.state == "queued")).one()
@@ -24,7 +24,7 @@ def everyone(context: Context) -> schemas.Seats:
 
 
 def drain(context: Context, seat_id: int, body: schemas.SeatIn) -> schemas.Seats:
-    """Let a seat take no further job, or take jobs again; it hears of that with its next sign of life."""
+    """Start or stop draining a seat; it takes effect with its next heartbeat."""
     if not context.runner.rows.shared:
         raise Conflict("this server is the only seat", hint="stop it instead: its jobs wait for the next start")
     with writing(context.engine) as session:
@@ -37,13 +37,13 @@ def drain(context: Context, seat_id: int, body: schemas.SeatIn) -> schemas.Seats
 
 
 def _this(context: Context) -> Seat:
-    """The server that holds its file of rows alone."""
+    """The seat of a server with its own database file."""
     settings, at = context.settings, context.runner.began
     return Seat(id=0, owner=context.runner.rows.owner, version=seats.version(), jobs=settings.heavy_jobs, began=at, seen=at)
 
 
 def _running(session: Session) -> dict[str, list[schemas.SeatJob]]:
-    """What runs, by its owner."""
+    """Running jobs by owner."""
     found: dict[str, list[schemas.SeatJob]] = {}
     rows = session.exec(
         select(Job, Project.name).join(Project).where(col(Job.state).in_(("running", "cancelling"))).order_by(col(Job.id))
@@ -65,7 +65,7 @@ def _running(session: Session) -> dict[str, list[schemas.SeatJob]]:
 
 
 def _helping(session: Session, job: Job) -> dict[str, list[str]]:
-    """Objects of the job that seats without it compute."""
+    """Objects of the job being computed by other seats."""
     found: dict[str, list[str]] = {}
     at_work = select(Part).where(Part.job_id == job.id, Part.state == "running", Part.owner != job.owner)
     for part in session.exec(at_work.order_by(col(Part.id))):

@@ -1,4 +1,4 @@
-"""Changes that their sender marked with a key: made once, answered as often as asked."""
+"""Idempotent changes with a sender's key: applied once, answered repeatedly."""
 
 import hashlib
 import time
@@ -18,7 +18,7 @@ LONGEST_KEY = 100
 
 
 def sending(person: Person, key: str, method: str, path: str) -> Sending:
-    """The marked change; keys of different people never meet."""
+    """The marked change; keys of different users cannot collide."""
     if not 1 <= len(key) <= LONGEST_KEY:
         raise InputError(f"Idempotency-Key has {len(key)} characters", hint=f"between 1 and {LONGEST_KEY}")
     parts = path.split("/")  # /api/projects/PROJECT/…
@@ -27,7 +27,7 @@ def sending(person: Person, key: str, method: str, path: str) -> Sending:
 
 
 def check_person(person: Person, named: str | None) -> None:
-    """Refuse what a page kept for one person once another has signed in beside it; `named` is percent-encoded."""
+    """Refuse pending changes of a page whose user differs from the signed-in one; `named` is percent-encoded."""
     if named is not None and unquote(named) != person.name:
         raise Unauthorised(
             f"this change was made by {unquote(named)!r}, and {person.name!r} is signed in now",
@@ -36,7 +36,7 @@ def check_person(person: Person, named: str | None) -> None:
 
 
 def answer_of(context: Context, change: Sending) -> Answer | None:
-    """What was answered when the change was made; None when it has not been made."""
+    """The stored answer of a change; None if it was not made yet."""
     with reading(context.engine) as session:
         found = once.find(session, change.digest)
     if found is None:
@@ -49,12 +49,12 @@ def answer_of(context: Context, change: Sending) -> Answer | None:
 
 
 def keep(context: Context, change: Sending, answer: Answer) -> None:
-    """Remember the answer that could not be stored with the change."""
+    """Store the answer that could not be stored with the change."""
     with writing(context.engine) as session:
         once.answered(session, change.digest, answer.status, answer.body)
 
 
 def tidy(context: Context) -> None:
-    """Forget what was sent so long ago that nobody sends it again."""
+    """Delete expired keys."""
     with writing(context.engine) as session:
         once.forget(session, before=time.time() - once.KEPT_S)

@@ -1,4 +1,4 @@
-"""How large projects are: measured when their jobs end, and now and then while they are worked on; a list only reads it."""
+"""Sizes of project folders, measured after jobs and periodically during work, and cached for lists."""
 
 from sqlmodel import col, select
 
@@ -9,7 +9,7 @@ from app.services.context import Context
 
 
 def measure(context: Context) -> None:
-    """Measure the folders of projects that changed since that was done last."""
+    """Measure the folders of projects that changed since the last measurement."""
     with reading(context.engine) as session:
         changed = session.exec(select(Project).where(col(Project.updated) > col(Project.sized))).all()
     for project in changed:

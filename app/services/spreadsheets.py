@@ -1,4 +1,4 @@
-"""Tables for a spreadsheet program: CSV whose text stays text."""
+"""CSV export that is safe against formula injection in spreadsheets."""
 
 import csv
 import io
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 def written(head: list[str], rows: Iterable[list[str]]) -> str:
-    """The table; text that a spreadsheet would run as a formula is quoted."""
+    """The CSV table, with text that a spreadsheet would run as a formula escaped."""
     out = io.StringIO()
     lines = csv.writer(out, lineterminator="\n")
     lines.writerow(head)
@@ -15,5 +15,5 @@ def written(head: list[str], rows: Iterable[list[str]]) -> str:
 
 
 def _plain(text: str) -> str:
-    """As text in a spreadsheet, whatever it begins with."""
+    """The text escaped if it starts like a formula."""
     return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text

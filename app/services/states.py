@@ -1,4 +1,4 @@
-"""draft → ready → in review → changes requested → approved: who may go where, and what has to hold."""
+"""Review states (draft → ready → in review → changes requested → approved): transitions, roles and conditions."""
 
 import logging
 import time
@@ -22,14 +22,14 @@ _log = logging.getLogger(__name__)
 
 SCOPE = "state"
 NAMED = 6  # joints, in the note about defaults
-LEAST_FRAMES = 3  # an object seen from fewer places has no shape to speak of
+LEAST_FRAMES = 3  # with fewer views, an object's shape is undetermined
 
 Check = Callable[[Context, Session, Project], list[str]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transition:
-    """One legal step."""
+    """One permitted transition."""
 
     text: str
     role: Literal["annotator", "reviewer"]
@@ -39,13 +39,13 @@ class Transition:
 
 
 def status(context: Context, project_id: str) -> schemas.ReviewStatus:
-    """Where the project stands and where it may go from here."""
+    """The project's review state and possible transitions."""
     with reading(context.engine) as session:
         return _status(context, session, queries.project_row(session, project_id))
 
 
 def step(context: Context, project_id: str, body: schemas.ReviewStep) -> schemas.ReviewStatus:
-    """Go there, if it is legal from here; what is unmet, or a refusal, needs a written reason."""
+    """Make a transition, if permitted; unmet conditions, and refusals, need a written reason."""
     reason = body.reason
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
@@ -69,13 +69,13 @@ def step(context: Context, project_id: str, body: schemas.ReviewStep) -> schemas
 
 
 def figures(context: Context, project_id: str) -> schemas.Figures:
-    """What the project cost its people so far."""
+    """Effort spent on the project so far."""
     with reading(context.engine) as session:
         return _figures(session, queries.project_row(session, project_id))
 
 
 def _ready_to_review(context: Context, session: Session, project: Project) -> list[str]:
-    """Every object was clicked and is seen from a few places."""
+    """Unmet conditions for review: every object has prompts and is seen in a few frames."""
     items = queries.live_objects(session, project.id)
     if not items:
         return ["no object was clicked yet"]
@@ -91,7 +91,7 @@ def _ready_to_review(context: Context, session: Session, project: Project) -> li
 
 
 def _approvable(context: Context, session: Session, project: Project) -> list[str]:
-    """The newest bundle is of now and passed; every object has a verdict; nothing said is open."""
+    """Unmet conditions for approval: a current, passed bundle, a verdict on every object, no open comments."""
     bundle = queries.newest_bundle(session, project.id)
     if bundle is None:
         return ["there is no bundle"]
@@ -113,7 +113,7 @@ def _approvable(context: Context, session: Session, project: Project) -> list[st
 
 
 def _by_default(context: Context, project: Project) -> list[str]:
-    """The joints of the newest scene that hold a value which nothing in the recording tells."""
+    """Joints of the newest scene with default values not derived from the recording."""
     scene = scenes.fitted(context.files(project))
     joints = [joint for item in scene["objects"] for joint in item["joints"]] if scene else []
     guessed = [joint["name"] for joint in joints if "default" in joint["sources"].values()]

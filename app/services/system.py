@@ -1,4 +1,4 @@
-"""What this app can do, and folders a recording may be taken from."""
+"""Capabilities of the app, and folders from which recordings may be imported."""
 
 import stat
 from pathlib import Path
@@ -18,7 +18,7 @@ from r2c2r_core.segment.stage import SEGMENTERS
 PALETTE = [  # Okabe-Ito first, then tones that keep 3:1 against them on light and dark frames
     "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00",
     "#cc79a7", "#9467bd", "#8c564b", "#17becf", "#bcbd22", "#7f7f7f",
-    # then, of sRGB, always the one farthest in OKLab from all before it (0.14 at least): 24 objects have a colour each
+    # then, greedily, the sRGB colour farthest in OKLab from all previous ones (at least 0.14), for 24 distinct objects
     "#ff00ff", "#0000ff", "#ffc3e1", "#00ff00", "#6900b4", "#006900",
     "#c30078", "#a500ff", "#78f0c3", "#ff87ff", "#00c300", "#5a5aff",
 ]  # fmt: skip
@@ -75,7 +75,7 @@ def browse(context: Context, path: str | None) -> schemas.FolderListing:
 
 
 def allowed_path(context: Context, path: str) -> Path:
-    """The path, resolved; raises Forbidden outside the allowed roots (links count as where they lead)."""
+    """The resolved path; raises Forbidden outside the allowed roots (links are followed)."""
     if "\x00" in path:
         raise Forbidden("the path holds a zero byte")
     try:
@@ -92,7 +92,7 @@ def allowed_path(context: Context, path: str) -> Path:
 
 
 def _below_root(context: Context, path: Path) -> Path:
-    """The part of a path below the allowed root it is in, the deepest one; empty outside them."""
+    """The path relative to its deepest allowed root; empty outside them."""
     roots = [root.resolve() for root in context.settings.roots if path.is_relative_to(root.resolve())]
     return path.relative_to(max(roots, key=lambda root: len(root.parts))) if roots else Path()
 
@@ -102,7 +102,7 @@ def _is_allowed(context: Context, path: Path) -> bool:
 
 
 def _entry(path: Path) -> schemas.FolderEntry | None:
-    """A folder or a plain file; None for what is neither, or has just gone."""
+    """A folder or a regular file; None for anything else, or if it has disappeared."""
     try:
         found = path.stat()
     except OSError:
@@ -131,7 +131,7 @@ def _backend(registry: Registry, backend: Backend) -> schemas.Backend:
 
 
 def _categories() -> list[schemas.Category]:
-    """All names of the category table; the label of what else a kind is called says what it is taken for."""
+    """All category names; the label of a synonym includes its category."""
     from r2c2r_core.kitchen.categories import every_category
 
     return [

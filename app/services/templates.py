@@ -1,4 +1,4 @@
-"""Templates of names and categories, and the list of objects that a project takes over from one."""
+"""Templates of names and categories, and checklists of projects made from them."""
 
 import time
 
@@ -18,13 +18,13 @@ MOST = 200  # on a server
 
 
 def listed(context: Context) -> list[schemas.Template]:
-    """All of them, by name."""
+    """All templates, by name."""
     with reading(context.engine) as session:
         return [_shape(context, row) for row in session.exec(select(Template).order_by(col(Template.name)))]
 
 
 def add(context: Context, body: schemas.TemplateIn) -> schemas.Template:
-    """A new one; raises Conflict when the name is taken."""
+    """Add a template; raises Conflict when the name is taken."""
     with writing(context.engine) as session:
         if len(session.exec(select(Template.id)).all()) >= MOST:
             raise InputError(f"{MOST} templates are there already", hint="delete those that nobody uses")
@@ -32,19 +32,19 @@ def add(context: Context, body: schemas.TemplateIn) -> schemas.Template:
 
 
 def change(context: Context, number: int, body: schemas.TemplateIn) -> schemas.Template:
-    """Another name or other objects; projects that took it over stay as they are. By who made it, or an admin."""
+    """Change name or objects; existing checklists are unchanged. Only by its author or an admin."""
     with writing(context.engine) as session:
         return _write(context, session, _mine(context, session, number), body)
 
 
 def remove(context: Context, number: int) -> None:
-    """Delete it; projects that took it over stay as they are. By who made it, or an admin."""
+    """Delete a template; existing checklists are unchanged. Only by its author or an admin."""
     with writing(context.engine) as session:
         session.delete(_mine(context, session, number))
 
 
 def set_checklist(context: Context, project_id: str, body: schemas.ChecklistIn) -> schemas.Project:
-    """The objects of a template are to be clicked in the project, or none are listed."""
+    """Set the project's checklist from a template, or clear it."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         template = _row(session, body.template) if body.template is not None else None
@@ -76,7 +76,7 @@ def _write(context: Context, session: Session, row: Template, body: schemas.Temp
 
 
 def _check(objects: list[schemas.ListedObject]) -> None:
-    """Raise PromptError or InputError for names that a project's objects could not have."""
+    """Raise PromptError or InputError for invalid object names."""
     seen: set[str] = set()
     for entry in objects:
         require_usable(entry.name)

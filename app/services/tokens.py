@@ -1,7 +1,7 @@
-"""Tokens with which programs come in: made once, kept as a hash, narrower than the person whose they are, revocable.
+"""API tokens: shown once, stored as a hash, limited to their user's rights, revocable.
 
-A token acts for its account, with the account's role of the moment or the token's where that reaches less far, and is in the
-history under the account's name.
+A token acts for its account with the lesser of the account's current role and the token's scope, and appears in the history
+under the account's name.
 """
 
 import contextlib
@@ -22,16 +22,16 @@ from app.settings import Settings
 from r2c2r_core.errors import InputError, R2C2RError
 
 SCOPES: tuple[TokenScope, ...] = ("metrics", "read", *ROLES)
-USED_S = 60.0  # when it was last used is noted this often
+USED_S = 60.0  # resolution of the last-used time
 MOST = 50  # of one account
 
 
 def add(
     engine: Engine, owner: str | None, name: str, scope: str, *, by: str = audit.COMMAND_LINE
 ) -> tuple[str, schemas.ApiToken]:
-    """A new token of an account, or, without one, of whoever starts the server; what is secret of it is returned only now.
+    """Create a token of an account, or, without one, of the user who starts the server; returns the secret only once.
 
-    Raises InputError for an unknown scope or one too many, Forbidden for a scope beyond the account's role.
+    Raises InputError for an unknown scope or too many tokens, Forbidden for a scope beyond the account's role.
     """
     secret = TOKEN_PREFIX + secrets.token_urlsafe(32)
     with writing(engine) as session:
@@ -48,7 +48,7 @@ def add(
 
 
 def everyone(engine: Engine, *, of: str | None = None) -> list[schemas.ApiToken]:
-    """The tokens of an account, or of all; the newest last."""
+    """The tokens of an account, or of all, oldest first."""
     with reading(engine) as session:
         query = select(ApiToken, Account).join(Account, isouter=True).order_by(col(ApiToken.id))
         if of is not None:
@@ -57,7 +57,7 @@ def everyone(engine: Engine, *, of: str | None = None) -> list[schemas.ApiToken]
 
 
 def revoke(engine: Engine, number: int, *, of: str | None = None, by: str = audit.COMMAND_LINE) -> None:
-    """It opens nothing from now on; raises NotFound for one that is not there, or, with `of`, is another account's."""
+    """Revoke a token; raises NotFound for an unknown one, or, with `of`, for another account's."""
     with writing(engine) as session:
         row = session.get(ApiToken, number)
         account = session.get(Account, row.account_id) if row is not None and row.account_id is not None else None
@@ -68,7 +68,7 @@ def revoke(engine: Engine, number: int, *, of: str | None = None, by: str = audi
 
 
 def person_of(engine: Engine, settings: Settings, secret: str) -> Person | None:
-    """Whom the token acts for, and how far; None for one that is none any more."""
+    """The token's user with its scope; None for an invalid token."""
     with reading(engine) as session:
         query = select(ApiToken, Account).join(Account, isouter=True).where(ApiToken.digest == _digest(secret))
         found = session.exec(query).first()
@@ -78,14 +78,14 @@ def person_of(engine: Engine, settings: Settings, secret: str) -> Person | None:
     if account is None and settings.accounts_only:
         return None
     if time.time() - (token.used or 0.0) > USED_S:
-        with contextlib.suppress(R2C2RError), writing(engine) as session:  # a full disk keeps nobody out
+        with contextlib.suppress(R2C2RError), writing(engine) as session:  # a full disk must not prevent access
             _note_used(session, token.id or 0)
     whole = accounts.person(account) if account else Person(settings.user, "admin")
     return _narrowed(whole, token.scope)
 
 
 def _narrowed(person: Person, scope: str) -> Person:
-    """The person as far as the token reaches."""
+    """The user with rights limited to the token's scope."""
     known, reach = _known(scope), _role_of(scope) or ROLES[0]
     return Person(person.name, min(person.role, reach, key=ROLES.index), account=person.account, scope=known)
 
@@ -106,7 +106,7 @@ def _known(scope: str) -> TokenScope:
 
 
 def _role_of(scope: str) -> Role | None:
-    """The role that is the scope's; None for one that is none."""
+    """The role of a scope, or None."""
     return next((role for role in ROLES if role == scope), None)
 
 

@@ -1,4 +1,4 @@
-"""The trash: projects that were deleted, whole, until an admin restores them or deletes them for good."""
+"""The trash: complete deleted projects, until an admin restores or permanently deletes them."""
 
 import time
 
@@ -15,7 +15,7 @@ from app.services.context import Context
 
 
 def put(context: Context, project_id: str) -> schemas.Trashed:
-    """Stop what works for the project and put it into the trash: nobody sees it, and nothing of it is deleted."""
+    """Stop the project's processes and move it to the trash: hidden, with all its files."""
     _stop(context, project_id)
     with writing(context.engine) as session:
         row = queries.project_row(session, project_id)
@@ -29,14 +29,14 @@ def put(context: Context, project_id: str) -> schemas.Trashed:
 
 
 def everything(context: Context) -> list[schemas.Trashed]:
-    """What is in the trash, the newest first."""
+    """Projects in the trash, newest first."""
     with reading(context.engine) as session:
         rows = session.exec(select(Project).where(col(Project.trashed).is_not(None)).order_by(col(Project.trashed).desc()))
         return [_shape(session, row) for row in rows]
 
 
 def restore(context: Context, project_id: str) -> schemas.Project:
-    """The project again as it was."""
+    """Restore a project from the trash."""
     with writing(context.engine) as session:
         row = _row(session, project_id)
         row.trashed = None
@@ -46,7 +46,7 @@ def restore(context: Context, project_id: str) -> schemas.Project:
 
 
 def delete(context: Context, project_id: str) -> schemas.Deleted:
-    """Delete the rows and files of what is in the trash, for good; a workspace elsewhere is not ours to delete."""
+    """Permanently delete rows and files of a trashed project, but not a workspace outside its folder."""
     with reading(context.engine) as session:
         _row(session, project_id)
     context.store.delete(project_id)

@@ -1,4 +1,4 @@
-"""Undo and redo: of clicks and names for everybody, of verdicts and corrections for reviewers."""
+"""Undo and redo: of clicks and names for all users, of verdicts and corrections for reviewers."""
 
 from typing import Literal
 
@@ -40,7 +40,7 @@ def _step(context: Context, project_id: str, body: schemas.UndoRequest, directio
         undone = schemas.Undone(object=change.shape, text=event.text, frame=event.frame, version=version)
         once.keep_answer(session, undone.model_dump_json())
     if "assignee" in (event.before or {}):
-        context.hub.publish("projects", None)  # inboxes are counted anew
+        context.hub.publish("projects", None)  # inbox counts are updated
     shape = prompts.after_change(context, change)
     if body.scope == "review":
         context.hub.publish("review", project_id, object=number)
@@ -50,7 +50,7 @@ def _step(context: Context, project_id: str, body: schemas.UndoRequest, directio
 def _refuse_overtaken(
     context: Context, session: Session, project: Project, item: SceneObject, body: schemas.UndoRequest
 ) -> None:
-    """Raise Conflict rather than take back what the sender has not seen."""
+    """Raise Conflict instead of undoing a change that the sender has not seen."""
     if body.scope == "review":
         reviews.refuse_overtaken(context, session, project, item, body)
     else:

@@ -1,4 +1,4 @@
-"""What was set aside, for an admin: what is in it, adopting it, leaving it, discarding the bytes of an upload."""
+"""Folders set aside, for an admin: list, adopt, leave, or discard an upload's bytes."""
 
 import logging
 import secrets
@@ -18,19 +18,19 @@ from r2c2r_core.errors import InputError
 
 _log = logging.getLogger(__name__)
 
-LEFT = "left"  # a mark in the folder
-_RECORDING = "Recovered.zip"  # what the file was called was in the row alone; an .r3d is a zip as well
+LEFT = "left"  # marker file in the folder
+_RECORDING = "Recovered.zip"  # the original name was only in the row; an .r3d is a zip as well
 
 
 def everything(context: Context) -> list[schemas.UnknownFolder]:
-    """All that was set aside, by name."""
+    """All folders set aside, by name."""
     return [_shape(context, path) for path in sorted(context.settings.unknown.glob("*"))]
 
 
 def adopt(context: Context, entry: str) -> schemas.Project:
-    """Make it a project again, or give the project that is there what it says beyond the database.
+    """Restore a folder as a project, or complete the existing project from it.
 
-    The bytes of an upload are looked at by a process, which is waited for: call it behind the gate of looks.
+    An upload's bytes are validated by a process: call it behind the gate of looks.
     """
     folder = _found(context, entry)
     if not folder.is_dir():
@@ -45,24 +45,26 @@ def adopt(context: Context, entry: str) -> schemas.Project:
         shutil.move(folder, files.root)
     try:
         with writing(context.engine) as session:
-            adopting.adopt(session, context.settings.data_dir, description, context.who).trashed = None  # it is wanted
+            adopting.adopt(
+                session, context.settings.data_dir, description, context.who
+            ).trashed = None  # restored also from the trash
     except BaseException:
         if not only_said:
             shutil.move(files.root, folder)
         raise
     if only_said:
-        delete_folder(folder)  # all it said is in the database
+        delete_folder(folder)  # all its content is in the database
     (files.root / LEFT).unlink(missing_ok=True)
     crossing.sees_changed(context)
     project = projects.get_project(context, description.id)
-    if project.job is not None:  # its recording is read again
+    if project.job is not None:  # a job reads its recording again
         context.runner.queued(project.job.id)
     projects.tell(context, project.id)
     return project
 
 
 def leave(context: Context, entry: str) -> schemas.UnknownFolder:
-    """Decide that it stays where it is."""
+    """Mark a folder to stay where it is."""
     folder = _found(context, entry)
     if folder.is_dir():
         (folder / LEFT).touch()
@@ -79,7 +81,7 @@ def discard(context: Context, entry: str) -> None:
 
 
 def _adopt_upload(context: Context, path: Path) -> schemas.Project:
-    """A new project from a recording of which every byte arrived."""
+    """A new project from a completely received recording."""
     probing.check_recording(context, path, safe_name(path.name))
     row = Upload(id=secrets.token_hex(6), file_name=_RECORDING, size=path.stat().st_size, who=context.who, created=time.time())
     with writing(context.engine) as session:
@@ -95,7 +97,7 @@ def _found(context: Context, entry: str) -> Path:
 
 
 def _only_said(folder: Path) -> bool:
-    """Whether it holds a project.json and nothing else of the project."""
+    """Whether the folder has only a project.json."""
     return {path.name for path in folder.iterdir()} - {LEFT} == {"project.json"}
 
 

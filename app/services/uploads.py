@@ -1,7 +1,7 @@
-"""Recordings on their way in: their bytes may stop and go on, also after the server was restarted.
+"""Resumable uploads of recordings, also across restarts of the server.
 
-How many bytes arrived is the size of the file they are in, so nothing can disagree about it. The upload's id becomes the
-project's: finishing twice, or again after a crash, is finishing once.
+The received size is the size of the file itself, so it is always consistent. The upload's id becomes the project's, which
+makes finishing idempotent, also after a crash.
 """
 
 import contextlib
@@ -24,11 +24,11 @@ from app.services.context import Context
 from r2c2r_core.errors import CaptureError, InputError
 from r2c2r_core.ingest.foreign import refuse_foreign
 
-SPARE = 2.5  # a recording needs its own size again when it is read, and some more
+SPARE = 2.5  # required free space relative to the recording, as reading it needs its size again, and more
 
 
 def begin(context: Context, body: schemas.UploadIn) -> schemas.Upload:
-    """Announce a file; refused at once when its name tells that it is no recording, or it is too large for limit or disk."""
+    """Announce a file; refused at once if its name is not a recording's, or it exceeds the limit or the disk."""
     refuse_foreign(PurePath(body.file_name))
     _refuse_size(context, body.size)
     require_free(context.settings.data_dir, int(body.size * SPARE), context.settings.min_free_bytes)
@@ -44,20 +44,20 @@ def begin(context: Context, body: schemas.UploadIn) -> schemas.Upload:
 
 
 def unfinished(context: Context) -> list[schemas.Upload]:
-    """Uploads of this person that stopped, newest first."""
+    """The user's unfinished uploads, newest first."""
     with reading(context.engine) as session:
         query = select(Upload).where(Upload.who == context.who).order_by(col(Upload.created).desc())
         return [_shape(context, row) for row in session.exec(query)]
 
 
 def state(context: Context, upload_id: str) -> schemas.Upload:
-    """How much of it is here."""
+    """Received size of an upload."""
     with reading(context.engine) as session:
         return _shape(context, _row(context, session, upload_id))
 
 
 async def append(context: Context, upload_id: str, offset: int, stream: AsyncIterator[bytes]) -> int:
-    """Store what comes from `offset` on; the new offset. What arrived stays when the sender leaves."""
+    """Append the stream at `offset` and return the new offset. Received bytes are kept if the sender disconnects."""
     with context.uploads.on(upload_id, "sent"):
         found = await anyio.to_thread.run_sync(state, context, upload_id)
         at = found.offset
@@ -69,12 +69,12 @@ async def append(context: Context, upload_id: str, offset: int, stream: AsyncIte
 
 
 def finish(context: Context, upload_id: str) -> schemas.Project:
-    """The project of an upload that is complete; one that cannot be read is refused, and nothing of it stays.
+    """Create the project of a complete upload; an unreadable one is refused and deleted.
 
     It waits for a process: call it behind the gate of looks.
     """
     with reading(context.engine) as session:
-        if session.get(Project, upload_id) is not None:  # asked twice
+        if session.get(Project, upload_id) is not None:  # repeated request
             return projects.get_project(context, upload_id)
     with context.uploads.on(upload_id, "finished"):
         row, received = _complete(context, upload_id)
@@ -91,7 +91,7 @@ def finish(context: Context, upload_id: str) -> schemas.Project:
 
 
 def give(context: Context, project_id: str, body: schemas.RecordingIn) -> schemas.Project:
-    """The recording of a project that has none, from an upload that is complete; what cannot be read is refused and goes.
+    """Add a complete upload as the recording of a project without one; an unreadable one is refused and deleted.
 
     It waits for a process: call it behind the gate of looks.
     """
@@ -107,7 +107,7 @@ def give(context: Context, project_id: str, body: schemas.RecordingIn) -> schema
 
 
 def forget(context: Context, upload_id: str) -> None:
-    """Delete an upload and its bytes; raises Unavailable while it is made a project."""
+    """Delete an upload and its bytes; raises Unavailable while it is becoming a project."""
     with context.uploads.on(upload_id, "deleted"):
         _delete(context, upload_id)
 
@@ -115,7 +115,7 @@ def forget(context: Context, upload_id: str) -> None:
 async def whole(
     context: Context, filename: str, name: str | None, size: int | None, stream: AsyncIterator[bytes]
 ) -> schemas.Project:
-    """A project from one request; nothing stays when it breaks off or is refused."""
+    """A project from a single request; nothing is kept if it is interrupted or refused."""
     _refuse_size(context, size or 0)
     context.gates.looks.check(context.who)  # before a byte is received
     wish = schemas.UploadIn(file_name=filename, size=size or 1, name=name)
@@ -129,7 +129,7 @@ async def whole(
         await anyio.to_thread.run_sync(_set_size, context, upload.id, received)
         return await context.gates.looks.run(context.who, finish, context, upload.id)
     except BaseException as error:
-        with anyio.CancelScope(shield=True), contextlib.suppress(NotFound):  # refused ones are gone already
+        with anyio.CancelScope(shield=True), contextlib.suppress(NotFound):  # refused ones are already deleted
             await anyio.to_thread.run_sync(forget, context, upload.id)
         if isinstance(error, ClientDisconnect):
             raise CaptureError("the sender left before the last byte", hint="upload it again") from error
@@ -137,7 +137,7 @@ async def whole(
 
 
 def forget_stopped(context: Context) -> None:
-    """Forget uploads that did not go on for long."""
+    """Delete stale uploads."""
     limit = time.time() - context.settings.upload_kept_s
     with reading(context.engine) as session:
         rows = session.exec(select(Upload)).all()
@@ -148,7 +148,7 @@ def forget_stopped(context: Context) -> None:
 
 
 async def _store(context: Context, upload_id: str, at: int, size: int, stream: AsyncIterator[bytes]) -> int:
-    """Append the stream to the file, up to `size` bytes; where it ends."""
+    """Append the stream to the file, up to `size` bytes, and return the end offset."""
     async with await anyio.open_file(_path(context, upload_id), "ab") as out:
         async for chunk in stream:
             if at + len(chunk) > size:
@@ -164,7 +164,7 @@ async def _store(context: Context, upload_id: str, at: int, size: int, stream: A
 
 
 def _complete(context: Context, upload_id: str) -> tuple[Upload, Path]:
-    """An upload and where its bytes are; raises Conflict unless all are here."""
+    """An upload and its file; raises Conflict unless it is complete."""
     with reading(context.engine) as session:
         row = _row(context, session, upload_id)
     found = _shape(context, row)
@@ -180,9 +180,9 @@ def _delete(context: Context, upload_id: str) -> None:
 
 
 def delete_bytes(context: Context, upload_id: str) -> None:
-    """The bytes of an upload that was given up, also where they were moved before finishing it was interrupted.
+    """Delete the bytes of an abandoned upload, also if they were moved before an interruption of finishing.
 
-    A folder that is not marked as the upload's is a project's, whatever a restored database says: it stays.
+    A folder without the upload's marker belongs to a project, regardless of a restored database, and is kept.
     """
     _path(context, upload_id).unlink(missing_ok=True)
     files = project_files(context.settings.data_dir, upload_id)
@@ -207,13 +207,13 @@ def _set_size(context: Context, upload_id: str, size: int) -> None:
 def _shape(context: Context, row: Upload) -> schemas.Upload:
     try:
         offset = _present(context, row).stat().st_size
-    except FileNotFoundError:  # somebody else deleted it: all of it is to be sent again
+    except FileNotFoundError:  # deleted concurrently: the whole file must be sent again
         offset = 0
     return schemas.Upload(offset=offset, **row.model_dump(include={"id", "file_name", "size", "modified", "created"}))
 
 
 def _present(context: Context, row: Upload) -> Path:
-    """Where its bytes are: already the project's when finishing was interrupted."""
+    """The upload's file, already in the project's folder if finishing was interrupted."""
     kept = project_files(context.settings.data_dir, row.id).source / safe_name(row.file_name)
     return kept if kept.exists() else _path(context, row.id)
 

@@ -1,4 +1,4 @@
-"""Variants of bundles for training: what they would take, made by a job, kept as files that say themselves what they are."""
+"""Variants of bundles for training: size estimates, creation by a job, and self-describing files."""
 
 import json
 import tempfile
@@ -21,12 +21,12 @@ from app.services.imports import queue_job
 from r2c2r_core.errors import BundleError
 from r2c2r_core.variants.stage import NOT_VARIED
 
-_SURFACES_BYTES = 900_000  # of the procedural textures, packed or not (benchmarks/variants.json)
-_TOLD = 1.1  # a variant with what variants.json says of it, beside its scene (the same: 4.1 MB beside 53)
+_SURFACES_BYTES = 900_000  # of the procedural textures, compressed or not (benchmarks/variants.json)
+_TOLD = 1.1  # size of a variant including its entry in variants.json, relative to its scene (ibid.: 4.1 MB beside 53)
 
 
 class _Takes(NamedTuple):
-    """Bytes: of what all variants share, and of each."""
+    """Bytes shared by all variants, and bytes of each."""
 
     shared: int
     each: int
@@ -36,7 +36,7 @@ class _Takes(NamedTuple):
 
 
 def list_variants(context: Context, project_id: str) -> schemas.Variants:
-    """All that were made, and what variants of the newest bundle would take."""
+    """Existing variants, and the estimated size of variants of the newest bundle."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         newest = queries.newest_bundle(session, project_id)
@@ -60,7 +60,7 @@ def list_variants(context: Context, project_id: str) -> schemas.Variants:
 
 
 def make(context: Context, project_id: str, body: schemas.VariantsIn) -> int:
-    """Queue a job that makes them; its number. One under way that makes the same is that job."""
+    """Queue a job that creates them and return its number; an active job for the same variants is reused."""
     bundle = bundles.file(context, project_id, body.version).path
     takes = _takes(bundle)
     if takes is None:
@@ -83,14 +83,14 @@ def make(context: Context, project_id: str, body: schemas.VariantsIn) -> int:
 
 
 def delete(context: Context, project_id: str, name: str) -> schemas.Variants:
-    """Delete variants that were made, if they are there; the same seed makes them again."""
+    """Delete existing variants; the same seed recreates them."""
     delete_folder(context.files(_project(context, project_id)).variants / name)
     projects.tell(context, project_id)
     return list_variants(context, project_id)
 
 
 def archive(context: Context, project_id: str, name: str) -> BundleFile:
-    """The zip of variants that were made."""
+    """The zip of existing variants."""
     project = _project(context, project_id)
     made = _made(context.files(project), name)
     shape = _shape(project, made)
@@ -98,7 +98,7 @@ def archive(context: Context, project_id: str, name: str) -> BundleFile:
 
 
 def wall(context: Context, project_id: str, name: str) -> Path:
-    """The picture of the first of them."""
+    """Picture of the first variants."""
     return _made(context.files(_project(context, project_id)), name).wall
 
 
@@ -115,15 +115,15 @@ def _made(files: ProjectFiles, name: str) -> VariantFiles:
 
 
 def _under_way(session: Session, project_id: str, name: str) -> Job | None:
-    """The job that makes them already."""
+    """The active job that creates them, or None."""
     active = select(Job).where(Job.project_id == project_id, Job.kind == "vary", col(Job.state).in_(("queued", "running")))
     return next((job for job in session.exec(active) if job.payload["name"] == name), None)
 
 
 def _takes(bundle: Path) -> tuple[_Takes, _Takes] | None:
-    """About what variants of the bundle take as a zip, and unpacked; None where it has no scene to vary.
+    """Approximate size of the bundle's variants as a zip, and unpacked; None without a scene to vary.
 
-    What they share is the bundle without what was seen in it; each is its scene with other numbers.
+    The shared part is the bundle without its result pictures; each variant is its scene with other values.
     """
     with zipfile.ZipFile(bundle) as archive:
         top = root_of(archive)

@@ -1,4 +1,4 @@
-"""The 3D view: what it shows, and who reaches it."""
+"""The 3D view: content and access."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,11 +21,11 @@ from app.services.candidates import facts_of
 from app.services.context import Context
 from app.viewer import proxy
 
-_CLOSING: dict[type[Exception], int] = {Forbidden: 4403, TooMany: 4429}  # as HTTP would say, in the range of applications
+_CLOSING: dict[type[Exception], int] = {Forbidden: 4403, TooMany: 4429}  # HTTP status codes in the application range
 
 
 def open_view(context: Context, project_id: str, session_id: str) -> schemas.ViewerSession:
-    """Where the 3D view is, or what to show instead."""
+    """Address of the 3D view, or a fallback."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         bundle = queries.newest_bundle(session, project_id)
@@ -45,7 +45,7 @@ def open_view(context: Context, project_id: str, session_id: str) -> schemas.Vie
 
 
 def show(context: Context, project_id: str, session_id: str, body: schemas.ViewerShow) -> schemas.ViewerShown:
-    """Change what the 3D view shows."""
+    """Change the content of the 3D view."""
     from app.services.meshes import upright
 
     with reading(context.engine) as session:
@@ -68,7 +68,7 @@ def show(context: Context, project_id: str, session_id: str, body: schemas.Viewe
 
 
 def _corrections(session: Session, files: ProjectFiles, project_id: str) -> dict[str, Any]:
-    """What people said that the newest scene may not show yet: corrections by object, and whose mesh they took away."""
+    """Corrections possibly newer than the newest scene, by object, and objects whose mesh was rejected."""
     stored = queries.overrides_by_object(session, project_id)
     said = {item.result_name: stored[item.id or 0] for item in queries.live_objects(session, project_id) if item.id in stored}
     entries = {name: overrides_entry({k: v for k, v in data.items() if k != "candidate"}) for name, data in said.items()}
@@ -87,7 +87,7 @@ def _made(files: ProjectFiles, name: str) -> set[str]:
 
 
 def picked(context: Context, project_id: str, session_id: str) -> schemas.ViewerPicked:
-    """What the last click in the 3D view was on."""
+    """The object or point of the last click in the 3D view."""
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         numbers = {item.result_name: item.id for item in queries.live_objects(session, project_id)}
@@ -96,7 +96,7 @@ def picked(context: Context, project_id: str, session_id: str) -> schemas.Viewer
 
 
 def camera(context: Context, project_id: str, session_id: str) -> schemas.ViewerCamera:
-    """Where the camera of the 3D view stands."""
+    """Camera of the 3D view."""
     return schemas.ViewerCamera.model_validate(context.viewer.camera(project_id, _workdir(context, project_id), session_id))
 
 
@@ -107,7 +107,7 @@ def set_joints(context: Context, project_id: str, session_id: str, values: dict[
 
 
 def place(context: Context, project_id: str, session_id: str, body: schemas.ViewerPlace) -> schemas.ViewerPlaced:
-    """Put what is being moved somewhere, or say where it is."""
+    """Set or return the pose of the object being moved."""
     placed = context.viewer.place(project_id, _workdir(context, project_id), session_id, body.pose)
     return schemas.ViewerPlaced.model_validate(placed)
 
@@ -119,7 +119,7 @@ async def page(context: Context, token: str, path: str, session_id: str) -> Resp
 
 
 async def socket(context: Context, token: str, connection: WebSocket) -> None:
-    """The 3D view's connection."""
+    """Connect a WebSocket to the 3D view."""
     person = connection.state.person
     try:
         with context.viewer.watched(token, person.name):
@@ -131,7 +131,7 @@ async def socket(context: Context, token: str, connection: WebSocket) -> None:
 
 
 async def _port(context: Context, token: str, session_id: str) -> int:
-    """Where the view behind the token is; only one that has to be started anew is waited for."""
+    """Port of the view behind the token, waiting only for a restart."""
     running = context.viewer.running_port(token, session_id)
     if running is not None:
         return running

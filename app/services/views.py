@@ -1,4 +1,4 @@
-"""What a stage stored, and the recording's cameras: read once for every time they change."""
+"""Cached access to stage results and the recording's cameras, invalidated by changes."""
 
 import contextlib
 import json
@@ -18,13 +18,13 @@ T = TypeVar("T")
 
 
 def latest(files: ProjectFiles, stage: str, name: str) -> Any:
-    """The stage's newest noun of that name; None while there is none."""
+    """The stage's newest noun of that name, or None."""
     path = noun_path(files.work, stage, name)
     return _NOUNS.get(path, lambda: Workspace(files.work).load_latest(stage, name), lambda _, size: _UNPACKED * size)
 
 
 def facts(files: ProjectFiles, stage: str, name: str, told: Callable[[Any], T]) -> T | None:
-    """What `told` says of the stage's newest noun of that name, as JSON; None while there is none."""
+    """JSON facts that `told` extracts from the stage's newest noun of that name, or None."""
     work = Workspace(files.work)
 
     def read() -> T | None:
@@ -35,23 +35,23 @@ def facts(files: ProjectFiles, stage: str, name: str, told: Callable[[Any], T]) 
 
 
 class KeptFacts:
-    """`facts` of many nouns, kept in a file of the project: a server that was just started need not read every noun.
+    """`facts` of many nouns, cached in a file of the project, so that a restarted server need not read every noun.
 
-    Each entry says what it was read from; what changed since is read anew. The file may be deleted at any time.
+    Each entry records its source; changed ones are read again. The file may be deleted at any time.
     """
 
     def __init__(self, files: ProjectFiles) -> None:
         self._files, self._new = files, False
 
     def of(self, stage: str, name: str, told: Callable[[Any], T]) -> T | None:
-        """What `told` says of the stage's newest noun of that name; None while there is none."""
+        """Facts that `told` extracts from the stage's newest noun of that name, or None."""
         path = noun_path(self._files.work, stage, name)
         return _FACTS.get(
             path, lambda: self._read(path, stage, name, told), lambda found, _: len(json.dumps(found)), about=told
         )
 
     def keep(self) -> None:
-        """Write what was read anew; a full disk keeps nobody from what was read."""
+        """Write new entries; on a full disk they stay in memory only."""
         if self._new:
             with contextlib.suppress(R2C2RError, OSError):
                 self._files.write(self._files.kept_facts, json.dumps({"version": FACTS_VERSION, "facts": self._kept}).encode())
@@ -77,18 +77,18 @@ class KeptFacts:
             return {}
 
 
-FACTS_VERSION = 1  # of what is told of nouns: what an older one kept is read anew
+FACTS_VERSION = 1  # of the extracted facts: older cache files are ignored
 
 
 def frame_of(files: ProjectFiles, index: int) -> Frame | None:
-    """A frame's cameras and pose; None while the recording is being read, or when it has no such frame."""
+    """A frame's cameras and pose; None while the recording is being read, or for an unknown frame."""
     path = noun_path(files.work, "ingest", "scene")
     found = _CAMERAS.get(path, lambda: _frames(Workspace(files.work)), lambda frames, _: _FRAME_BYTES * len(frames))
     return found.get(index) if found else None
 
 
 def frames_folder(files: ProjectFiles) -> Path:
-    """Where the recording's images are; which reading they are of stands in a file that grows with the recording."""
+    """Folder of the recording's images, cached, as finding it reads a file that grows with the recording."""
     path = noun_path(files.work, "ingest", "scene")
     return _FOLDERS.get(path, lambda: workspace.frames_folder(files.work), lambda *_: 1) or workspace.frames_folder(files.work)
 
@@ -98,10 +98,10 @@ def _frames(work: Workspace) -> dict[int, Frame]:
     return {frame.index: frame for frame in capture.frames} if capture is not None else {}
 
 
-_UNPACKED = 4  # bytes in memory of one in a noun's file: meshes and masks are compressed there to a quarter and less
+_UNPACKED = 4  # memory per byte of a noun's file, where meshes and masks are compressed to a quarter or less
 _FRAME_BYTES = 2000  # of a frame's cameras and pose
 
-_FOLDERS: FileCache[Path] = FileCache(1000)  # counted, for each is a path
+_FOLDERS: FileCache[Path] = FileCache(1000)  # by count, as each is a path
 _NOUNS: FileCache[Any] = FileCache(256 << 20)
 _FACTS: FileCache[Any] = FileCache(64 << 20)  # of some 8000 objects, as JSON
 _CAMERAS: FileCache[dict[int, Frame]] = FileCache(64 << 20)

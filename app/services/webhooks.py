@@ -1,4 +1,4 @@
-"""Webhooks as people make and remove them: of projects that are theirs, and an admin of all."""
+"""Webhook management by users: of their own projects, and of all projects for admins."""
 
 import json
 import secrets
@@ -17,17 +17,17 @@ from app.services.context import Context
 from r2c2r_core.errors import InputError
 
 MOST = 100  # on a server
-SHOWN = 100  # deliveries of one, the newest
+SHOWN = 100  # newest deliveries of one webhook
 
 
 def listed(context: Context) -> list[schemas.Webhook]:
-    """One's own; an admin sees everybody's."""
+    """The user's webhooks; for an admin, everyone's."""
     with reading(context.engine) as session:
         return [_shape(session, *found) for found in session.exec(_mine(context).order_by(col(Webhook.id)))]
 
 
 def add(context: Context, body: schemas.WebhookIn) -> schemas.NewWebhook:
-    """Post to that address what becomes of a project; of all of them where none is named, which takes an admin."""
+    """Add a webhook for a project, or, as an admin, for all projects."""
     if body.project is None:
         context.require("admin")
     with writing(context.engine) as session:
@@ -45,7 +45,7 @@ def add(context: Context, body: schemas.WebhookIn) -> schemas.NewWebhook:
 
 
 def remove(context: Context, number: int) -> None:
-    """It hears of nothing any more; what waits for it is not sent."""
+    """Remove a webhook and its pending deliveries."""
     with writing(context.engine) as session:
         row, account, _ = _found(context, session, number)
         session.delete(row)
@@ -53,7 +53,7 @@ def remove(context: Context, number: int) -> None:
 
 
 def test(context: Context, number: int) -> schemas.Delivery:
-    """Post a message that means nothing, once."""
+    """Send a test message once."""
     with writing(context.engine) as session:
         row, _, project = _found(context, session, number)
         now = time.time()
@@ -68,7 +68,7 @@ def test(context: Context, number: int) -> schemas.Delivery:
 
 
 def deliveries(context: Context, number: int) -> list[schemas.Delivery]:
-    """What was and will be posted to it, newest first."""
+    """Past and pending deliveries of a webhook, newest first."""
     with reading(context.engine) as session:
         _found(context, session, number)
         query = select(Delivery).where(Delivery.webhook_id == number).order_by(col(Delivery.id).desc()).limit(SHOWN)
