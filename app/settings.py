@@ -24,7 +24,7 @@ _IDENTITIES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quotas:
-    """Quotas of one user; admins have higher ones."""
+    """Quotas of one user; admins are exempt."""
 
     jobs: int = 20  # waiting or running
     uploads: int = 20  # announced and not finished

@@ -82,4 +82,4 @@ class EnvironmentProblem(R2C2RError):
 
 
 class Cancelled(R2C2RError):
-    """The person asked to stop."""
+    """The user cancelled the work."""

@@ -8,7 +8,7 @@ from sqlmodel import Session, col, select
 from app.db.tables import Job, JobEvent
 
 LOOKED_AT = 5
-"""Jobs, the newest: the scan and its objects change, and most runs compute little of it anew."""
+"""Number of newest jobs used: scan and objects change, and most runs recompute little."""
 
 
 def longest(session: Session, job: Job) -> dict[str, float]:

@@ -30,7 +30,7 @@ _log = logging.getLogger(__name__)
 IDLE_LOOK_S = 5.0
 MOST_DEATHS = 2  # maximum automatic restarts of a crashed process
 LEFT_S = 10.0
-"""A preparation that no tab looks at any more is stopped after this: longer than a page takes to load anew."""
+"""Seconds after which a preparation without watching tabs is stopped: longer than a page reload takes."""
 VANISHED = body("worker-died", "the live segmenter ended early", "click again to restart it; see its log")
 
 

@@ -1,6 +1,6 @@
-"""Addresses that may be looked up: nothing in them is too long for a file name or cannot be written into a file.
+"""Middleware that validates paths and query values: length limits and encodable text.
 
-Pages, API and sockets have absolute addresses: below a path of a proxy none of them would be found, which is said at once.
+Pages, API and sockets have absolute addresses, so a proxy that serves the app below a path is reported at once.
 """
 
 from urllib.parse import parse_qsl
@@ -16,13 +16,13 @@ LONGEST_VALUE = 4096  # characters after a `name=`: a path on the server's machi
 
 
 class Addresses:
-    """The middleware: 404 for a path that nothing can be at, 422 for a value that nothing can be called."""
+    """The middleware: 404 for an impossible path, 422 for an impossible value."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on what can be looked up."""
+        """Refuse invalid addresses; pass on the others."""
         refused = _refused(scope) if scope["type"] == "http" else None
         await (refused or self.app)(scope, receive, send)
 

@@ -1,4 +1,4 @@
-"""Answers that are what is stored: encoded as they are. The route's response_model says their schema, and a test compares."""
+"""Responses encoded directly from stored data. The route's response_model documents the schema, and a test compares."""
 
 import json
 from typing import Any
@@ -7,5 +7,5 @@ from fastapi.responses import Response
 
 
 def as_json(content: Any) -> Response:
-    """The content as JSON, not built as a model first."""
+    """The content as JSON, without building a model first."""
     return Response(json.dumps(content, separators=(",", ":")), media_type="application/json")

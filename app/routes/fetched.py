@@ -1,4 +1,4 @@
-"""Where files are in a store: what a request is about lies here before it is answered."""
+"""Middleware that fetches a project's files from the store before a request is handled."""
 
 from collections.abc import Callable
 
@@ -13,13 +13,13 @@ from r2c2r_core.errors import R2C2RError
 
 
 class Fetched:
-    """The middleware, behind the one that knows who may see the project."""
+    """The middleware, after the access check of the project."""
 
     def __init__(self, app: ASGIApp, context_of: Callable[[], Context]) -> None:
         self.app, self.context_of = app, context_of
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on, once the project is here."""
+        """Pass the request on once the project's files are local."""
         found = OF_A_PROJECT.fullmatch(scope["path"]) if scope["type"] == "http" else None
         if found is not None and found[1].isalnum():
             try:

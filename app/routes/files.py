@@ -6,7 +6,7 @@ from pathlib import Path
 from fastapi import Request
 from fastapi.responses import FileResponse, Response
 
-AT_ONCE_BYTES = 1 << 19  # a frame: read here, for a response that reads changes threads for every 64 kB
+AT_ONCE_BYTES = 1 << 19  # size of a frame: read at once, as a streaming response switches threads for every 64 kB
 IMMUTABLE = "private, max-age=31536000, immutable"
 
 

@@ -1,4 +1,4 @@
-"""Work of several: whose turn a project is, what waits for a person, what the others did."""
+"""Collaboration: assignment, inbox and news."""
 
 from fastapi import APIRouter
 

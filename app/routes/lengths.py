@@ -1,4 +1,4 @@
-"""Lengths that were measured in the room."""
+"""True lengths measured in the room."""
 
 from fastapi import APIRouter
 

@@ -1,4 +1,4 @@
-"""One connection per tab: jobs, masks, saved changes, and who else is here."""
+"""Live connection of each tab: jobs, masks, saved changes and presence."""
 
 import asyncio
 from typing import Annotated
@@ -16,9 +16,9 @@ from app.tasks import until_first
 router = APIRouter()
 
 HEARTBEAT_S = 15.0
-MOST_TABS = 50  # connected at a time, of one person
-TOO_MANY_TABS = 4429  # closes a connection beyond them; HTTP says 429
-LONGEST_MESSAGE = 1000  # characters of what a tab says
+MOST_TABS = 50  # concurrent connections of one user
+TOO_MANY_TABS = 4429  # close code beyond the limit, like HTTP 429
+LONGEST_MESSAGE = 1000  # characters of a tab's message
 SAID = '{"type": "watch", "project": an id or null, "page": one of the app\'s pages, "object": a number or null}'
 
 
@@ -58,7 +58,7 @@ async def _speak(socket: WebSocket, listener: Listener, hub: Hub) -> None:
 
 
 async def _listen(socket: WebSocket, listener: Listener, hub: Hub) -> None:
-    """Where the tab is; what is no such message is answered to it, and changes nothing."""
+    """Read the tab's position messages; invalid ones are answered without effect."""
     while (message := await socket.receive())["type"] == "websocket.receive":
         try:
             text = message.get("text") or ""
@@ -75,7 +75,7 @@ async def _listen(socket: WebSocket, listener: Listener, hub: Hub) -> None:
 
 
 async def _follow_person(socket: WebSocket, listener: Listener, hub: Hub, people: People) -> None:
-    """Say when the person may do more or less than before; close when the session has ended."""
+    """Notify the tab of changed rights; close the connection when the session ends."""
     person = socket.state.person
     while (now := await people.until_other(socket.state.session, person)) is not None:
         person = socket.state.person = now

@@ -1,4 +1,4 @@
-"""Every request from its first byte to the end of its answer: an id, a line in the log, a time in the metrics."""
+"""Middleware that gives every request an id, a log line and a duration in the metrics."""
 
 import logging
 import re
@@ -18,13 +18,13 @@ _METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS")
 
 
 class Measured:
-    """The middleware, before all others. A proxy's X-Request-ID is kept, so that its log and ours name a request alike."""
+    """The outermost middleware. A proxy's X-Request-ID is kept, so that both logs use the same id."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self.app, self.metrics = app, metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass it on, and note how it ended: status 0 for one whose answer never began."""
+        """Handle the request and record its outcome; status 0 if the answer never began."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -57,7 +57,7 @@ class Measured:
 
 
 def _route(scope: Scope) -> str:
-    """The pattern of the path: whatever people ask for, there are as many of them as routes."""
+    """The route's path pattern, which bounds the number of metric labels."""
     found = getattr(scope.get("route"), "path", None)
     if found is not None:
         return str(found)

@@ -1,4 +1,4 @@
-"""Pixels, meshes and bundles. What cannot change is cached for ever; the address changes when the content does."""
+"""Images, meshes and bundles. Immutable content is cached for ever; its address changes with the content."""
 
 from typing import Annotated, Literal
 

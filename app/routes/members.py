@@ -1,4 +1,4 @@
-"""Members of a project: who they are, and the one place where a request about a project of others ends."""
+"""Members of a project, and the access check of all requests about a project."""
 
 import re
 from collections.abc import Callable
@@ -37,13 +37,13 @@ def set_members(context: Ctx, project: str, body: schemas.MembersIn) -> schemas.
 
 
 class MembersOnly:
-    """The middleware, behind the guard: what is of a project that the person may not see is not there for that person."""
+    """The middleware, after the guard: invisible projects are reported as not found."""
 
     def __init__(self, app: ASGIApp, context_of: Callable[[], Context]) -> None:
         self.app, self.context_of = app, context_of
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on what the person may see."""
+        """Pass on requests about visible projects."""
         if scope["type"] not in ("http", "websocket") or await self._sees(scope):
             await self.app(scope, receive, send)
         elif scope["type"] == "http":
@@ -56,7 +56,7 @@ class MembersOnly:
 
     async def _sees(self, scope: Scope) -> bool:
         person, path = scope["state"]["person"], scope["path"]
-        if person is None:  # signs in, or brings the printed key: the guard lets nobody else come this far
+        if person is None:  # signing in, or using the printed key: the guard refuses all other anonymous requests
             return True
         context = self.context_of()
         if found := OF_A_PROJECT.fullmatch(path):
@@ -69,7 +69,7 @@ class MembersOnly:
 
 
 def _number(text: str) -> int:
-    """The number as the route will read it; -1, which no job has, where it will refuse it."""
+    """The number as parsed by the route; -1, which is no job, where the route will refuse it."""
     try:
         return _ROW_ID.validate_python(text)
     except ValidationError:

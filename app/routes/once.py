@@ -1,4 +1,4 @@
-"""The header Idempotency-Key: a change whose answer got lost may be sent again, and is made once."""
+"""Middleware for the header Idempotency-Key: a change whose answer was lost may be repeated, and is applied once."""
 
 import asyncio
 import re
@@ -17,19 +17,19 @@ from app.services.context import Context
 from app.services.sending import Answer, Sending
 from r2c2r_core.errors import R2C2RError
 
-# deleting a project and sending a recording are many steps, each of which may be taken again as it is
+# deleting a project and uploading a recording are sequences of idempotent steps
 COVERED = re.compile(r"/api/(projects/(sample|import|[^/]+/.+)|jobs/[^/]+/(cancel|retry))")
 
 
 class Once:
-    """The middleware, behind the guard. What changes something does so in one transaction: see app.db.once."""
+    """The middleware, after the guard. Every change is one transaction: see app.db.once."""
 
     def __init__(self, app: ASGIApp, context_of: Callable[[], Context]) -> None:
         self.app, self.context_of = app, context_of
-        self._under_way: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()  # while somebody holds or awaits it
+        self._under_way: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()  # while a request holds or awaits it
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Make a marked change, or answer it as it was answered before."""
+        """Apply a marked change, or repeat its stored answer."""
         key = Headers(scope=scope).get("idempotency-key") if scope["type"] == "http" else None
         if key is None or scope["method"] in SAFE_METHODS or not COVERED.fullmatch(scope["path"]):
             await self.app(scope, receive, send)
@@ -39,7 +39,7 @@ class Once:
             sending.check_person(person, Headers(scope=scope).get("x-r2c2r-person"))
             change = sending.sending(person, key, scope["method"], scope["path"])
             lock = self._under_way.setdefault(change.digest, asyncio.Lock())
-            async with lock:  # sent again while the first one is still at work
+            async with lock:  # repeated while the first request is still being handled
                 await self._answer(change, scope, receive, send)
         except R2C2RError as error:
             await JSONResponse(error_body(error), kind_of(error)[1])(scope, receive, send)

@@ -1,4 +1,4 @@
-"""Signing in and out, and who may."""
+"""Sign-in, sign-out and accounts."""
 
 from typing import Annotated
 

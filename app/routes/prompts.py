@@ -1,4 +1,4 @@
-"""Objects, clicks, undo, and the masks that follow from them."""
+"""Objects, clicks, undo, and the resulting masks."""
 
 from fastapi import APIRouter
 from fastapi.responses import Response

@@ -1,4 +1,4 @@
-"""Signing in at the lab's identity provider, and out of it: pages that a browser goes through."""
+"""Sign-in and sign-out at the identity provider, by browser redirects."""
 
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
@@ -16,7 +16,7 @@ from r2c2r_core.errors import R2C2RError
 router = APIRouter(include_in_schema=False)
 
 PAGE = "/login/provider"
-BEGUN_S = 600  # to sign in at the provider
+BEGUN_S = 600  # time limit of a sign-in at the provider
 LONGEST_NEXT = 1000  # characters: a browser keeps no cookie of more than four thousand
 
 
@@ -73,12 +73,12 @@ def _refused(context: Context, error: R2C2RError) -> Response:
 
 
 def _ours(wanted: str) -> str:
-    """The path, when it is one; it goes after our own origin, so that no host can stand in it."""
+    """The path if valid, else "/"; it is appended to our own origin, so that it cannot contain a host."""
     return wanted if wanted.startswith("/") and len(wanted) <= LONGEST_NEXT else "/"
 
 
 def _origin(request: Request) -> str:
-    """Scheme and host as the browser has them."""
+    """Scheme and host as seen by the browser."""
     return str(request.base_url).rstrip("/")
 
 

@@ -1,4 +1,4 @@
-"""Candidates, what people say about them, and what they correct."""
+"""Candidates, verdicts and corrections."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""The machines that compute, for admins."""
+"""Seats: the computing machines, for admins."""
 
 from fastapi import APIRouter
 

@@ -1,4 +1,4 @@
-"""Review states, comments, and what a project cost."""
+"""Review states, comments, and effort spent on a project."""
 
 from fastapi import APIRouter
 from fastapi.responses import Response

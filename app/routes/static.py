@@ -1,4 +1,4 @@
-"""Our own files, from memory: a page asks for fifty modules at once, and a thread for each is what it would wait for."""
+"""Static files from memory, as a page requests fifty modules at once, which would wait for file-reading threads."""
 
 import gzip
 import mimetypes
@@ -12,15 +12,15 @@ from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
-SERVED = ("index.html", "login.html", "css", "js", "icons", "favicon.svg")  # not the development files beside them
+SERVED = ("index.html", "login.html", "css", "js", "icons", "favicon.svg")  # without development files
 LEAST_BYTES = 500  # less is not worth compressing
 
 
 class PageFiles(StaticFiles):
-    """Static files that a browser asks about each time, so that an update is seen at once."""
+    """Static files that browsers revalidate each time, so that updates take effect at once."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """The file, 304 when the browser has it; HTTPException 404 for what is not a page's, 405 for what is no question."""
+        """The file, or 304 if the browser has it; HTTPException 404 for files that are not served, 405 for other methods."""
         if scope["method"] not in ("GET", "HEAD"):
             raise HTTPException(405)
         file, found = self.lookup_path(path)
@@ -42,7 +42,7 @@ class PageFiles(StaticFiles):
 
 @lru_cache(maxsize=256)
 def _contents(file: Path, _changed: int) -> tuple[bytes, bytes]:
-    """The bytes, and the same compressed (none when that is not worth it)."""
+    """The content, and its gzip (empty for small files)."""
     plain = file.read_bytes()
     return plain, gzip.compress(plain, mtime=0) if len(plain) >= LEAST_BYTES else b""
 

@@ -1,4 +1,4 @@
-"""Templates of names and categories, and what projects take over from them."""
+"""Templates of names and categories, and checklists made from them."""
 
 from fastapi import APIRouter
 

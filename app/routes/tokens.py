@@ -1,4 +1,4 @@
-"""Tokens with which programs come in."""
+"""API tokens."""
 
 from fastapi import APIRouter
 

@@ -1,4 +1,4 @@
-"""Projects that were deleted, until they are restored or deleted for good."""
+"""The trash: deleted projects, until they are restored or permanently deleted."""
 
 from fastapi import APIRouter
 

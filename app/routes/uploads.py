@@ -1,4 +1,4 @@
-"""Recordings that come in pieces, after tus 1.0: begin, PATCH at an offset, HEAD for the offset, finish."""
+"""Resumable uploads of recordings, modelled on tus 1.0: begin, PATCH at an offset, HEAD for the offset, finish."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""The 3D view: what it shows, and the way to it through this origin."""
+"""The 3D view: its content, and its proxy through this origin."""
 
 from fastapi import APIRouter, Request, WebSocket
 from fastapi.responses import Response

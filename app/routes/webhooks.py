@@ -1,4 +1,4 @@
-"""Addresses that are told when a run ends or a project's review state changes."""
+"""Webhooks, called when a run ends or a project's review state changes."""
 
 from fastapi import APIRouter
 

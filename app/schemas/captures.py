@@ -1,4 +1,4 @@
-"""A recording: what it is, how good it is, and its frames."""
+"""A recording: facts, quality and frames."""
 
 from pydantic import Field
 

@@ -1,6 +1,6 @@
-"""project.json: what a project's folder says it is, enough to make its rows anew.
+"""project.json: description of a project in its folder, sufficient to restore its rows.
 
-It is a second copy: the database decides as long as it is there. Paths inside the folder are relative to it.
+It is a second copy: the database has precedence while it exists. Paths inside the folder are relative to it.
 """
 
 from typing import Any, Literal

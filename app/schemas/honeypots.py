@@ -1,4 +1,4 @@
-"""Honeypots: sample kitchens in a person's queue, scored against their truth. Admins alone are told of them."""
+"""Honeypots: sample kitchens in a user's queue, scored against their truth. Visible to admins only."""
 
 from app.schemas.base import Shape
 from app.schemas.states import ReviewState

@@ -1,4 +1,4 @@
-"""Lengths that were measured in the room: what the scan is held against."""
+"""True lengths measured in the room, to check the scan's scale."""
 
 from typing import Annotated, Literal, Self
 

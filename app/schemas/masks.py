@@ -1,4 +1,4 @@
-"""Masks, where they are, and the live segmenter."""
+"""Masks, their frames, and the live segmenter."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""Second opinions: projects of one recording that people work on apart, and how far they agree."""
+"""Second opinions: independently annotated projects of one recording, and their agreement."""
 
 from app.schemas.base import Shape
 from app.schemas.states import ReviewState

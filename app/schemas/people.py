@@ -1,4 +1,4 @@
-"""Signing in, and who may."""
+"""Sign-in and accounts."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""The mesh over the photos: what a reviewer trusts."""
+"""Overlays of the mesh on photos, for review."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""project.json of a project's file: what people said of it beside prompts.json and overrides.json, which lie next to it."""
+"""project.json of an exported project: user input that is not in prompts.json and overrides.json beside it."""
 
 from typing import Annotated, Literal
 

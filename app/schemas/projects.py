@@ -1,4 +1,4 @@
-"""Projects and how recordings get in."""
+"""Projects and the import of recordings."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""The machines that compute."""
+"""Seats: the computing machines."""
 
 from app.schemas.base import Shape
 

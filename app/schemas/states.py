@@ -1,4 +1,4 @@
-"""Where a project stands between its annotator and its reviewer, what they say to each other, and what it cost."""
+"""Review states, comments, and effort spent on a project."""
 
 from typing import Literal, Self
 

@@ -1,4 +1,4 @@
-"""Text that people give: bounded, without white space around it, and without what would be obeyed instead of shown."""
+"""User-supplied text: bounded, stripped, and without control characters."""
 
 from typing import Annotated, Any
 

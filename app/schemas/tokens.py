@@ -1,4 +1,4 @@
-"""Tokens with which programs come in."""
+"""API tokens."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""Recordings on their way in."""
+"""Uploads of recordings."""
 
 from pydantic import Field
 

@@ -1,4 +1,4 @@
-"""Addresses that are told of what happens."""
+"""Webhooks."""
 
 from typing import Annotated, Literal
 from urllib.parse import urlsplit

@@ -30,7 +30,7 @@ class Overlaps:
         self._areas: tuple[Counter[Hashable], Counter[Hashable]] = (Counter(), Counter())
 
     def add(self, first: dict[Hashable, Bits], second: dict[Hashable, Bits]) -> None:
-        """The masks of one frame, by object."""
+        """Add the masks of one frame, by object."""
         boxes = [{key: _Box.of(bits) for key, bits in side.items()} for side in (first, second)]
         for areas, side in zip(self._areas, boxes, strict=True):
             areas.update({key: box.area for key, box in side.items()})

@@ -68,7 +68,7 @@ def show(context: Context, project_id: str, session_id: str, body: schemas.Viewe
 
 
 def _corrections(session: Session, files: ProjectFiles, project_id: str) -> dict[str, Any]:
-    """Corrections possibly newer than the newest scene, by object, and objects whose mesh was rejected."""
+    """Corrections possibly newer than the newest scene, by object, and objects whose placed mesh was rejected or replaced."""
     stored = queries.overrides_by_object(session, project_id)
     said = {item.result_name: stored[item.id or 0] for item in queries.live_objects(session, project_id) if item.id in stored}
     entries = {name: overrides_entry({k: v for k, v in data.items() if k != "candidate"}) for name, data in said.items()}
