@@ -46,7 +46,7 @@ class Listener:
     _waiting: int = 0  # bytes
 
     def take(self, message: Message, epoch: str) -> None:
-        """Queue the message; a tab that falls behind is told to reload everything instead."""
+        """Queue the message; a tab that falls behind must reload everything instead."""
         text = message.text
         if self._waiting + len(text) > WAITING_BYTES:
             while not self.queue.empty():

@@ -58,7 +58,7 @@ class Settings:
         default_factory=lambda: os.environ.get("R2C2R_CACHE_GB", "")
     )  # of a store's; empty: all that was used
     log: str = field(default_factory=lambda: os.environ.get("R2C2R_LOG", ""))  # "json": one object a line
-    traces: str = field(default_factory=lambda: os.environ.get("R2C2R_TRACES", ""))  # "otlp": told to a collector
+    traces: str = field(default_factory=lambda: os.environ.get("R2C2R_TRACES", ""))  # "otlp": sent to a collector
     compute: str = field(default_factory=lambda: os.environ.get("R2C2R_COMPUTE", ""))  # ray; empty: this machine
     identity: str = field(default_factory=lambda: os.environ.get("R2C2R_IDENTITY", ""))  # proxy:HEADER or oidc:ISSUER
     oidc_client: str = field(default_factory=lambda: os.environ.get("R2C2R_OIDC_CLIENT", ""))

@@ -29,7 +29,7 @@ class Project(SQLModel, table=True):
     source_name: str
     source_path: str | None = None  # absolute; the upload, or a recording on this machine
     work_path: str | None = None  # absolute; set when the workspace is not in the project's folder
-    media_version: str = ""  # changes when the recording is read anew
+    media_version: str = ""  # changes when the recording is read again
     capture: dict[str, Any] = Field(default_factory=dict, sa_column=Column(JSON, nullable=False))
     notices: list[str] = Field(default_factory=list, sa_column=Column(JSON, nullable=False))
     error: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
@@ -44,7 +44,7 @@ class Project(SQLModel, table=True):
     opinion_of: str | None = None  # a project of this recording, of which it is an independent one; it may be gone
     honeypot: bool = Field(
         default=False, sa_column_kwargs={"server_default": false()}
-    )  # its truth is known; admins alone are told
+    )  # its truth is known; visible to admins only
     members_only: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # only they and admins see it
     review_state: str = Field(default="draft", sa_column_kwargs={"server_default": "draft"})  # services/states.py
     tags: list[str] = Field(default_factory=list, sa_column=Column(JSON, nullable=False, server_default="[]"))
@@ -52,7 +52,7 @@ class Project(SQLModel, table=True):
         default_factory=list, sa_column=Column(JSON, nullable=False, server_default="[]")
     )
     archived: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # done with: not shown unless asked for
-    trashed: float | None = None  # when it was put into the trash: nobody sees it, all of it is kept
+    trashed: float | None = None  # when it was moved to the trash: hidden, with all files kept
     inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of everything a person gave
     size_bytes: int = Field(default=0, sa_type=BYTES, sa_column_kwargs={"server_default": "0"})  # of its folder
     sized: float = Field(default=0.0, sa_column_kwargs={"server_default": "0"})  # when that was measured
@@ -113,7 +113,7 @@ class SignIn(SQLModel, table=True):
 
     __tablename__ = "sign_ins"
 
-    digest: str = Field(primary_key=True)  # SHA-256 of what the cookie holds: the file alone lets nobody in
+    digest: str = Field(primary_key=True)  # SHA-256 of the cookie's value: the database file alone gives no access
     account_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="CASCADE")
     created: float
     used: float  # to the hour
@@ -126,7 +126,7 @@ class ApiToken(SQLModel, table=True):
     __table_args__ = (UniqueConstraint("digest", name="uq_api_tokens_digest"),)
 
     id: int | None = Field(default=None, primary_key=True)
-    digest: str  # SHA-256: the database alone lets nobody in
+    digest: str  # SHA-256: the database alone gives no access
     account_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="CASCADE")
     name: str  # what it is for
     scope: str  # metrics | read | annotator | reviewer | admin
@@ -173,7 +173,7 @@ class LaunchKey(SQLModel, table=True):
 
     __tablename__ = "launch_keys"
 
-    digest: str = Field(primary_key=True)  # SHA-256: the file alone lets nobody in
+    digest: str = Field(primary_key=True)  # SHA-256: the database file alone gives no access
     created: float
 
 
@@ -378,7 +378,7 @@ class Job(SQLModel, table=True):
     owner: str | None = None  # host, process and a random word of the server that runs it
     worker_pid: int | None = None
     worker_started: float | None = None  # the worker's creation time: its pid alone may be another's by now
-    heartbeat: float | None = None  # when its owner last said that it lives, by the database's clock
+    heartbeat: float | None = None  # last heartbeat of its owner, by the database's clock
     created: float
     started: float | None = None
     finished: float | None = None
@@ -398,7 +398,7 @@ class Part(SQLModel, table=True):
     state: str  # waiting | running | stopping | done | failed
     at_least: int  # as many a process takes, where its seat's share is so many: its start takes time too
     owner: str | None = None  # of the process that computes it, as of a job
-    heartbeat: float | None = None  # when its owner last said that it is at it, by the database's clock
+    heartbeat: float | None = None  # last heartbeat of its owner for this part, by the database's clock
     attempts: int = 0
     log: str = ""  # what its process wrote; of several that one process computed, the first has it
 
@@ -414,7 +414,7 @@ class Seat(SQLModel, table=True):
     version: str
     jobs: int  # at a time
     began: float
-    seen: float  # when it last said that it lives, by the database's clock
+    seen: float  # last heartbeat, by the database's clock
     draining: bool = False  # it takes no further job
 
 

@@ -74,5 +74,5 @@ def give_cookie(request: Request, response: Response, session_id: str) -> None:
 
 
 def address_of(request: Request) -> str:
-    """Where a request comes from: who connected, or what the proxy says that the server was told to believe."""
+    """Client address of a request: the peer's, or the one reported by a trusted proxy."""
     return request.client.host if request.client else ""

@@ -13,7 +13,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 SERVED = ("index.html", "login.html", "css", "js", "icons", "favicon.svg")  # without development files
-LEAST_BYTES = 500  # less is not worth compressing
+LEAST_BYTES = 500  # smaller files are not compressed
 
 
 class PageFiles(StaticFiles):
