@@ -16,7 +16,7 @@ export interface AccountInfo {
   you: boolean;
 }
 
-/** What changes; a new password ends the account's sessions. */
+/** Changes of an account; a new password ends the account's sessions. */
 export interface AccountPatch {
   role?: "annotator" | "reviewer" | "admin" | null;
   password?: string | null;
@@ -101,7 +101,7 @@ export interface Backend {
   reason: string;
 }
 
-/** What keeps a joint from opening all the way: a loose thing, or the part of another joint that stands open. */
+/** An obstacle that keeps a joint from opening completely: a free object, or the part of another open joint. */
 export interface BlockerVerdict {
   name: string;
   kind: string;
@@ -140,7 +140,7 @@ export interface BundleFormat {
   opened_by: string;
 }
 
-/** What a bundle holds for robots. */
+/** A bundle's content for robots. */
 export interface BundleInside {
   version: number;
   assets: ObjectAsset[];
@@ -188,7 +188,7 @@ export interface CandidateGroup {
   can_regenerate: boolean;
 }
 
-/** What the recording is: shown before any work starts. Pictures: /media/{project}/scan/plan.png and view.png. */
+/** Facts about the recording, shown before any work starts. Pictures: /media/{project}/scan/plan.png and view.png. */
 export interface CaptureFacts {
   format: string;
   sha256: string;
@@ -213,7 +213,7 @@ export interface CaptureFigure {
   value: string;
 }
 
-/** What one of the frames that the doctor looked at is like. */
+/** Measures of one frame examined by the capture doctor. */
 export interface CaptureMoment {
   frame_index: number;
   sharpness: number;
@@ -254,12 +254,12 @@ export interface Certificate {
   together_penetration_m: number | null;
 }
 
-/** Which template's objects a project is to click from now on; None: none. */
+/** The template whose objects form a project's checklist; None: none. */
 export interface ChecklistIn {
   template: number | null;
 }
 
-/** What somebody said, where, and whether it is settled. */
+/** A comment with its position, and whether it is resolved. */
 export interface Comment {
   object: number | null;
   frame: number | null;
@@ -305,7 +305,7 @@ export interface Crop {
   box: number[];
 }
 
-/** What deleting freed. */
+/** Result of deleting a project. */
 export interface Deleted {
   freed_bytes: number;
 }
@@ -329,7 +329,7 @@ export interface Difference {
   most: number;
 }
 
-/** What tells candidates apart. Turntables: /media/{project}/candidates/{object}/{candidate}/turns.png?against={candidate}, 24 pictures from left to right. */
+/** Differences between candidates. Turntables: /media/{project}/candidates/{object}/{candidate}/turns.png?against={candidate}, 24 pictures from left to right. */
 export interface Differences {
   against: string;
   tolerance: number;
@@ -382,7 +382,7 @@ export interface ErrorBody {
   current: unknown;
 }
 
-/** What the project cost its people so far; times in seconds. */
+/** Effort spent on the project so far; times in seconds. */
 export interface Figures {
   objects: number;
   clicks: number;
@@ -436,7 +436,7 @@ export interface FrameCamera {
   camera_from_capture: number[][];
 }
 
-/** What an object is in one frame: a mask that stands, or None: not visible there. */
+/** Correction of an object in one frame: a fixed mask, or None: not visible there. */
 export interface FrameIn {
   mask: PromptsFileMask | null;
 }
@@ -494,7 +494,7 @@ export interface HoneypotIn {
   name: string;
 }
 
-/** What the person made of it. */
+/** The user's score on a honeypot. */
 export interface HoneypotScore {
   found: number;
   extra: number;
@@ -509,7 +509,7 @@ export interface ImportPath {
   name?: string | null;
 }
 
-/** What waits for who asks; each project is in one of the first two lists. */
+/** The current user's inbox; each project is in one of the first two lists. */
 export interface Inbox {
   returned: InboxProject[];
   assigned: InboxProject[];
@@ -603,7 +603,7 @@ export interface Lane {
   confidences: number[];
 }
 
-/** What a joint of the object moves: its front as a box, closed, and the line it turns about or goes along. */
+/** The part moved by a joint of the object: its front as a box, closed, and the line it turns about or goes along. */
 export interface Leaf {
   joint: string;
   part: string;
@@ -616,7 +616,7 @@ export interface Leaf {
   opening: Opening | null;
 }
 
-/** What was made from the scan and a person wants none of. */
+/** An object made from the scan that the user does not want. */
 export interface LeftOut {
   object: number;
   name: string;
@@ -707,7 +707,7 @@ export interface NewWebhook {
   secret: string;
 }
 
-/** What others did to a project since you last were there, newest first. */
+/** Changes of a project by others since your last visit, newest first. */
 export interface News {
   since: number | null;
   last: number;
@@ -731,7 +731,7 @@ export interface ObjectIn {
   front?: PromptsFileFrontInput | null;
 }
 
-/** What changes, a drawn front, a crop box and whose turn it is also to none. With `version`, only if nobody changed it meanwhile. */
+/** Changes of an object; a drawn front, a crop box and the assignee can also be removed. With `version`, only if nobody changed it meanwhile. */
 export interface ObjectPatch {
   name?: string | null;
   category?: string | null;
@@ -752,7 +752,7 @@ export interface ObjectPhotos {
   leaves: Leaf[];
 }
 
-/** What the masks and the depth say of an object's shape: points around their centre, +Z up. */
+/** An object's shape from masks and depth: points around their centre, +Z up. */
 export interface ObjectPoints {
   count: number;
   frames: number;
@@ -796,7 +796,7 @@ export interface OpinionIn {
   name: string | null;
 }
 
-/** What a person corrected about one object; None is computed. */
+/** Manual corrections of one object; None is computed. */
 export interface OverrideData {
   candidate: string | null;
   hinge: "left" | "right" | "top" | "bottom" | null;
@@ -955,7 +955,7 @@ export interface Project {
   awaits_recording: boolean;
 }
 
-/** What is in a project. */
+/** Counts of a project's content. */
 export interface ProjectCounts {
   objects: number;
   points: number;
@@ -964,7 +964,7 @@ export interface ProjectCounts {
   open_comments: number;
 }
 
-/** What the file of a project would hold. */
+/** Size of a project's export file. */
 export interface ProjectFileOffer {
   size_bytes: number;
   recording_bytes: number | null;
@@ -979,7 +979,7 @@ export interface ProjectMembers {
   accounts: string[];
 }
 
-/** What changes: its name, tags, whether it is archived, or which backends do its stages. */
+/** Changes of a project: its name, tags, whether it is archived, or which backends do its stages. */
 export interface ProjectPatch {
   name?: string | null;
   tags?: string[] | null;
@@ -1035,7 +1035,7 @@ export interface PromptsFileCrop {
   edges_m: number[][];
 }
 
-/** What was said of an object in one frame. */
+/** The corrected state of an object in one frame. */
 export interface PromptsFileFrame {
   frame: number;
   mask: PromptsFileMask | null;
@@ -1113,12 +1113,12 @@ export interface Proposal {
   doubts: string[];
 }
 
-/** Which proposals are meant. */
+/** Selection of proposals. */
 export interface ProposalIds {
   ids: string[];
 }
 
-/** What is proposed now: dismissed ones and those that became objects are left out. */
+/** The current proposals, without dismissed and confirmed ones. */
 export interface Proposals {
   state: "none" | "running" | "done";
   fraction: number;
@@ -1126,7 +1126,7 @@ export interface Proposals {
   dismissed: number;
 }
 
-/** Which proposals become objects. */
+/** Proposals to be confirmed as objects. */
 export interface ProposalsConfirmed {
   ids: string[];
   category?: string | null;
@@ -1188,7 +1188,7 @@ export interface RobotGrip {
   picture: string | null;
 }
 
-/** What one robot did in a bundle. */
+/** One robot's trial in a bundle. */
 export interface RobotTrial {
   name: string;
   joints: number;
@@ -1198,7 +1198,7 @@ export interface RobotTrial {
   map: string | null;
 }
 
-/** Which backends, where not the defaults. */
+/** A run's backends, where not the defaults. */
 export interface RunRequest {
   segmenter?: string | null;
   generator?: string | null;
@@ -1295,7 +1295,7 @@ export interface Seat {
   jobs: SeatJob[];
 }
 
-/** What is to become of a seat. */
+/** A requested change of a seat. */
 export interface SeatIn {
   draining: boolean;
 }
@@ -1354,7 +1354,7 @@ export interface StandingPlace {
   joints: string[];
 }
 
-/** What the app can do here; limits are shown before a file is chosen. */
+/** Capabilities of the app; limits are shown before a file is chosen. */
 export interface SystemInfo {
   version: string;
   user: string;
@@ -1384,7 +1384,7 @@ export interface Template {
   may_change: boolean;
 }
 
-/** What a template holds; names are unique, as in a project. */
+/** Content of a template; names are unique, as in a project. */
 export interface TemplateIn {
   name: string;
   objects: ListedObject[];
@@ -1448,14 +1448,14 @@ export interface TrueObject {
   same_category: boolean | null;
 }
 
-/** What to undo or redo: the last change of this object, or of any object when None. */
+/** Target of an undo or redo: the last change of this object, or of any object when None. */
 export interface UndoRequest {
   object?: number | null;
   scope?: "prompts" | "review";
   version?: number | null;
 }
 
-/** What was undone or redone, so that the page can say it. */
+/** The undone or redone change, for display. */
 export interface Undone {
   object: SceneObject;
   text: string;
@@ -1520,14 +1520,14 @@ export interface Variants {
   sets: VariantSet[];
 }
 
-/** What is wished for. */
+/** Request for variants. */
 export interface VariantsIn {
   version: number;
   count: number;
   seed?: number;
 }
 
-/** What variants of the newest bundle would take. */
+/** Estimated size of variants of the newest bundle. */
 export interface VariantsOffer {
   version: number;
   most: number;
@@ -1538,7 +1538,7 @@ export interface VariantsOffer {
   free_bytes: number;
 }
 
-/** What a reviewer says. Rejecting the last one makes new candidates; accepting another one aligns it anew. */
+/** A reviewer's verdict. Rejecting the last one makes new candidates; accepting another one aligns it anew. */
 export interface VerdictIn {
   candidate: string;
   verdict: "accepted" | "rejected" | "cleared";
@@ -1597,7 +1597,7 @@ export interface ViewerLookOutput {
   camera: ViewerCamera | null;
 }
 
-/** What the last click in the 3D view was on. */
+/** The object or point of the last click in the 3D view. */
 export interface ViewerPicked {
   number: number;
   name: string;
@@ -1624,7 +1624,7 @@ export interface ViewerSession {
   fallback_image: string | null;
 }
 
-/** What the 3D view shows. */
+/** The requested content of the 3D view. */
 export interface ViewerShow {
   mode: "cloud" | "candidate" | "aligned" | "scene";
   draw?: "meshes" | "wireframe" | "colliders" | "both" | "distance" | "unobserved";
@@ -1644,7 +1644,7 @@ export interface ViewerShow {
   frame?: number | null;
 }
 
-/** What the 3D view shows now. */
+/** The current content of the 3D view. */
 export interface ViewerShown {
   mode: string;
   text: string;
