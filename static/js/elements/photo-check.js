@@ -20,12 +20,12 @@ import { sayError } from "./toasts.js";
 /** @typedef {"ghost" | "outline" | "residual"} Look */
 
 /** @type {Record<Look, string>} */
-/** @type {Record<Look, string>} */
 const LEGENDS = {
   outline: "Lines: edges of the model; faint: behind something.",
   ghost: "The model over the photo; faint: behind something.",
   residual: "Red: the mesh stands before the measured surface. Blue: behind it. Full colour at 3 cm. Pale: they agree.",
 };
+/** @type {Record<Look, string>} */
 const LOOKS = { outline: "Outline", ghost: "Ghost", residual: "Distance" };
 const PIN_R = 0.008; // of the photo's width
 const HOLD_PX = 9; // on the screen
