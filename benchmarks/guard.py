@@ -115,7 +115,7 @@ def _drift(measure: str, changes: Sequence[float]) -> str | None:
 
 
 def summary(name: str, kitchen: Kitchen, seconds: float) -> str:
-    """One line of figures; a missing object is unusable."""
+    """One line of figures. Usable: sizes within 5 %, joints of the true types and no others, edges within 10 mm."""
     rows: dict[str, Row] = kitchen["objects"]
     usable = sum(row is not None and _usable(row) for row in rows.values())
     wrong = ", ".join(thing for thing, row in rows.items() if row is None or not _usable(row))
