@@ -89,7 +89,7 @@ def test_a_configuration_sets_them_by_stage_and_module() -> None:
         ({"wals": {}}, "unknown key 'wals' in kitchen.params; expected category, depth, fillers, fronts"),
         ({"../walls": {}}, "unknown key '../walls' in kitchen.params"),
         ({"walls": {"parallel": 0.1}}, "kitchen.params.walls: unknown key 'parallel' in the document; expected parallel_rad"),
-        ({"walls": {"parallel_rad": "wide"}}, "kitchen.params.walls: parallel_rad is 'wide'; expected between the normals"),
+        ({"walls": {"parallel_rad": "wide"}}, "kitchen.params.walls: parallel_rad is 'wide'; expected Maximum angle"),
         ({"walls": {"parallel_rad": -0.1}}, "kitchen.params.walls: parallel_rad is -0.1"),
         ({"walls": {"parallel_rad": float("nan")}}, "kitchen.params.walls: parallel_rad is nan"),
         ({"fronts": {"least_points": 2.5}}, "kitchen.params.fronts: least_points is 2.5"),
