@@ -143,6 +143,7 @@ def segmented(page: Page, project: str) -> str:
     ready(page)
     pick(page, "drawer_1")
     expect(page.locator(".object-list .current")).to_contain_text("3 frames")
+    expect(page).to_have_url(re.compile(r"object=\d+"))  # after the list's redraw
     return str(page.evaluate("new URLSearchParams(location.search).get('object')"))
 
 
