@@ -7,6 +7,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.motion import JointMotion
+from r2c2r_core.model.rectangle import Rectangle3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,12 +33,9 @@ class FrontHandle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FrontPanel:
-    """The rectangle of a flat front, measured over all frames. `world_from_front` is the `front` frame of transforms.py."""
+class FrontPanel(Rectangle3):
+    """The rectangle of a flat front, measured over all frames."""
 
-    world_from_front: Rigid3
-    width_m: float
-    height_m: float
     handle: FrontHandle | None
     confidence: float  # 0..1
     roll_rad: float = 0.0  # in-plane tilt that was found and removed (gravity error)
