@@ -10,8 +10,9 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.category import Category, Size
 from r2c2r_core.kitchen.category import Params as SizeParams
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.rectangle import TOWARDS
 from r2c2r_core.model.track import ThingBox
-from r2c2r_core.segment.fronts.front import Front, front_corners, side_corners, side_faces
+from r2c2r_core.segment.fronts.front import Front, side_corners, side_faces
 from r2c2r_core.segment.mosaics.lines import Evidence
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.occlusion import Facet, Tolerance, visible_mask
@@ -118,13 +119,13 @@ def find_rectangle(
 def appliance_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, float]:
     """Visible pixels of the box in a frame, and the visible fraction of its projection."""
     params, grid = tuned(Params), front.run.grid
-    slide = front.run.slide_of(frame.index, scene)
+    face = grid.rectangle(front.cell, front.run.slide_of(frame.index, scene))
     facets = []
     if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward > 0.03:
-        facets.append(Facet(front_corners(front.cell, grid, slide)))
-    for side in ("left", "right", "top", "bottom"):
-        if side_faces(front.cell, grid, side, frame.world_from_camera.translation):
-            facets.append(Facet(side_corners(front.cell, grid, slide, side, front.depth_m)))
+        facets.append(Facet(face.corners))
+    for side in TOWARDS:
+        if side_faces(front.outline, side, frame.world_from_camera.translation):
+            facets.append(Facet(side_corners(face, side, front.depth_m)))
     mask, share = visible_mask(facets, scene, frame, Tolerance(front_m=params.front_m, behind_m=params.behind_m))
     if share < params.least_visible:
         return np.zeros_like(mask), 0.0
@@ -133,13 +134,11 @@ def appliance_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, floa
 
 def appliance_box(front: Front) -> ThingBox:
     """Box in the world: the front rectangle extruded by its depth."""
-    grid, cell = front.run.grid, front.cell
-    width, height = cell.width * grid.cell_m, cell.height * grid.cell_m
-    centre = grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]), front.depth_m / 2)[0]
+    face = front.rectangle.at(Rigid3(np.eye(3), np.array([0.0, front.depth_m / 2, 0.0])))
     return ThingBox(
-        world_from_object=Rigid3(front.run.region.world_from_plane.rotation, centre),
-        dimensions_m=np.array([width, front.depth_m, height]),
-        support_z_m=float(centre[2] - height / 2),
+        world_from_object=face.world_from_front,
+        dimensions_m=np.array([face.width_m, front.depth_m, face.height_m]),
+        support_z_m=float(face.centre[2] - face.height_m / 2),
     )
 
 

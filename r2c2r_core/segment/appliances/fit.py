@@ -32,7 +32,7 @@ from r2c2r_core.segment.appliances.edges import (
     shares,
 )
 from r2c2r_core.segment.appliances.faces import Patches, patches_on
-from r2c2r_core.segment.fronts.front import Front, front_middle
+from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.thing import ThingConfig, support_height
@@ -146,9 +146,8 @@ def fit_box(front: Front, scene: Scene, kind: Category, wall_m: float | None, *,
 
     Without photographs it uses depth alone, for a preview.
     """
-    cell, cell_m, middle = front.cell, front.run.grid.cell_m, front_middle(front)
-    world_from_front = Rigid3(front.run.grid.world_from_plane.rotation, middle)
-    half_w, half_h = cell.width * cell_m / 2, cell.height * cell_m / 2
+    world_from_front, (half_w, half_h) = front.outline.world_from_front, front.outline.half_m
+    middle = world_from_front.translation
     farthest = min(kind.depth.high, np.inf if wall_m is None else wall_m)
     start = np.array([0.0, -half_w, half_w, 0.0, min(kind.depth.usual, farthest), -half_h, half_h])
     deep = start.copy()
@@ -300,7 +299,7 @@ def _possible(box: np.ndarray, start: np.ndarray) -> bool:
 
 def _fitted_front(front: Front, box: np.ndarray) -> Front:
     """Front rotated about the vertical axis through its centre, moved, and with its edges at the box's."""
-    middle, run, cell, cell_m = front_middle(front), front.run, front.cell, front.run.grid.cell_m
+    middle, run, cell, cell_m = front.outline.centre, front.run, front.cell, front.run.grid.cell_m
     column, row = (cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2
     moved = Cell(column + box[LEFT] / cell_m, row - box[TOP] / cell_m, column + box[RIGHT] / cell_m, row - box[BOTTOM] / cell_m)
 

@@ -10,9 +10,10 @@ from r2c2r_core.segment.appliances.box import appliance_box, appliance_mask
 from r2c2r_core.segment.appliances.seams import drawer_seams
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
-from r2c2r_core.segment.fronts.front import Front, front_corners, front_leaf, front_panel
+from r2c2r_core.segment.fronts.front import Front, front_panel
 from r2c2r_core.segment.motion.board import open_mask
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
+from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -40,7 +41,7 @@ class FoundAppliance:
     def __post_init__(self) -> None:
         seams_m = drawer_seams(self.front) if self.category.over_drawer is not None else ()
         object.__setattr__(
-            self, "_leaves", FilmedLeaves(front_leaf(self.front), self.category, self.scene, self.front.depth_m, seams_m)
+            self, "_leaves", FilmedLeaves(Leaf.of(self.front.rectangle), self.category, self.scene, self.front.depth_m, seams_m)
         )
 
     def see(self, frame: Frame) -> View:
@@ -48,8 +49,7 @@ class FoundAppliance:
         mask, share = appliance_mask(self.front, self.scene, frame)
         for opened in self._leaves.open_in(frame.index):
             mask = mask | open_mask(opened, self.scene, frame)[0]
-        corners = front_corners(self.front.cell, self.front.run.grid, (0.0, 0.0))
-        return View(mask, expected_iou(mask, share, frame, corners, tuned(Params).border_m))
+        return View(mask, expected_iou(mask, share, frame, self.front.outline.corners, tuned(Params).border_m))
 
     def panel(self) -> FrontPanel | None:
         """Front rectangle with its handle."""

@@ -7,7 +7,7 @@ import numpy as np
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.fronts.front import Front, front_leaf
+from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.motion.hypotheses import Hypothesis, hypotheses
 from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.motion.likelihood import evidence, lay_out
@@ -101,16 +101,16 @@ def _leaves_near(prepared: PreparedCapture, point: Vector3) -> list[Leaf]:
         if not -reach < local[1] < tuned(Params).off_m or abs(local[0]) > region.width_m / 2 + reach:
             continue
         run = prepared.run_of(region)
-        leaves = [] if run is None else [front_leaf(Front(run, cell, None, 0.0)) for cell in run.cells]
+        leaves = [] if run is None else [Leaf.of(Front(run, cell, None, 0.0).rectangle) for cell in run.cells]
         leaves = [leaf for leaf in leaves if min(leaf.width_m, leaf.height_m) > tuned(Params).least_m]
-        found += [leaf for leaf in leaves if np.linalg.norm(leaf.world_from_front.translation - point) < reach]
+        found += [leaf for leaf in leaves if np.linalg.norm(leaf.centre - point) < reach]
     return found
 
 
 def _holds(leaf: Leaf, point: Vector3) -> bool:
     """Whether a point lies on a closed leaf."""
     local = leaf.world_from_front.inverse.apply(point)
-    return bool(abs(local[1]) < tuned(Params).off_m and abs(local[0]) < leaf.half_m[0] and abs(local[2]) < leaf.half_m[1])
+    return bool(abs(local[1]) < tuned(Params).off_m and leaf.covers(local))
 
 
 def _in_a_row(prepared: PreparedCapture, point: Vector3, leaf: Leaf) -> bool:
@@ -155,9 +155,8 @@ def _as_opened(
     """
     front = leaf.world_from_front.inverse.apply(point[None])
     local = np.concatenate([hypothesis.pose(float(state)).inverse.apply(front) for state in hypothesis.states])
-    half_w, half_h = leaf.half_m
     off = np.minimum(np.abs(local[:, 1]), np.abs(local[:, 1] - leaf.thickness_m))
-    on = (off < tuned(Params).off_m) & (np.abs(local[:, 0]) < half_w) & (np.abs(local[:, 2]) < half_h)
+    on = (off < tuned(Params).off_m) & leaf.covers(local)
     on[0] = False
     if not on.any():
         return 0.0, 0.0, 0.0, 0, point

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2c2r_core.arrays import Points
 from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.model.inputs import DrawnFront, DrawnHandle
+from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import Front, front_panel
@@ -27,7 +27,7 @@ _SUPPORT_M = 0.02  # side of the region's cells
 def drawn_front(drawn: DrawnFront, scene: Scene, config: SegmentConfig) -> Front:
     """Drawn rectangle on a grid of its own; `depth_m` is not known here. Raises ObjectNotSeen where no frame sees it."""
     corners = scene.capture.world_from_capture.apply(np.array(drawn.corners_capture))
-    grid, cell = _grid_around(corners, config.cell_m)
+    grid, cell = _grid_around(Rectangle3.from_corners(corners), config.cell_m)
     run = _run_of(grid, cell, scene, config.mosaic_frames)
     handle = _handle_on(drawn.handle, cell, grid.cell_m) if drawn.handle is not None else run.handles[0]
     return Front(run, cell, handle, 0.0)
@@ -42,20 +42,14 @@ class FoundDrawn(FoundFront):
         return replace(front_panel(self.front), confidence=1.0)
 
 
-def _grid_around(corners_world: Points, cell_m: float) -> tuple[PlaneGrid, Cell]:
+def _grid_around(face: Rectangle3, cell_m: float) -> tuple[PlaneGrid, Cell]:
     """Grid whose axes are the rectangle's edges, and the rectangle on it."""
-    across, up = corners_world[1] - corners_world[0], corners_world[0] - corners_world[3]
-    width_m, height_m = float(np.linalg.norm(across)), float(np.linalg.norm(up))
-    right = across / width_m
-    into = np.cross(up / height_m, right)
-    into /= np.linalg.norm(into)
-    rotation = np.column_stack([right, into, np.cross(right, into)])
-    pad = round(_AROUND_M / cell_m)
-    cell = Cell(pad, pad, pad + width_m / cell_m, pad + height_m / cell_m)
+    pad, (half_w, half_h) = round(_AROUND_M / cell_m), face.half_m
+    cell = Cell(pad, pad, pad + face.width_m / cell_m, pad + face.height_m / cell_m)
     grid = PlaneGrid(
-        Rigid3(rotation, corners_world.mean(axis=0)),
-        -width_m / 2 - pad * cell_m,
-        height_m / 2 + pad * cell_m,
+        face.world_from_front,
+        -half_w - pad * cell_m,
+        half_h + pad * cell_m,
         cell_m,
         int(np.ceil(cell.right)) + pad,
         int(np.ceil(cell.bottom)) + pad,
@@ -81,15 +75,15 @@ def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
 
 def _region(grid: PlaneGrid, cell: Cell) -> PlaneRegion:
     """Rectangle as a plane observed everywhere, with level axes."""
-    width_m, height_m = cell.width * grid.cell_m, cell.height * grid.cell_m
-    rows, columns = (max(round(side / _SUPPORT_M), 1) for side in (height_m, width_m))
+    face = grid.rectangle(cell)
+    rows, columns = (max(round(side / _SUPPORT_M), 1) for side in (face.height_m, face.width_m))
     return PlaneRegion(
         world_from_plane=Rigid3(front_rotation(grid.outward), grid.world_from_plane.translation),
-        width_m=width_m,
-        height_m=height_m,
+        width_m=face.width_m,
+        height_m=face.height_m,
         support=np.ones((rows, columns), bool),
         cell_m=_SUPPORT_M,
-        area_m2=width_m * height_m,
+        area_m2=face.width_m * face.height_m,
     )
 
 

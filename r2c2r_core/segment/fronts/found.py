@@ -10,11 +10,10 @@ from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
-from r2c2r_core.segment.fronts.front import Front, front_corners, front_leaf, front_mask, front_panel, sides_mask
+from r2c2r_core.segment.fronts.front import Front, front_mask, front_panel, sides_mask
 from r2c2r_core.segment.motion.board import open_mask
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
-from r2c2r_core.segment.motion.leaf import OpenLeaf
-from r2c2r_core.segment.motion.leaf import corners as leaf_corners
+from r2c2r_core.segment.motion.leaf import Leaf, OpenLeaf
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -42,23 +41,23 @@ class FoundFront:
     _leaves: FilmedLeaves = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_leaves", FilmedLeaves(front_leaf(self.front), self.category, self.scene, self.front.depth_m))
+        leaf = Leaf.of(self.front.rectangle)
+        object.__setattr__(self, "_leaves", FilmedLeaves(leaf, self.category, self.scene, self.front.depth_m))
 
     def see(self, frame: Frame) -> View:
         """Visible pixels of the front at its leaves' pose in the frame, with their confidence."""
         opened = self._leaves.open_in(frame.index)
         if opened:
             return self._opened(opened, frame)
-        corners = front_corners(self.front.cell, self.front.run.grid, (0.0, 0.0))
         mask, share = front_mask(self.front, self.scene, frame)
-        return View(mask, expected_iou(mask, share, frame, corners, tuned(Params).border_m, self.fit))
+        return View(mask, expected_iou(mask, share, frame, self.front.outline.corners, tuned(Params).border_m, self.fit))
 
     def _opened(self, opened: tuple[OpenLeaf, ...], frame: Frame) -> View:
         """Mask of its open leaves, and of those of a pair that stay closed."""
         parts = [open_mask(one, self.scene, frame) for one in opened]
-        corners = [one.world_from_leaf.apply(leaf_corners(one.leaf)) for one in opened]
+        corners = [one.leaf.corners for one in opened]
         for leaf in self._leaves.closed_in(frame.index):
-            corners.append(leaf.world_from_front.apply(leaf_corners(leaf)))
+            corners.append(leaf.corners)
             parts.append(front_mask(self.front, self.scene, frame, corners[-1]))
         mask = np.logical_or.reduce([sides_mask(self.front, self.scene, frame), *(part for part, _ in parts)])
         share = float(np.mean([share for _, share in parts]))

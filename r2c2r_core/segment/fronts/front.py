@@ -11,6 +11,8 @@ from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.kitchen.depth import FrontDepth, front_depth
 from r2c2r_core.model.capture import Frame, Room
+from r2c2r_core.model.inputs import HingeSide
+from r2c2r_core.model.rectangle import TOWARDS, Rectangle3
 from r2c2r_core.model.track import FrontHandle, FrontPanel
 from r2c2r_core.segment.fronts.certainty import edges_right
 from r2c2r_core.segment.fronts.units import unit_cell
@@ -18,7 +20,6 @@ from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid, joined
 from r2c2r_core.segment.mosaics.strips import clear_of_strips
-from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.occlusion import Facet, visible_mask
 from r2c2r_core.segment.runs.alignment import aligned
 from r2c2r_core.segment.runs.contrast import Contrast, edge_changes
@@ -91,7 +92,18 @@ class Front:
     cell: Cell
     handle: GridHandle | None
     depth_m: float  # to the wall behind, or the usual depth
-    sides: tuple[str, ...] = ()  # of left, right, bottom, top: faces of the carcass in view
+    sides: tuple[HingeSide, ...] = ()  # faces of the carcass in view
+
+    @property
+    def outline(self) -> Rectangle3:
+        """Its rectangle along the lines of its grid, which may lean."""
+        return self.run.grid.rectangle(self.cell)
+
+    @property
+    def rectangle(self) -> Rectangle3:
+        """Its rectangle with level edges, as fronts hang."""
+        outline = self.outline
+        return replace(outline, world_from_front=Rigid3(self.run.region.world_from_plane.rotation, outline.centre))
 
 
 def find_front(
@@ -139,29 +151,18 @@ def own_handle(handle: GridHandle | None, panel: Cell) -> GridHandle | None:
 
 def front_panel(front: Front) -> FrontPanel:
     """Measured rectangle in the `front` frame."""
-    grid, cell = front.run.grid, front.cell
-    centre = front_middle(front)
-    rotation = front.run.region.world_from_plane.rotation
-    width, height = cell.width * grid.cell_m, cell.height * grid.cell_m
-    handle = _handle_in_front(front, cell) if front.handle is not None else None
-    strengths = edge_strengths(front)
+    face, strengths = front.rectangle, edge_strengths(front)
     return FrontPanel(
-        world_from_front=Rigid3(rotation, centre),
-        width_m=width,
-        height_m=height,
-        handle=handle,
+        world_from_front=face.world_from_front,
+        width_m=face.width_m,
+        height_m=face.height_m,
+        handle=_handle_in_front(front, front.cell) if front.handle is not None else None,
         confidence=float(np.mean(strengths)),
         roll_rad=front.run.roll_rad,
         edges=strengths,
-        right=edges_right(front.run, cell),
+        right=edges_right(front.run, front.cell),
         seam=seam_inside(front),
     )
-
-
-def front_leaf(front: Front) -> Leaf:
-    """Measured rectangle as a rigid leaf, for motion analysis."""
-    pose, cell_m = Rigid3(front.run.region.world_from_plane.rotation, front_middle(front)), front.run.grid.cell_m
-    return Leaf(world_from_front=pose, width_m=front.cell.width * cell_m, height_m=front.cell.height * cell_m)
 
 
 def front_mask(front: Front, scene: Scene, frame: Frame, part: Points | None = None) -> tuple[Mask, float]:
@@ -172,7 +173,7 @@ def front_mask(front: Front, scene: Scene, frame: Frame, part: Points | None = N
     slide = front.run.slide_of(frame.index, scene)
     if part is not None:
         return visible_mask([Facet(part)], scene, frame)
-    facets = [Facet(front_corners(front.cell, grid, slide))]
+    facets = [Facet(grid.rectangle(front.cell, slide).corners)]
     return visible_mask([*facets, *_side_facets(front, frame, slide)], scene, frame)
 
 
@@ -183,27 +184,28 @@ def sides_mask(front: Front, scene: Scene, frame: Frame) -> Mask:
 
 def _side_facets(front: Front, frame: Frame, slide: tuple[float, float]) -> list[Facet]:
     """Observed sides that face the camera."""
-    grid = front.run.grid
+    face = front.run.grid.rectangle(front.cell, slide)
     return [
-        Facet(side_corners(front.cell, grid, slide, side, front.depth_m), confirm=True)
+        Facet(side_corners(face, side, front.depth_m), confirm=True)
         for side in front.sides
-        if side_faces(front.cell, grid, side, frame.world_from_camera.translation)
+        if side_faces(front.outline, side, frame.world_from_camera.translation)
     ]
 
 
 def depth_behind(front: Front, room: Room, category: Category) -> FrontDepth:
     """Depth of a front of a category here, as far as the walls constrain it."""
-    return front_depth(room.walls, front_middle(front), front.run.grid.outward, category.depth)
+    return front_depth(room.walls, front.outline.centre, front.run.grid.outward, category.depth)
 
 
-def seen_sides(front: Front, scene: Scene) -> tuple[str, ...]:
+def seen_sides(front: Front, scene: Scene) -> tuple[HingeSide, ...]:
     """Faces of the carcass that depth confirms over most of their area, away from the front's own edge."""
-    found, params = [], tuned(Params)
-    for side in ("left", "right", "bottom"):
+    found, params = list[HingeSide](), tuned(Params)
+    sides: tuple[HingeSide, ...] = ("left", "right", "bottom")
+    for side in sides:
         agree = total = 0
         points = _side_samples(front, side)
         for frame in scene.frames[:: max(1, len(scene.frames) // 40)]:
-            if not side_faces(front.cell, front.run.grid, side, frame.world_from_camera.translation):
+            if not side_faces(front.outline, side, frame.world_from_camera.translation):
                 continue
             z, depth, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
             known = (depth > 0) & ~scene.noise.occluded(depth, z, params.far_before_m)  # far occluders are no evidence
@@ -413,44 +415,24 @@ def seam_inside(front: Front) -> float:
     return probability(LineField(front.run.odds, front.run.grid.cell_m).best_uncut(front.cell, tuned(Params).border_m))
 
 
-def front_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float]) -> Points:
-    """World corners of a panel as a frame shows it: top left, then clockwise."""
-    corners = np.array([[cell.left, cell.top], [cell.right, cell.top], [cell.right, cell.bottom], [cell.left, cell.bottom]])
-    return grid.points_at(corners - np.array(slide))
+_SIDE_EDGES: dict[HingeSide, tuple[int, int]] = {"left": (0, 3), "right": (1, 2), "bottom": (2, 3), "top": (0, 1)}
 
 
-def front_middle(front: Front) -> Vector3:
-    """World point at the centre of a panel."""
-    cell = front.cell
-    at = np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]])
-    return np.asarray(front.run.grid.points_at(at)[0])
-
-
-_SIDE_EDGES = {"left": (0, 3), "right": (1, 2), "bottom": (2, 3), "top": (0, 1)}
-
-
-def side_corners(cell: Cell, grid: PlaneGrid, slide: tuple[float, float], side: str, depth_m: float) -> Points:
+def side_corners(face: Rectangle3, side: HingeSide, depth_m: float) -> Points:
     """World corners of the carcass face that starts at one edge of a panel."""
-    corners = front_corners(cell, grid, slide)[list(_SIDE_EDGES[side])]
-    back = corners - grid.outward * depth_m
+    corners = face.corners[list(_SIDE_EDGES[side])]
+    back = corners - face.outward * depth_m
     return np.stack([corners[0], corners[1], back[1], back[0]])
 
 
-def side_faces(cell: Cell, grid: PlaneGrid, side: str, camera_world: Vector3) -> bool:
+def side_faces(face: Rectangle3, side: HingeSide, camera_world: Vector3) -> bool:
     """Whether a camera is on the outer side of a carcass face."""
-    local = grid.cells_of(camera_world[None])[0]
-    return bool(
-        {
-            "left": local[0] < cell.left,
-            "right": local[0] > cell.right,
-            "top": local[1] < cell.top,
-            "bottom": local[1] > cell.bottom,
-        }[side]
-    )
+    beyond = face.world_from_front.inverse.apply(camera_world) - face.corners_front[_SIDE_EDGES[side][0]]
+    return bool(beyond @ TOWARDS[side] > 0)
 
 
-def _side_samples(front: Front, side: str) -> Points:
-    corners = side_corners(front.cell, front.run.grid, (0.0, 0.0), side, front.depth_m)
+def _side_samples(front: Front, side: HingeSide) -> Points:
+    corners = side_corners(front.outline, side, front.depth_m)
     inset_m = tuned(Params).side_inset_m
     first = min(inset_m / max(front.depth_m, 1.1 * inset_m), 0.5)
     along, deep = np.meshgrid(np.linspace(0.1, 0.9, 9), np.linspace(first, 0.9, 9))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2c2r_core.calibration import probability
-from r2c2r_core.segment.fronts.front import Front, front_middle
+from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.mosaics.edges import as_lab
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.planes import PlaneRegion
@@ -60,8 +60,7 @@ def sliding_chance(front: Front, planes: Sequence[PlaneRegion]) -> float:
 def _odds(front: Front, sign: int, plane: PlaneRegion) -> float:
     """Log-odds (natural) of sliding over a plane on the left (-1) or right of the front."""
     params, grid = tuned(Params), front.run.grid
-    middle = front_middle(front)
-    back_m = float((middle - plane.world_from_plane.translation) @ grid.outward)
+    back_m = float((front.outline.centre - plane.world_from_plane.translation) @ grid.outward)
     parallel = float(plane.outward @ grid.outward) > params.parallel
     if not parallel or not params.back_m[0] < back_m < params.back_m[1] or not _goes_on(front, sign, plane):
         return -np.inf

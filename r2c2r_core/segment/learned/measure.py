@@ -16,12 +16,13 @@ from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances.box import appliance_box
 from r2c2r_core.segment.appliances.fit import fit_box
-from r2c2r_core.segment.fronts.front import Front, depth_behind, front_leaf, front_panel
+from r2c2r_core.segment.fronts.front import Front, depth_behind, front_panel
 from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, joined
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
+from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
 from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
@@ -82,14 +83,14 @@ def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int,
         return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category), warnings=said)
     behind = depth_behind(front, prepared.scene.capture.room, category)
     if category.kind == "front":
-        leaves = FilmedLeaves(front_leaf(front), category, prepared.scene, behind.depth_m)
+        leaves = FilmedLeaves(Leaf.of(front.rectangle), category, prepared.scene, behind.depth_m)
         return Measured(kind="front", front=front_panel(front), motions=leaves.motions)
     fitted = fit_box(front, prepared.scene, category, behind.wall_m)
     front = fitted.front
     assumed = f"its depth was not seen: {front.depth_m:.2f} m is usual for a {prompt.category}"
     warnings = () if fitted.depth_seen else (assumed,)
     panel = front_panel(front)
-    motions = FilmedLeaves(front_leaf(front), category, prepared.scene, front.depth_m).motions
+    motions = FilmedLeaves(Leaf.of(front.rectangle), category, prepared.scene, front.depth_m).motions
     return Measured(kind="appliance", front=panel, box=appliance_box(front), warnings=warnings, motions=motions)
 
 

@@ -9,6 +9,7 @@ from r2c2r_core.arrays import Image, Matrix3, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics, project, sample_nearest
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -74,6 +75,12 @@ class PlaneGrid:
         x = self.left_m + cells[:, 0] * self.cell_m
         z = self.top_m - cells[:, 1] * self.cell_m
         return self.world_from_plane.apply(np.stack([x, np.full(len(x), depth_m), z], axis=1))
+
+    def rectangle(self, cell: "Cell", slide: tuple[float, float] = (0.0, 0.0)) -> Rectangle3:
+        """Rectangle of a cell in the world, as a frame with that slide shows it."""
+        middle = np.array([[(cell.left + cell.right) / 2 - slide[0], (cell.top + cell.bottom) / 2 - slide[1]]])
+        place = Rigid3(self.world_from_plane.rotation, self.points_at(middle)[0])
+        return Rectangle3(world_from_front=place, width_m=cell.width * self.cell_m, height_m=cell.height * self.cell_m)
 
     def pixel_from_cell(self, frame: Frame, camera: Intrinsics) -> Matrix3:
         """Homography from continuous cells to continuous pixels; its third row gives z in metres."""

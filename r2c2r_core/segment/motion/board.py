@@ -10,7 +10,7 @@ from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.camera import pixel_centres, unproject
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.motion.leaf import OpenLeaf, corners
+from r2c2r_core.segment.motion.leaf import OpenLeaf
 from r2c2r_core.segment.occlusion import Facet, Tolerance, visible_mask
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -50,12 +50,12 @@ def open_mask(opened: OpenLeaf, scene: Scene, frame: Frame) -> tuple[Mask, float
     """Visible pixels of an open leaf in a frame, and the visible fraction of its projection."""
     params = tuned(Params)
     near = Tolerance(
-        front_m=params.in_plane_m if opened.way == "along" else params.before_m, behind_m=params.behind_m, fused=False
+        front_m=params.in_plane_m if opened.movement == "along" else params.before_m, behind_m=params.behind_m, fused=False
     )  # a sliding leaf passes others one track away
     mask, share = visible_mask(_faces(opened, frame), scene, frame, near)
     seen = _seen(opened, scene, frame)
     mask = mask & ~_hand_before(mask, opened, seen, scene, frame)
-    return (mask | _drawn_out(opened, seen, frame) if opened.way == "out" else mask), share
+    return (mask | _drawn_out(opened, seen, frame) if opened.movement == "out" else mask), share
 
 
 def _seen(opened: OpenLeaf, scene: Scene, frame: Frame) -> np.ndarray:
@@ -66,7 +66,7 @@ def _seen(opened: OpenLeaf, scene: Scene, frame: Frame) -> np.ndarray:
     camera, depth = frame.depth_camera, scene.depth(frame.index)
     away, nearest = distance_transform_edt(depth == 0, return_indices=True)
     filled = np.where(away <= tuned(Params).hole_px, depth[tuple(nearest)], np.nan)
-    leaf_from_camera: Rigid3 = opened.world_from_leaf.inverse @ frame.world_from_camera
+    leaf_from_camera: Rigid3 = opened.leaf.world_from_front.inverse @ frame.world_from_camera
     return leaf_from_camera.apply(unproject(pixel_centres(camera), filled, camera).reshape(-1, 3)).reshape(*depth.shape, 3)
 
 
@@ -78,7 +78,7 @@ def _hand_before(mask: Mask, opened: OpenLeaf, seen: np.ndarray, scene: Scene, f
     """
     params = tuned(Params)
     size = (mask.shape[1], mask.shape[0])
-    from_behind = float(opened.world_from_leaf.inverse.apply(frame.world_from_camera.translation[None])[0, 1]) > 0
+    from_behind = float(opened.leaf.world_from_front.inverse.apply(frame.world_from_camera.translation)[1]) > 0
     before = seen[..., 1] - opened.leaf.thickness_m if from_behind else -seen[..., 1]
     on_leaf = (scene.depth(frame.index) > 0) & (before < params.touches_m)
     told = mask & (cv2.resize(on_leaf.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0)
@@ -89,7 +89,7 @@ def _hand_before(mask: Mask, opened: OpenLeaf, seen: np.ndarray, scene: Scene, f
     light = np.maximum(lab[..., 0], 1.0) / max(float(usual[0]), 1.0)
     hue = np.abs((lab[..., 1:] - 128.0) - (usual[1:] - 128.0) * light[..., None]).max(axis=2)
     unlike = (np.abs(np.log(light)) > np.log(params.shade)) | (hue > params.hue_lab)
-    away = float(frame.world_from_camera.inverse.apply(opened.world_from_leaf.translation[None])[0, 2])
+    away = float(frame.world_from_camera.inverse.apply(opened.leaf.centre)[2])
     width = max(int(params.hand_m * frame.rgb_camera.fx / max(away, 0.3)), 3)
     element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
     patch = cv2.morphologyEx((unlike & ~told).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
@@ -100,12 +100,12 @@ def _hand_before(mask: Mask, opened: OpenLeaf, seen: np.ndarray, scene: Scene, f
 
 def _faces(opened: OpenLeaf, frame: Frame) -> list[Facet]:
     """Sides of the board that face the camera."""
-    face = corners(opened.leaf)
+    face = opened.leaf.corners_front
     back = face + opened.leaf.behind
     quads = [face, back[::-1], *(np.stack([face[k], back[k], back[k - 1], face[k - 1]]) for k in range(4))]
-    facets = [Facet(opened.world_from_leaf.apply(quad)) for quad in quads]
+    facets = [Facet(opened.leaf.world_from_front.apply(quad)) for quad in quads]
     camera = frame.world_from_camera.translation
-    middle = opened.world_from_leaf.apply((face + back).mean(axis=0)[None] / 2)[0]
+    middle = opened.leaf.world_from_front.apply((face + back).mean(axis=0)[None] / 2)[0]
     return [f for f in facets if _side(f, camera) * _side(f, middle) < 0]
 
 
@@ -118,10 +118,7 @@ def _drawn_out(opened: OpenLeaf, seen: np.ndarray, frame: Frame) -> Mask:
 
     For a box whose rear was not observed, only as far as the drawer has come out.
     """
-    out = float(np.linalg.norm(opened.world_from_leaf.translation - opened.leaf.world_from_front.translation))
-    if opened.rear_m is not None:
-        out = max(out, opened.rear_m + tuned(Params).rear_m)
-    half_w, half_h = opened.leaf.half_m
-    inside = (np.abs(seen[..., 0]) < half_w) & (np.abs(seen[..., 2]) < half_h) & (seen[..., 1] > 0) & (seen[..., 1] < out)
+    out = opened.out_m if opened.rear_m is None else max(opened.out_m, opened.rear_m + tuned(Params).rear_m)
+    inside = opened.leaf.covers(seen) & (seen[..., 1] > 0) & (seen[..., 1] < out)
     size = (frame.rgb_camera.width, frame.rgb_camera.height)
     return np.asarray(cv2.resize(inside.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5)

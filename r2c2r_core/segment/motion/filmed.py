@@ -79,7 +79,8 @@ class FilmedLeaves:
     def _over_drawer(self) -> list[tuple[Leaf, JointMotion | None]]:
         """A drawer observed to move below its doors, and those doors; none where nothing below a seam was drawn out."""
         for seam_m in self.seams_m:
-            below, above = _parted(self.whole, seam_m)
+            half_w, half_h = self.whole.half_m
+            below, above = (self.whole.part((-half_w, half_w), ends) for ends in ((-half_h, seam_m), (seam_m, half_h)))
             drawer = self._looked_for(DRAWER, below, _USUAL["drawer"])
             if drawer[1] is not None:
                 return [
@@ -125,7 +126,7 @@ def _places(leaf: Leaf, motion: JointMotion) -> Callable[[Frame], Rigid3 | None]
 
     def place(frame: Frame) -> Rigid3 | None:
         state = _state(motion, frame.index)
-        return _opened(leaf, motion, state).world_from_leaf if state >= ajar else None
+        return _opened(leaf, motion, state).leaf.world_from_front if state >= ajar else None
 
     return place
 
@@ -136,8 +137,8 @@ def _opened(leaf: Leaf, motion: JointMotion, state: float) -> OpenLeaf:
     opening = moved(motion.axis_world, motion.pivot_world, motion.kind == "revolute", state)
     depth_m = None if motion.inside is None else motion.inside.depth_m
     rear_m = None if depth_m is None else depth_m + leaf.thickness_m
-    world_from_leaf, way = opening @ leaf.world_from_front, motion.movement(leaf.outward)
-    return OpenLeaf(leaf=leaf, world_from_leaf=world_from_leaf, way=way, rear_m=rear_m)
+    moved_leaf = replace(leaf, world_from_front=opening @ leaf.world_from_front)
+    return OpenLeaf(leaf=moved_leaf, movement=motion.movement(leaf.outward), out_m=state, rear_m=rear_m)
 
 
 def _leaves(whole: Leaf, category: Category) -> list[tuple[str, Leaf, tuple[Way, ...]]]:
@@ -146,22 +147,6 @@ def _leaves(whole: Leaf, category: Category) -> list[tuple[str, Leaf, tuple[Way,
         return []
     if category.opens != "pair":
         return [("", whole, _USUAL[category.opens])]
-    half = whole.width_m / 2
-    return [("left", _part(whole, -half / 2, half), ("left",)), ("right", _part(whole, half / 2, half), ("right",))]
-
-
-def _parted(whole: Leaf, seam_m: float) -> tuple[Leaf, Leaf]:
-    """Parts of a front below a height and above it."""
-    half = whole.height_m / 2
-    return _band(whole, -half, seam_m), _band(whole, seam_m, half)
-
-
-def _band(whole: Leaf, low_m: float, high_m: float) -> Leaf:
-    place = whole.world_from_front @ Rigid3(np.eye(3), np.array([0.0, 0.0, (low_m + high_m) / 2]))
-    return Leaf(world_from_front=place, width_m=whole.width_m, height_m=high_m - low_m)
-
-
-def _part(whole: Leaf, x_m: float, width_m: float) -> Leaf:
-    """Part of a front centred `x_m` from its middle."""
-    place = whole.world_from_front @ Rigid3(np.eye(3), np.array([x_m, 0.0, 0.0]))
-    return Leaf(world_from_front=place, width_m=width_m, height_m=whole.height_m)
+    half_w, half_h = whole.half_m
+    left, right = (whole.part(ends, (-half_h, half_h)) for ends in ((-half_w, 0.0), (0.0, half_w)))
+    return [("left", left, ("left",)), ("right", right, ("right",))]

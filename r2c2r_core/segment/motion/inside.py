@@ -145,7 +145,6 @@ def _free(cloud: _Cloud, leaf: Leaf, place: Callable[[Frame], Rigid3 | None], sc
 
 
 def _behind(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene, deepest_m: float) -> _Cloud:
-    half_w, half_h = leaf.half_m
     found, numbers, rest = [np.zeros((0, 3))], [np.zeros(0, int)], [np.zeros(0)]
     for frame in scene.frames:
         world_from_front = place(frame)
@@ -154,8 +153,7 @@ def _behind(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene, d
         depth = scene.depth(frame.index)
         seen = depth_points(depth, frame.depth_camera)[depth > 0].astype(np.float64)
         local = (world_from_front.inverse @ frame.world_from_camera).apply(seen)
-        keep = (np.abs(local[:, 0]) < half_w) & (np.abs(local[:, 2]) < half_h)
-        keep &= (local[:, 1] > 0) & (local[:, 1] < deepest_m)
+        keep = leaf.covers(local) & (local[:, 1] > 0) & (local[:, 1] < deepest_m)
         found.append(local[keep])
         numbers.append(np.full(int(keep.sum()), frame.index))
         rest.append(leaf.world_from_front.inverse.apply(world_from_front.apply(local[keep]))[:, 1])

@@ -7,7 +7,7 @@ import numpy as np
 from r2c2r_core.geometry.camera import pixel_rays, project
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.motion.hypotheses import Hypothesis
-from r2c2r_core.segment.motion.leaf import Leaf, corners
+from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -59,7 +59,7 @@ def _over_plane(leaf: Leaf, scene: Scene, frame: Frame) -> tuple[np.ndarray, np.
     """Unoccluded depth within the closed outline: x where its ray meets the plane, and metres behind the plane."""
     params = tuned(Params)
     camera, depth = frame.depth_camera, scene.depth(frame.index)
-    outline = frame.world_from_camera.inverse.apply(leaf.world_from_front.apply(corners(leaf)))
+    outline = frame.world_from_camera.inverse.apply(leaf.corners)
     if outline[:, 2].min() < 0.1:
         return np.zeros(0), np.zeros(0)
     uv = project(outline, camera)

@@ -9,7 +9,7 @@ from r2c2r_core.geometry.camera import project, unproject
 from r2c2r_core.geometry.least_squares import fit_linear, geman_mcclure
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.motion.leaf import Leaf, corners
+from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -79,7 +79,7 @@ def _points_near(leaf: Leaf, world_from_leaf: Rigid3, scene: Scene, frame: Frame
     """Depth points within the leaf's outline, in its frame, and the standard deviation of each along the leaf's normal."""
     params = tuned(Params)
     camera, depth = frame.depth_camera, scene.depth(frame.index)
-    outline = frame.world_from_camera.inverse.apply(world_from_leaf.apply(corners(leaf)))
+    outline = frame.world_from_camera.inverse.apply(world_from_leaf.apply(leaf.corners_front))
     uv = project(np.maximum(outline, [-np.inf, -np.inf, 0.1]), camera)
     low = np.clip(np.floor(uv.min(axis=0)), 0, [camera.width, camera.height]).astype(int)
     high = np.clip(np.ceil(uv.max(axis=0)), 0, [camera.width, camera.height]).astype(int)

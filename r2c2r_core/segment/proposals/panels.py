@@ -4,12 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.arrays import Points
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.kitchen.walls import distances_behind
 from r2c2r_core.model.capture import Room
-from r2c2r_core.segment.fronts.front import Front, edge_strengths, find_front, front_corners
+from r2c2r_core.model.rectangle import Rectangle3
+from r2c2r_core.segment.fronts.front import Front, edge_strengths, find_front
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.proposals.naming import FrontLook, name_front
 from r2c2r_core.segment.runs.run import Run
@@ -74,21 +75,9 @@ class Panel:
         return self.front.run
 
     @property
-    def size_m(self) -> tuple[float, float]:
-        """Width and height."""
-        cell_m = self.run.grid.cell_m
-        return self.front.cell.width * cell_m, self.front.cell.height * cell_m
-
-    @property
-    def centre(self) -> Vector3:
-        """Centre of the panel, in the world."""
-        cell = self.front.cell
-        return self.run.grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))[0]
-
-    @property
-    def corners(self) -> Points:
-        """Corners of the panel in the world: top left, then clockwise."""
-        return front_corners(self.front.cell, self.run.grid, (0.0, 0.0))
+    def rectangle(self) -> Rectangle3:
+        """Its rectangle with level edges."""
+        return self.front.rectangle
 
 
 def find_panels(run: Run, room: Room) -> list[Panel]:
@@ -205,7 +194,7 @@ def is_on_wall(run: Run, room: Room, shallowest_m: float) -> bool:
 
 
 def _middle(run: Run, cell: Cell) -> Points:
-    return run.grid.points_at(np.array([[(cell.left + cell.right) / 2, (cell.top + cell.bottom) / 2]]))
+    return run.grid.rectangle(cell).centre[None]
 
 
 def _mate(run: Run, cell: Cell) -> Cell | None:
@@ -239,8 +228,7 @@ def _dark_share(run: Run, area: tuple[slice, slice]) -> float:
 
 
 def _area(panel: Panel) -> float:
-    width, height = panel.size_m
-    return width * height
+    return panel.rectangle.width_m * panel.rectangle.height_m
 
 
 def _is_side_of(side: Panel, front: Panel) -> bool:
@@ -249,12 +237,11 @@ def _is_side_of(side: Panel, front: Panel) -> bool:
     normal = front.run.grid.outward
     if abs(float(normal @ side.run.grid.outward)) > 0.3:
         return False
-    width, height = front.size_m
-    local = front.run.region.world_from_plane.rotation.T @ (side.corners - front.centre).T
-    x, behind, z = local
+    half_w, half_h = front.rectangle.half_m
+    x, behind, z = front.rectangle.world_from_front.inverse.apply(side.front.outline.corners).T
     outward = float(front.run.region.world_from_plane.rotation[:, 0] @ side.run.grid.outward)
-    at_edge = abs(abs(float(x.mean())) - width / 2) < params.corner_m and float(x.mean()) * outward > 0
+    at_edge = abs(abs(float(x.mean())) - half_w) < params.corner_m and float(x.mean()) * outward > 0
     # The side may end short of the front: a door is in front of its carcass, or the cut removed a piece of it.
     is_behind = behind.min() > -params.corner_m and behind.min() < 0.35 and behind.max() < params.deepest_m
-    overlap = min(float(z.max()), height / 2) - max(float(z.min()), -height / 2)
-    return at_edge and bool(is_behind) and overlap > 0.5 * min(height, float(np.ptp(z)))
+    overlap = min(float(z.max()), half_h) - max(float(z.min()), -half_h)
+    return at_edge and bool(is_behind) and overlap > 0.5 * min(2 * half_h, float(np.ptp(z)))

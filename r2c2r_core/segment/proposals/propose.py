@@ -125,7 +125,7 @@ def _apart(panels: list[Panel]) -> list[Panel]:
     """Non-maximum suppression of overlapping panels on one plane: boxes before their doors, then by confidence."""
     kept: list[Panel] = []
     for panel in sorted(panels, key=lambda panel: (not _is_box(panel.category), -panel.confidence)):
-        if not any(_covers(other, panel.centre) or _covers(panel, other.centre) or _same_box(panel, other) for other in kept):
+        if not any(_covers(other, panel) or _covers(panel, other) or _same_box(panel, other) for other in kept):
             kept.append(panel)
     return kept
 
@@ -134,24 +134,25 @@ def _same_box(panel: Panel, other: Panel) -> bool:
     """Whether two faces belong to one appliance: two of one category never stand corner to corner."""
     if panel.category != other.category or not _is_box(panel.category):
         return False
-    return bool(np.linalg.norm(panel.centre - other.centre) < max(panel.size_m[0], other.size_m[0]))
+    one, two = panel.rectangle, other.rectangle
+    return bool(np.linalg.norm(one.centre - two.centre) < max(one.width_m, two.width_m))
 
 
-def _covers(panel: Panel, point: Vector3) -> bool:
-    local = panel.run.region.world_from_plane.rotation.T @ (point - panel.centre)
-    width, height = panel.size_m
-    return bool(abs(local[1]) < tuned(Params).same_plane_m and abs(local[0]) < width / 2 and abs(local[2]) < height / 2)
+def _covers(panel: Panel, other: Panel) -> bool:
+    """Whether the centre of another panel lies on a panel."""
+    local = panel.rectangle.world_from_front.inverse.apply(other.rectangle.centre)
+    return bool(abs(local[1]) < tuned(Params).same_plane_m and panel.rectangle.covers(local))
 
 
 def clashes(panel: Panel, others: Iterable[tuple[Proposal, Panel]]) -> tuple[str, ...]:
     """Doubts about a panel that overlaps fronts proposed before it: no two fronts share a place."""
     params = tuned(Params)
-    width, height = panel.size_m
+    half_w, half_h = panel.rectangle.half_m
     doubts = []
     for proposal, other in others:
-        x, off, z = panel.run.region.world_from_plane.rotation.T @ (other.corners - panel.centre).T
-        across = min(x.max(), width / 2) - max(x.min(), -width / 2)
-        down = min(z.max(), height / 2) - max(z.min(), -height / 2)
+        x, off, z = panel.rectangle.world_from_front.inverse.apply(other.front.outline.corners).T
+        across = min(x.max(), half_w) - max(x.min(), -half_w)
+        down = min(z.max(), half_h) - max(z.min(), -half_h)
         if np.abs(off).max() < params.same_plane_m and min(across, down) > params.clash_m:
             doubts.append(f"overlaps the proposed {proposal.category} beside it by {100 * min(across, down):.0f} cm")
     return tuple(doubts)
@@ -160,7 +161,7 @@ def clashes(panel: Panel, others: Iterable[tuple[Proposal, Panel]]) -> tuple[str
 def _holds(proposal: Proposal, panel: Panel, clump: Clump) -> bool:
     """Whether a cluster is part of the box behind a front."""
     params = tuned(Params)
-    x, behind, z = panel.run.region.world_from_plane.rotation.T @ (clump.points.mean(axis=0) - panel.centre)
+    x, behind, z = panel.rectangle.world_from_front.inverse.apply(clump.points.mean(axis=0))
     width, depth, height = np.array(proposal.size_m) / [2, 1, 2] + params.box_slack_m
     return bool(abs(x) < width and abs(z) < height and -2 * params.box_slack_m < behind < depth)
 
@@ -205,7 +206,7 @@ def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
 
 def _present_panel(prepared: PreparedCapture, panel: Panel) -> Proposal | None:
     scene, is_box = prepared.scene, _is_box(panel.category)
-    views = best_views(scene, panel.corners, panel.run.grid.outward)
+    views = best_views(scene, panel.front.outline.corners, panel.run.grid.outward)
     shown = [(front_mask(panel.front, scene, frame), frame) for frame in views]
     for (mask, _), frame in sorted(shown, key=lambda view: -np.count_nonzero(view[0][0])):
         for click in panel_clicks(scene, panel, frame, mask):
@@ -220,15 +221,15 @@ def _present_panel(prepared: PreparedCapture, panel: Panel) -> Proposal | None:
 def _proposal(
     prepared: PreparedCapture, panel: Panel, found: FoundFront | FoundAppliance, frame: Frame, click: PromptPoint
 ) -> Proposal:
-    width, height = panel.size_m
+    face = panel.rectangle
     return Proposal(
         kind=found.kind,
         category=panel.category,
         confidence=round(panel.confidence, 3),
         click=click,
         outline=pack_mask(found.see(frame).mask),
-        size_m=(width, panel.front.depth_m or found.front.depth_m, height),
-        centre_world=panel.centre,
+        size_m=(face.width_m, panel.front.depth_m or found.front.depth_m, face.height_m),
+        centre_world=face.centre,
         handle_px=_handle_px(panel, frame),
     )
 
@@ -298,16 +299,14 @@ def _confirmed(prepared: PreparedCapture, category: str, click: PromptPoint | No
 
 def _overlap(panel: Panel, found: FoundFront | FoundAppliance) -> float:
     """IoU of two rectangles on about the same plane."""
-    other, width, height = found.front, *panel.size_m
-    cell = other.cell
-    ends = other.run.grid.points_at(np.array([[cell.left, cell.top], [cell.right, cell.bottom]]))
-    (x0, y0, z1), (x1, y1, z0) = (panel.run.region.world_from_plane.rotation.T @ (end - panel.centre) for end in ends)
+    (half_w, half_h), other = panel.rectangle.half_m, found.front.outline.corners
+    (x0, y0, z1), _, (x1, y1, z0), _ = panel.rectangle.world_from_front.inverse.apply(other)
     if max(abs(y0), abs(y1)) > tuned(Params).same_plane_m:
         return 0.0
-    across = max(min(x1, width / 2) - max(x0, -width / 2), 0.0)
-    down = max(min(z1, height / 2) - max(z0, -height / 2), 0.0)
+    across = max(min(x1, half_w) - max(x0, -half_w), 0.0)
+    down = max(min(z1, half_h) - max(z0, -half_h), 0.0)
     shared = across * down
-    return float(shared / (width * height + (x1 - x0) * (z1 - z0) - shared))
+    return float(shared / (4 * half_w * half_h + (x1 - x0) * (z1 - z0) - shared))
 
 
 def _handle_px(panel: Panel, frame: Frame) -> tuple[tuple[float, float], ...]:

@@ -31,13 +31,13 @@ class OnePhoto:
 
 def test_a_dark_hand_on_a_handle_is_no_part_of_the_front_that_it_draws() -> None:
     """It stands no further before the face than a handle does: depth alone keeps it."""
-    place = LEAF.world_from_front @ joint("out").pose(HELD_M)
+    opened = OpenLeaf(leaf=LEAF.at(joint("out").pose(HELD_M)), movement="out", out_m=HELD_M)
+    place = opened.leaf.world_from_front
     pose = look_at(place.apply(np.array([0.3, -1.5, 0.4])), place.translation)
     front = (place, (-0.25, 0.0, -0.3), (0.25, 0.018, 0.3))
     alone, both = (cast_rays(solids, pose) for solids in ([front], [front, (place, *HAND)]))
     hand = both != alone
     frame = Frame(index=0, timestamp_s=0.0, rgb_camera=CAMERA, depth_camera=CAMERA, world_from_camera=pose, sharpness=1.0)
-    opened = OpenLeaf(leaf=LEAF, world_from_leaf=place, way="out")
     mask, _ = open_mask(opened, OnePhoto(both.astype(np.float32), hand), frame)
     assert mask[hand].mean() < 0.2
     assert mask[(alone > 0) & ~hand].mean() > 0.95
