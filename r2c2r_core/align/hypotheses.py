@@ -121,8 +121,7 @@ def measured_extents(observation: Observation, track: MaskTrack, room_yaw_rad: f
         front = track.front
         rotation = front.world_from_front.rotation
         low, high = _span(observation, rotation)
-        centre = rotation.T @ front.world_from_front.translation
-        half = np.array([front.width_m / 2, 0.0, front.height_m / 2])
+        centre, half = rotation.T @ front.centre, front.corners_front[1]
         known = np.array([True, False, True])
         low = np.where(known, centre - half, np.minimum(low, centre))
         high = np.where(known, centre + half, np.maximum(high, centre))

@@ -166,8 +166,7 @@ def known_corners(track: MaskTrack) -> Points:
     signs = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     corners = [np.zeros((0, 3))]
     if track.front is not None:
-        half = signs * [track.front.width_m, 0.0, track.front.height_m]
-        corners.append(track.front.world_from_front.apply(half[[0, 1, 4, 5]]))
+        corners.append(track.front.corners)
     if track.box is not None:
         corners.append(track.box.world_from_object.apply(signs * track.box.dimensions_m))
     return np.concatenate(corners)

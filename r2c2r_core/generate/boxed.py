@@ -19,6 +19,7 @@ from r2c2r_core.geometry.meshes import box_mesh, unite
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.depth import DepthBehind, DepthSource, depths_behind, distinct, next_sizes
 from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.tuning import param, tuned
 
@@ -57,14 +58,13 @@ def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
     if front is None:
         raise GenerationFailed(f"{track.name}: no front rectangle was measured", hint="add a click that faces it")
     category = category_of(track.category)
-    known = depths_behind(evidence.capture, front.world_from_front, front.width_m, front.height_m, category)
+    known = depths_behind(evidence.capture, front, category)
     depths = distinct([*known, *next_sizes(known[0].depth_m)])
     relief = cache(partial(measure_relief, front))  # the guesses of one draw share it
 
     def shape(behind: DepthBehind, handle: HandleStyle, variation: Variation) -> Shape:
         depth = behind.depth_m * _scale(behind, variation)
-        low = np.array([-front.width_m / 2, 0.0, -front.height_m / 2])
-        high = np.array([front.width_m / 2, depth, front.height_m / 2])
+        low, high = front.corners_front[3], front.corners_front[1] + [0.0, depth, 0.0]
         made = _box_with_relief(BoxPart(low, high), front.world_from_front, np.zeros(3), relief(variation), handle)
         at_front = made.vertices_local[made.faces][:, :, 1].max(axis=1) < tuned(Params).front_zone_m
         error = abs(depth - depths[0].depth_m) + _handle_error(relief(variation), handle)
@@ -88,7 +88,7 @@ def appliance_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hyp
         depth = max(behind.depth_m * _scale(behind, variation), seen_m)
         high[1] = low[1] + depth
         found = relief(variation) if relief is not None else NO_RELIEF
-        at = box.world_from_object.inverse.apply(front.world_from_front.translation) if front is not None else low
+        at = box.world_from_object.inverse.apply(front.centre) if front is not None else low
         made = _box_with_relief(BoxPart(low, high), box.world_from_object, at, found, handle)
         error = abs(depth - depths[0].depth_m) + _handle_error(found, handle)
         return replace(made, parameters={**made.parameters, "depth_m": depth}, unseen_error_m=error)
@@ -148,8 +148,9 @@ def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vec
     width, thought, height = (float(v) for v in box.dimensions_m)
     end = rear_edge(low, high, evidence.pool, box.world_from_object)
     measured = end - float(low[1])
-    front = Rigid3(box.world_from_object.rotation, box.world_from_object.apply(np.array([0.0, float(low[1]), 0.0])))
-    assumed = depths_behind(evidence.capture, front, width, height, category)
+    place = box.world_from_object @ Rigid3(np.eye(3), np.array([0.0, float(low[1]), 0.0]))
+    front = Rectangle3(world_from_front=place, width_m=width, height_m=height)
+    assumed = depths_behind(evidence.capture, front, category)
     if measured > tuned(Params).most_hidden * category.depth.usual and _side_seen(box, evidence.pool):
         return distinct([DepthBehind(measured, "seen"), DepthBehind(thought, "box"), *assumed]), 0.0
     reached = DepthBehind(measured, "points")
@@ -169,7 +170,7 @@ def _measured_box(evidence: Evidence, box: ThingBox, variation: Variation) -> tu
                 limit = 0.04 * 2 * half[axis]
                 corner[axis] += float(np.clip(np.median(points) - corner[axis], -limit, limit))
     if evidence.track.front is not None:
-        low[1] = float(box.world_from_object.inverse.apply(evidence.track.front.world_from_front.translation[None])[0, 1])
+        low[1] = float(box.world_from_object.inverse.apply(evidence.track.front.centre)[1])
     return low, high
 
 
@@ -203,4 +204,4 @@ def _local_front(front: FrontPanel | None, box: ThingBox) -> FrontPanel | None:
     turn = box.world_from_object.rotation.T @ front.world_from_front.rotation
     if turn[1, 1] < np.cos(np.radians(15.0)):
         return None
-    return replace(front, world_from_front=Rigid3(box.world_from_object.rotation, front.world_from_front.translation))
+    return replace(front, world_from_front=Rigid3(box.world_from_object.rotation, front.centre))

@@ -84,7 +84,7 @@ def object_centre(capture: Capture, track: MaskTrack, frame: Frame) -> Vector3:
     if track.box is not None:
         return track.box.world_from_object.translation
     if track.front is not None:
-        return track.front.world_from_front.translation
+        return track.front.centre
     view = _load_view(capture, track.masks[frame.index], frame, 1.0)
     points = masked_points(view)
     if len(points) == 0:

@@ -66,7 +66,7 @@ NO_RELIEF = Relief((), (), None)
 def measure_relief(front: FrontPanel, variation: Variation) -> Relief:
     """Relief of a front from the views of one draw, in the front's frame."""
     points = [front.world_from_front.inverse.apply(masked_points(v, variation.erosion_px)) for v in variation.views]
-    footprint = _depth_footprint(variation.views, front.world_from_front.translation)
+    footprint = _depth_footprint(variation.views, front.centre)
     heights = measure_heights(points, front.width_m, front.height_m, max(0.006, 1.5 * footprint))
     raised, sunk = find_steps(heights, front.handle)
     if front.handle is None:

@@ -11,11 +11,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
-from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.categories import DEPTHS_SOLD_M
 from r2c2r_core.kitchen.category import Category, Size
 from r2c2r_core.kitchen.walls import distances_behind
 from r2c2r_core.model.capture import Capture, Wall
+from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.tuning import param, tuned
 
 DepthSource = Literal["seen", "points", "box", "wall", "worktop", "category", "catalogue"]
@@ -91,19 +91,15 @@ def believable(depth_m: float, behind: FrontDepth, allowed: Size, *, seen_apart:
     return behind.depth_m, behind.wall_m is None
 
 
-def depths_behind(
-    capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, category: Category
-) -> tuple[DepthBehind, ...]:
+def depths_behind(capture: Capture, front: Rectangle3, category: Category) -> tuple[DepthBehind, ...]:
     """Candidate depths of a front, most trusted first.
 
     To the wall behind it if one is at a plausible distance; to the end of the worktop on it; its category's usual depth.
     """
     params = tuned(Params)
-    wall, usual = front_depth(
-        capture.room.walls, world_from_front.translation, -world_from_front.rotation[:, 1], category.depth
-    )
+    wall, usual = front_depth(capture.room.walls, front.centre, front.outward, category.depth)
     found = [] if wall is None else [DepthBehind(wall - params.wall_gap_m, "wall")]
-    worktop = _worktop_end(capture, world_from_front, width_m, height_m, params.least_worktop * usual)
+    worktop = _worktop_end(capture, front, params.least_worktop * usual)
     if worktop is not None and worktop <= category.depth.high:
         found.append(DepthBehind(worktop, "worktop"))
     return distinct([*found, DepthBehind(usual, "category")])
@@ -125,12 +121,12 @@ def distinct(depths: Sequence[DepthBehind]) -> tuple[DepthBehind, ...]:
     )
 
 
-def _worktop_end(capture: Capture, world_from_front: Rigid3, width_m: float, height_m: float, least_m: float) -> float | None:
+def _worktop_end(capture: Capture, front: Rectangle3, least_m: float) -> float | None:
     """Depth to the end of the lowest level sheet above a front that begins over it, as a worktop does; None without one."""
-    params = tuned(Params)
-    points = world_from_front.inverse.apply(capture.surface.vertices_world)
-    above = points[(points[:, 2] > height_m / 2 - params.level_m) & (points[:, 2] < height_m / 2 + params.worktop_above_m)]
-    above = above[(np.abs(above[:, 0]) < width_m / 2) & (above[:, 1] > 0.0) & (above[:, 1] < params.deepest_m)]
+    params, (half_w, half_h) = tuned(Params), front.half_m
+    points = front.world_from_front.inverse.apply(capture.surface.vertices_world)
+    above = points[(points[:, 2] > half_h - params.level_m) & (points[:, 2] < half_h + params.worktop_above_m)]
+    above = above[(np.abs(above[:, 0]) < half_w) & (above[:, 1] > 0.0) & (above[:, 1] < params.deepest_m)]
     if len(above) < params.least_points:
         return None
     cell = np.floor(above[:, 1:] / [params.along_m, params.level_m]).astype(int)

@@ -222,8 +222,7 @@ def _misplaced(track: MaskTrack, category: Category, walls: Sequence[Wall], para
         )
     if track.front is None or category.opens in ("fixed", "rigid"):
         return
-    pose = track.front.world_from_front
-    behind = distances_behind(walls, pose.translation, -pose.rotation[:, 1])
+    behind = distances_behind(walls, track.front.centre, track.front.outward)
     if any(abs(distance) < params.in_wall_m for distance in behind):
         yield Contradiction(
             rule="in-a-wall",

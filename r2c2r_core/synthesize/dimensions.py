@@ -175,7 +175,7 @@ def _at_width(spec: Category, width_m: float, handle: FrontHandle | None) -> Cat
 def facing(capture: Capture, track: MaskTrack, samples: SurfaceSamples) -> tuple[Vector3, bool]:
     """Horizontal direction that the object faces, and whether its yaw is exact; else only the side that the cameras saw."""
     if track.front is not None:
-        return -track.front.world_from_front.rotation[:, 1], True
+        return track.front.outward, True
     if track.box is not None and track.kind == "appliance":
         return -track.box.world_from_object.rotation[:, 1], True
     if track.box is not None:
@@ -238,8 +238,7 @@ def _fits(front: FrontPanel, mesh_size: Vector3, warnings: list[str]) -> bool:
 
 def _with_front(low: Vector3, high: Vector3, front: FrontPanel, rotation: np.ndarray) -> tuple[Vector3, Vector3]:
     """The range with the front's rectangle and plane; the back remains the mesh's."""
-    centre = front.world_from_front.translation @ rotation
-    half = np.array([front.width_m, 0.0, front.height_m]) / 2
+    centre, half = front.centre @ rotation, front.corners_front[1]
     new_low, new_high = centre - half, centre + half
     new_high[1] = centre[1] + max(high[1] - low[1], 0.02) if high[1] < centre[1] + 0.05 else high[1]
     return new_low, new_high

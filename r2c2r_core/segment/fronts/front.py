@@ -194,7 +194,7 @@ def _side_facets(front: Front, frame: Frame, slide: tuple[float, float]) -> list
 
 def depth_behind(front: Front, room: Room, category: Category) -> FrontDepth:
     """Depth of a front of a category here, as far as the walls constrain it."""
-    return front_depth(room.walls, front.outline.centre, front.run.grid.outward, category.depth)
+    return front_depth(room.walls, front.outline.centre, front.outline.outward, category.depth)
 
 
 def seen_sides(front: Front, scene: Scene) -> tuple[HingeSide, ...]:

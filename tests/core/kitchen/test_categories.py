@@ -15,6 +15,7 @@ from r2c2r_core.kitchen.depth import depths_behind
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.inputs import Overrides
+from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.segment.geometric import finders
 from r2c2r_core.segment.things.thing import sized_as
@@ -130,7 +131,7 @@ def test_every_name_is_looked_for_and_measured_the_same(category: Category, monk
     bench: Any = type("Bench", (), {"planes": (), "run_of": lambda self, region, margin_m=0.0: object()})()
     item = built_as(category.name, category)
     wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=-category.depth.usual, area_m2=4.0)
-    front = Rigid3()
+    front = Rectangle3(world_from_front=Rigid3(), width_m=0.6, height_m=0.6)
     for name in category.names:
         found = category_of(name)
         # segment: what is looked for
@@ -139,7 +140,7 @@ def test_every_name_is_looked_for_and_measured_the_same(category: Category, monk
         assert asked["kind"] is category
         assert sized_as(found).radius_m == min(category.longest_m / 2, 1.0)
         # generate: how deep it is, and which wall may be behind it
-        depths = depths_behind(capture((wall,)), front, 0.6, 0.6, found)
+        depths = depths_behind(capture((wall,)), front, found)
         assert depths[-1].depth_m == pytest.approx(category.depth.usual, abs=0.006)
     # synthesize: what is built
     assert item.fixture == (category.name if category.fixture is not None else "object")

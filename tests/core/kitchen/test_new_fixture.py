@@ -11,6 +11,7 @@ from r2c2r_core.kitchen.category import Category, Size
 from r2c2r_core.kitchen.depth import depths_behind
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model import materials
+from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.segment.things.thing import sized_as
 from r2c2r_core.synthesize import fixtures
 from tests.core.synthesize.kitchen_units import Unit, capture
@@ -58,7 +59,8 @@ def test_a_new_unit_is_one_file_and_one_line(typed: str) -> None:
     category = category_of(typed)
     assert category is LINE
     assert sized_as(category).radius_m == 0.45
-    assert depths_behind(capture(), Rigid3(), 0.6, 0.14, category)[-1].depth_m == 0.55
+    front = Rectangle3(world_from_front=Rigid3(), width_m=0.6, height_m=0.14)
+    assert depths_behind(capture(), front, category)[-1].depth_m == 0.55
     item = built(Unit("a", typed, (0, 0, 1.0), (0.6, 0.55, 0.14))).objects[0]
     assert (item.fixture, [joint.upper for joint in item.joints]) == ("plate_warmer", [1.0])
     np.testing.assert_allclose(item.dimensions_m, (0.6, 0.55, 0.14), atol=0.005)

@@ -12,6 +12,7 @@ from r2c2r_core.kitchen.depth import depths_behind, front_depth
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.kitchen.walls import depths_in, distances_behind
 from r2c2r_core.model.capture import Wall
+from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.segment.fronts.front import depth_behind as depth_behind_front
 from r2c2r_core.synthesize.dimensions import depth_behind as depth_behind_box
 from tests.core.synthesize.kitchen_units import capture
@@ -29,14 +30,11 @@ def wall_at(distance_m: float, *, off_deg: float = 0.0) -> Wall:
 def asked(walls: tuple[Wall, ...], category: str) -> list[float | None]:
     """What each stage says."""
     kind, scan = category_of(category), capture(walls)
-    cell = SimpleNamespace(left=0.0, right=0.0, top=0.0, bottom=0.0)
-    grid = SimpleNamespace(points_at=lambda at: MIDDLE[None], outward=OUTWARD)
-    front: Any = SimpleNamespace(run=SimpleNamespace(grid=grid), cell=cell)
+    face = Rectangle3(world_from_front=Rigid3(np.eye(3), MIDDLE), width_m=0.6, height_m=0.6)
+    front: Any = SimpleNamespace(outline=face)
     half = np.array([0.3, 0.25, 0.3])
     low, high = MIDDLE - half * [1, 0, 1], MIDDLE + half * [1, 2, 1]
-    generated = next(
-        (d.depth_m for d in depths_behind(scan, Rigid3(np.eye(3), MIDDLE), 0.6, 0.6, kind) if d.source == "wall"), None
-    )
+    generated = next((d.depth_m for d in depths_behind(scan, face, kind) if d.source == "wall"), None)
     return [
         depth_behind_front(front, scan.room, kind).wall_m,
         None if generated is None else generated + 0.005,  # what stands against a wall leaves it a gap
