@@ -26,7 +26,7 @@ Source = Literal["measured", "at_least", "inferred", "default", "person"]
 DOOR, DRAWER = "door", "drawer"
 """Parts of an object with a drawer below its door."""
 
-MotionKind = Literal["revolute", "prismatic", "fixed"]
+JointType = Literal["revolute", "prismatic"]
 
 Movement = Literal["hinge", "out", "along", "none"]
 """Motion of a front: rotation about an edge, pulled out, sliding along its own plane, or none."""
@@ -65,7 +65,7 @@ class JointMotion:
     """
 
     part: str = ""  # leaf of an object with several: "left", "right", DOOR, DRAWER; "" for a single leaf
-    kind: MotionKind
+    kind: JointType | Literal["fixed"]
     axis_world: Vector3 | None  # unit; opening turns about it, or goes along it
     pivot_world: Vector3 | None
     covariance: Float[ndarray, "6 6"] | None

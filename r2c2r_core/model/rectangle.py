@@ -18,6 +18,14 @@ TOWARDS: Mapping[HingeSide, Vector3] = {
 }
 """Unit vectors from the centre of a front towards its edges, in the `front` frame."""
 
+HINGE_AXES: Mapping[HingeSide, Vector3] = {
+    "left": TOWARDS["bottom"],
+    "right": TOWARDS["top"],
+    "bottom": TOWARDS["right"],
+    "top": TOWARDS["left"],
+}
+"""Axes about which leaves hinged on those edges open, by the right-hand rule."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rectangle3:

@@ -7,9 +7,8 @@ from typing import Literal
 from r2c2r_core.arrays import Matrix3, Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.mesh import TexturedMesh
-from r2c2r_core.model.motion import JointMotion, Source
+from r2c2r_core.model.motion import JointMotion, JointType, Source
 
-JointType = Literal["revolute", "prismatic"]
 InsidePart = Literal["depth", "shelves"]
 """Observable properties of the space behind a front: its depth (for a drawer, its tray's) and its shelves."""
 Role = Literal["front", "handle", "carcass", "inner"]

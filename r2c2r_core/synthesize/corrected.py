@@ -12,9 +12,9 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.inputs import HingeSide, JointLimits, ObjectOverride
 from r2c2r_core.model.motion import JointMotion
+from r2c2r_core.model.rectangle import TOWARDS
 from r2c2r_core.model.scene import Box, ConvexPiece, Joint, Link, SceneObject
 from r2c2r_core.synthesize.fixtures.doors import hinge_motion
-from r2c2r_core.synthesize.fixtures.sliding_door import TOWARDS
 from r2c2r_core.synthesize.marked import part_of, remarked
 
 _SAME = 1e-3  # m and rad: rounding of files

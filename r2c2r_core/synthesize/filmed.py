@@ -10,8 +10,8 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import HingeSide
-from r2c2r_core.model.motion import DRAWER, Inside, JointMotion, Source
-from r2c2r_core.model.scene import JointType
+from r2c2r_core.model.motion import DRAWER, Inside, JointMotion, JointType, Source
+from r2c2r_core.model.rectangle import HINGE_AXES, TOWARDS
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.fixtures.spec import Below, Motion
 from r2c2r_core.tuning import param, tuned
@@ -62,10 +62,8 @@ def side_filmed(item: MeasuredObject) -> HingeSide | None:
     if len(leaves) != 1:
         return None
     axis = _axis(leaves[0], item.placed_pose)
-    across, up = float(axis[0]), float(axis[2])
-    if leaves[0].movement(item.placed_pose.rotation[:, 1]) == "hinge":
-        return ("right" if up > 0 else "left") if abs(up) > abs(across) else ("bottom" if across > 0 else "top")
-    return ("right" if across > 0 else "left") if abs(across) > abs(up) else ("top" if up > 0 else "bottom")
+    axes = HINGE_AXES if leaves[0].kind == "revolute" else TOWARDS
+    return max(axes, key=lambda side: float(axis @ axes[side]))
 
 
 def filmed(motions: Sequence[JointMotion], placed_pose: Rigid3, motion: Motion) -> JointMotion | None:

@@ -8,10 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.inputs import HingeSide
+from r2c2r_core.model.rectangle import HINGE_AXES, TOWARDS
 from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.tuning import param, tuned
 
-Way = Literal["left", "right", "top", "bottom", "out", "slides_left", "slides_right"]
+Way = HingeSide | Literal["out", "slides_left", "slides_right"]
 """The edge that it hangs on, as a person facing the closed front sees it; out of its unit; or along its own plane."""
 
 
@@ -46,7 +48,7 @@ class Hypothesis:
     @property
     def turns(self) -> bool:
         """Whether the joint is a hinge."""
-        return self.way in ("left", "right", "top", "bottom")
+        return self.way in HINGE_AXES
 
     @property
     def lateral(self) -> bool:
@@ -76,21 +78,18 @@ def moved(axis: Vector3, pivot: Vector3, turns: bool, state: float) -> Rigid3:
 def hypotheses(leaf: Leaf, floor_m: float | None = None) -> tuple[Hypothesis, ...]:
     """All joint hypotheses of a rectangular leaf, above a floor at that height (world z) where one is known."""
     params = tuned(Params)
-    half_w, half_h = leaf.half_m
     angles = np.arange(0.0, params.most_rad + 1e-9, params.step_rad)
     flap_angles = angles[angles <= params.most_flap_rad]
     out = np.arange(0.0, params.most_m + 1e-9, params.step_m)
     along = np.arange(0.0, leaf.width_m + 1e-9, params.step_m)
-    x, y, z = np.eye(3)
-    none = np.zeros(3)
+    lowered = flap_angles[_above(floor_m, leaf, flap_angles)]
+    swings: dict[HingeSide, np.ndarray] = {"left": angles, "right": angles, "top": flap_angles, "bottom": lowered}
+    half, none = leaf.corners_front[1], np.zeros(3)
     return (
-        Hypothesis(way="left", axis=-z, pivot=-x * half_w, states=angles),
-        Hypothesis(way="right", axis=z, pivot=x * half_w, states=angles),
-        Hypothesis(way="top", axis=-x, pivot=z * half_h, states=flap_angles),
-        Hypothesis(way="bottom", axis=x, pivot=-z * half_h, states=flap_angles[_above(floor_m, leaf, flap_angles)]),
-        Hypothesis(way="out", axis=-y, pivot=none, states=out),
-        Hypothesis(way="slides_left", axis=-x, pivot=none, states=along),
-        Hypothesis(way="slides_right", axis=x, pivot=none, states=along),
+        *(Hypothesis(way=k, axis=HINGE_AXES[k], pivot=TOWARDS[k] * half, states=states) for k, states in swings.items()),
+        Hypothesis(way="out", axis=np.array([0.0, -1.0, 0.0]), pivot=none, states=out),
+        Hypothesis(way="slides_left", axis=TOWARDS["left"], pivot=none, states=along),
+        Hypothesis(way="slides_right", axis=TOWARDS["right"], pivot=none, states=along),
     )
 
 
@@ -98,5 +97,5 @@ def _above(floor_m: float | None, leaf: Leaf, angles: np.ndarray) -> np.ndarray:
     """Mask of the angles (q,) at which the free edge of a leaf hinged on its lower edge stays above the floor."""
     if floor_m is None:
         return np.ones(len(angles), bool)
-    hinge_m = leaf.world_from_front.translation[2] - leaf.half_m[1]
+    hinge_m = leaf.centre[2] - leaf.half_m[1]
     return np.asarray(hinge_m + leaf.height_m * np.cos(angles) > floor_m - tuned(Params).under_floor_m)
