@@ -11,8 +11,7 @@ from r2c2r_core.model.track import FrontPanel
 def front_line(panel: FrontPanel, world_from_capture: Rigid3) -> dict[str, Any]:
     """The front in the format of schemas.FoundFront: corners from top left clockwise; the handle relative to the centre."""
     c, s = np.cos(panel.roll_rad), np.sin(panel.roll_rad)
-    right, up = np.array([c, 0.0, s]) * panel.width_m / 2, np.array([-s, 0.0, c]) * panel.height_m / 2
-    corners = panel.world_from_front.apply(np.stack([up - right, up + right, right - up, -up - right]))
+    corners = panel.at(Rigid3(np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]))).corners
     handle = panel.handle
     return {
         "edges": [round(sure, 3) for sure in panel.edges],
