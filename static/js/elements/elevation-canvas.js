@@ -5,17 +5,9 @@
  */
 
 import { h, LiveElement, wire } from "../dom.js";
-import {
-  between,
-  heightOf,
-  middleOf,
-  moved,
-  nearestEdge,
-  holds,
-  SMALLEST_M,
-  widthOf,
-  withEdge,
-} from "../lib/elevation.js";
+import { heightOf, middleOf, widthOf } from "../lib/elevation.js";
+import { carried, drawn, heldAt, isLarge, settled, smallestAt } from "../lib/front-hits.js";
+import { edgeMiddle, edgeOf, hingeLine, slideArrow } from "../lib/front-marks.js";
 import { Gestures } from "../lib/gestures.js";
 import { fit, pinch, toImage, toScreen, zoom } from "../lib/view.js";
 
@@ -29,7 +21,7 @@ import { fit, pinch, toImage, toScreen, zoom } from "../lib/view.js";
  *   handle: Box | null, hinge: Side | null, slides: boolean, overlaps: boolean, asked: Side[],
  * }} Shown
  */
-/** @typedef {{ key: string, side: Side | null }} Held an edge, or all of a front */
+/** @typedef {import("../lib/front-hits.js").Held} Held */
 /** @typedef {(side: Side, at: number, rect: Rect, key: string | null, reach: number) => number} Snap */
 
 const STILL_PX = 3;
@@ -165,18 +157,17 @@ export class ElevationCanvas extends LiveElement {
       front.drawn ? [] : [8, 4],
     );
     if (front.handle) this.#drawHandle(context, rect, front.handle, front.paint);
-    if (front.hinge && front.slides) this.#drawSlide(context, rect, front.hinge, front.paint);
+    if (front.hinge && front.slides)
+      this.#stroke(context, slideArrow(this.#onScreen(rect), front.hinge), 2.5, front.paint);
     else if (front.hinge) this.#drawHinge(context, rect, front.hinge, front.paint);
-    if (front.chosen && this.edge) this.#drawEdge(context, rect, this.edge);
+    if (front.chosen && this.edge) this.#stroke(context, [edgeOf(this.#onScreen(rect), this.edge)], 6, "#ffffff");
     for (const side of front.asked) this.#drawAsked(context, rect, side);
     this.#drawLabel(context, rect, front.name);
   }
 
   /** An edge that is asked about. @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side */
   #drawAsked(context, rect, side) {
-    const { left, top, right, bottom } = this.#onScreen(rect);
-    const x = side === "left" ? left : side === "right" ? right : (left + right) / 2;
-    const y = side === "top" ? top : side === "bottom" ? bottom : (top + bottom) / 2;
+    const [x, y] = edgeMiddle(this.#onScreen(rect), side);
     context.beginPath();
     context.arc(x, y, ASKED_PX, 0, 2 * Math.PI);
     context.fillStyle = "#ffd166";
@@ -218,75 +209,19 @@ export class ElevationCanvas extends LiveElement {
     this.#outline(context, at, "#0d0f12", 1, []);
   }
 
-  /** The opening's triangle, as on drawings: its point is at the hinge. @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side @param {string} colour */
+  /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side @param {string} colour */
   #drawHinge(context, rect, side, colour) {
-    const { left, top, right, bottom } = this.#onScreen(rect);
-    const [x, y] = [(left + right) / 2, (top + bottom) / 2];
-    /** @type {Record<Side, [number, number][]>} */
-    const lines = {
-      left: [
-        [right, top],
-        [left, y],
-        [right, bottom],
-      ],
-      right: [
-        [left, top],
-        [right, y],
-        [left, bottom],
-      ],
-      top: [
-        [left, bottom],
-        [x, top],
-        [right, bottom],
-      ],
-      bottom: [
-        [left, top],
-        [x, bottom],
-        [right, top],
-      ],
-    };
-    context.beginPath();
-    for (const [px, py] of lines[side]) context.lineTo(px, py);
-    context.lineWidth = 1.5;
-    context.strokeStyle = colour;
     context.setLineDash([6, 5]);
-    context.stroke();
+    this.#stroke(context, [hingeLine(this.#onScreen(rect), side)], 1.5, colour);
     context.setLineDash([]);
   }
 
-  /** An arrow to where it slides. @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side @param {string} colour */
-  #drawSlide(context, rect, side, colour) {
-    const { left, top, right, bottom } = this.#onScreen(rect);
-    const y = (top + bottom) / 2;
-    const quarter = (right - left) / 4;
-    const [from, to] = side === "left" ? [right - quarter, left + quarter] : [left + quarter, right - quarter];
-    const head = Math.sign(from - to) * Math.min(12, quarter);
+  /** @param {CanvasRenderingContext2D} context @param {[number, number][][]} lines @param {number} width @param {string} colour */
+  #stroke(context, lines, width, colour) {
     context.beginPath();
-    context.moveTo(from, y);
-    context.lineTo(to, y);
-    context.lineTo(to + head, y - Math.abs(head) / 2);
-    context.moveTo(to, y);
-    context.lineTo(to + head, y + Math.abs(head) / 2);
-    context.lineWidth = 2.5;
+    for (const line of lines) for (const [k, [x, y]] of line.entries()) k ? context.lineTo(x, y) : context.moveTo(x, y);
+    context.lineWidth = width;
     context.strokeStyle = colour;
-    context.stroke();
-  }
-
-  /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side */
-  #drawEdge(context, rect, side) {
-    const { left, top, right, bottom } = this.#onScreen(rect);
-    const ends = {
-      left: [left, top, left, bottom],
-      right: [right, top, right, bottom],
-      top: [left, top, right, top],
-      bottom: [left, bottom, right, bottom],
-    };
-    const [x1 = 0, y1 = 0, x2 = 0, y2 = 0] = ends[side];
-    context.beginPath();
-    context.moveTo(x1, y1);
-    context.lineTo(x2, y2);
-    context.lineWidth = 6;
-    context.strokeStyle = "#ffffff";
     context.stroke();
   }
 
@@ -340,7 +275,10 @@ export class ElevationCanvas extends LiveElement {
       this.#preview =
         motion.kind === "carry"
           ? this.#carried(motion.held, motion.at, event.altKey)
-          : this.#drawn(motion.to, event.altKey || event.shiftKey);
+          : {
+              key: null,
+              rect: drawn(this.#from, this.pointer, event.altKey || event.shiftKey ? null : this.#snapOf(null)),
+            };
     this.draw();
   }
 
@@ -359,7 +297,7 @@ export class ElevationCanvas extends LiveElement {
   /** @param {{ x: number, y: number }} at @param {PointerEvent} event */
   #click(at, event) {
     if (this.tooled) return this.emit("use-tool", at);
-    const front = this.#frontAt(at);
+    const front = smallestAt(this.#fronts, at);
     this.emit("pick", { key: front?.key ?? null, side: null, also: event.shiftKey });
   }
 
@@ -392,65 +330,28 @@ export class ElevationCanvas extends LiveElement {
   /** @param {Held} held @param {At} at @param {boolean} free */
   #carried({ key, side }, at, free) {
     const front = this.#fronts.find((one) => one.key === key);
-    if (!front) return null;
-    const to = toImage(this.#view, at);
-    const { rect } = front;
-    if (side === null)
-      return { key, rect: this.#placed(moved(rect, to.x - this.#from.x, to.y - this.#from.y), key, free) };
-    const put = side === "left" || side === "right" ? to.x : to.y;
-    return { key, rect: withEdge(rect, side, free ? put : this.snap(side, put, rect, key, this.#reach)) };
+    const snap = free ? null : this.#snapOf(key);
+    return front ? { key, rect: carried(front.rect, side, this.#from, toImage(this.#view, at), snap) } : null;
   }
 
   /** Where a new front of that size settles: on the lines that are near. @param {Rect} rect */
   settled(rect) {
-    return this.#placed(rect, null, false);
+    return settled(rect, this.#snapOf(null));
   }
 
-  /** A front that is moved as a whole: the edge with the least way to go snaps. @param {Rect} rect @param {string | null} key @param {boolean} free */
-  #placed(rect, key, free) {
-    if (free) return rect;
-    const ways = (/** @type {Side[]} */ sides) =>
-      sides
-        .map((side) => this.snap(side, rect[side], rect, key, this.#reach) - rect[side])
-        .reduce((best, way) => (way !== 0 && (best === 0 || Math.abs(way) < Math.abs(best)) ? way : best), 0);
-    return moved(rect, ways(["left", "right"]), ways(["top", "bottom"]));
+  /** How the edges of a front snap, of a new one for null. @param {string | null} key @returns {import("../lib/front-hits.js").Snap} */
+  #snapOf(key) {
+    return (side, at, rect) => this.snap(side, at, rect, key, this.reach);
   }
 
-  /** @param {At} at @param {boolean} free */
-  #drawn(at, free) {
-    const rect = between(this.#from, toImage(this.#view, at));
-    if (free) return { key: null, rect };
-    const put = (/** @type {Side} */ side) => this.snap(side, rect[side], rect, null, this.#reach);
-    const snapped = { left: put("left"), right: put("right"), top: put("top"), bottom: put("bottom") };
-    return { key: null, rect: isLarge(snapped) ? snapped : rect };
-  }
-
-  /** What a press takes hold of: an edge, of a chosen front first, or a chosen front. @param {At} at @param {number} fingers @returns {Held | null} */
+  /** @param {At} at @param {number} fingers */
   #heldAt(at, fingers) {
-    const position = toImage(this.#view, at);
-    const reach = (fingers * EDGE_PX) / this.#view.scale;
-    const near = this.#fronts
-      .map(({ key, rect, chosen }) => ({ key, chosen, ...nearestEdge(rect, position) }))
-      .filter(({ off }) => off <= reach)
-      .toSorted((a, b) => Number(b.chosen) - Number(a.chosen) || a.off - b.off)[0];
-    if (near) return { key: near.key, side: near.side };
-    const inside = this.#fronts.find(({ rect, chosen }) => chosen && holds(rect, position));
-    return inside ? { key: inside.key, side: null } : null;
+    return heldAt(this.#fronts, toImage(this.#view, at), (fingers * EDGE_PX) / this.#view.scale);
   }
 
-  /** The smallest front there. @param {{ x: number, y: number }} at */
-  #frontAt(at) {
-    const there = this.#fronts.filter(({ rect }) => holds(rect, at));
-    return there.toSorted((a, b) => widthOf(a.rect) * heightOf(a.rect) - widthOf(b.rect) * heightOf(b.rect))[0] ?? null;
-  }
-
-  get #reach() {
-    return SNAP_PX / this.#view.scale;
-  }
-
-  /** How near a tool's click snaps, in metres. */
+  /** How near an edge or a tool's click snaps, in metres. */
   get reach() {
-    return this.#reach;
+    return SNAP_PX / this.#view.scale;
   }
 
   /** @param {Rect} rect */
@@ -478,9 +379,4 @@ export class ElevationCanvas extends LiveElement {
     if (this.#fitted) this.fit();
     else this.draw();
   }
-}
-
-/** @param {Rect} rect */
-function isLarge(rect) {
-  return widthOf(rect) >= SMALLEST_M && heightOf(rect) >= SMALLEST_M;
 }
