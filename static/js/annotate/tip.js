@@ -4,7 +4,7 @@ import { h } from "../dom.js";
 
 const KNOWN_FROM = 3; // objects
 
-/** @typedef {{ pinning: boolean, proposed: string | null, name: string | undefined, objects: number }} Now */
+/** @typedef {{ cropping: boolean, pinning: boolean, proposed: string | null, name: string | undefined, objects: number }} Now */
 
 export class Tip {
   element = h("div", { class: "tip" });
@@ -18,12 +18,14 @@ export class Tip {
   /** @param {Now} now */
   show(now) {
     this.say(textOf(now));
-    this.element.hidden = !now.pinning && now.objects >= KNOWN_FROM;
+    this.element.hidden = !now.cropping && !now.pinning && now.objects >= KNOWN_FROM;
   }
 }
 
 /** @param {Now} now */
-function textOf({ pinning, proposed, name }) {
+function textOf({ cropping, pinning, proposed, name }) {
+  if (cropping)
+    return "Drag a side of the box, or choose one and press arrow keys; Esc ends. What lies outside is none of the object.";
   if (pinning) return "Click where the comment belongs. Esc leaves it.";
   if (proposed) return proposed;
   if (name === undefined)

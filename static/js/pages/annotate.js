@@ -2,11 +2,11 @@
 
 import * as api from "../api.js";
 import { actionsOf, offers, ONE_A_PRESS } from "../annotate/commands.js";
-import { crosshairKey } from "../annotate/crosshair.js";
 import { Cropper } from "../annotate/cropper.js";
 import { Contradictions } from "../annotate/contradictions.js";
 import { Edits } from "../annotate/edits.js";
 import { EvidencePane } from "../annotate/evidence-pane.js";
+import { listenToKeys } from "../annotate/keys.js";
 import { Layout } from "../annotate/layout.js";
 import { LiveMasks } from "../annotate/live-masks.js";
 import { Painter } from "../annotate/painter.js";
@@ -22,7 +22,7 @@ import { FilmStrip } from "../elements/film-strip.js";
 import { FrameCanvas } from "../elements/frame-canvas.js";
 import { FrameMosaic } from "../elements/frame-mosaic.js";
 import { say, sayError } from "../elements/toasts.js";
-import { Commands, isForPage } from "../keyboard.js";
+import { Commands } from "../keyboard.js";
 import { Meanwhile } from "../lib/meanwhile.js";
 import { partedText } from "../lib/parted.js";
 import { live } from "../live.js";
@@ -32,9 +32,6 @@ import { offerToSkip } from "../skip.js";
 
 /** @typedef {import("../api-types").Comment} Comment */
 /** @typedef {import("../api-types").SceneObject} SceneObject */
-
-const CROPPING =
-  "Drag a side of the box, or choose one and press arrow keys; Esc ends. What lies outside is none of the object.";
 
 export class AnnotatePage extends LiveElement {
   project = "";
@@ -145,8 +142,7 @@ export class AnnotatePage extends LiveElement {
     this.#listenToThePanes();
     this.#listenToTheOthers();
     const { signal } = this;
-    document.addEventListener("keydown", (event) => this.#onKey(event), { signal });
-    document.addEventListener("keyup", (event) => this.#onKeyUp(event), { signal });
+    listenToKeys({ ...this.#parts, painter: this.#painter, cropper: this.#cropper, commands: this.#commands }, signal);
     signal.addEventListener("abort", () =>
       [this.#player, this.#picture, this.#contradictions, this.#cropper].forEach((part) => part.stop()),
     );
@@ -380,37 +376,8 @@ export class AnnotatePage extends LiveElement {
     const { pinning } = this.#presses;
     const { chosen, size } = this.#objects;
     const proposed = this.#pane.proposals.tip;
-    if (this.#cropper.on) return this.#tip.say(CROPPING);
-    if (this.#player.frame) this.#tip.show({ pinning, proposed, name: chosen?.name, objects: size });
-  }
-
-  /** @param {KeyboardEvent} event */
-  #onKey(event) {
-    if (!isForPage(event)) return;
-    if (event.key === "Escape" && this.#presses.pinning) return void (this.#presses.pinning = false);
-    if (event.key === "Escape" && this.#cropper.on) return void this.#cropper.use();
-    if (event.key === "Escape" && this.#painter.tool) return this.#painter.use(null);
-    if (event.key === "Enter" && this.#painter.close()) return event.preventDefault();
-    if (this.#pane.proposals.likeOne && this.#likeKey(event)) return event.preventDefault();
-    if (event.key === " ") return (event.preventDefault(), void this.#canvas.holdSpace(true)); // a tap plays: #onKeyUp
-    const click = (/** @type {0 | 1} */ label) =>
-      this.#canvas.crosshair && this.#presses.click({ ...this.#canvas.crosshair, label, hold: false });
-    if (crosshairKey(event, this.#canvas, click)) return event.preventDefault();
-    this.#commands.press(event);
-  }
-
-  /** While those like an object are shown, Enter is about them. @param {KeyboardEvent} event @returns {boolean} whether it was */
-  #likeKey({ key, shiftKey, repeat }) {
-    const { proposals } = this.#pane;
-    if (key === "Escape") proposals.findLike(null);
-    else if (key === "Enter" && !repeat) shiftKey ? proposals.confirmAll() : proposals.confirm();
-    return ["Escape", "Enter"].includes(key);
-  }
-
-  /** @param {KeyboardEvent} event */
-  #onKeyUp(event) {
-    if (event.key.toLowerCase() === "t") this.#canvas.showRaw(false);
-    if (event.key === " " && isForPage(event) && !this.#canvas.holdSpace(false)) this.act("play");
-    if (event.key === "Control" || event.key === "Meta") this.#presses.release();
+    const cropping = this.#cropper.on;
+    if (cropping || this.#player.frame)
+      this.#tip.show({ cropping, pinning, proposed, name: chosen?.name, objects: size });
   }
 }
