@@ -4,7 +4,7 @@
  */
 
 import * as api from "../api.js";
-import { h } from "../dom.js";
+import { h, shape } from "../dom.js";
 import { say, sayError } from "../elements/toasts.js";
 import { edges, moved, sides, sizes } from "../lib/crop-box.js";
 import { toScreen } from "../lib/view.js";
@@ -13,7 +13,6 @@ import { toScreen } from "../lib/view.js";
 /** @typedef {import("../lib/crop-box.js").Side} Side */
 /** @typedef {import("../api-types").FrameCamera} FrameCamera */
 
-const SVG = "http://www.w3.org/2000/svg";
 const PAUSE_MS = 400; // after which keys pressed one after the other are stored as one change
 const APART_PX = 34; // from the middle of a small box to its handles: none lies over another
 const LEAST_PX_PER_M = 40; // a side seen along its own way cannot be dragged
@@ -24,7 +23,7 @@ export class Cropper extends EventTarget {
   #edits;
   #player;
   #canvas;
-  #lines = document.createElementNS(SVG, "svg");
+  #lines = shape("svg");
   #size = h("output", { class: "crop-size" });
   element = h("div", { class: "crop", role: "group", "aria-label": "Crop box" });
   /** @type {number | null} of the object whose box is shown */
@@ -145,12 +144,8 @@ export class Cropper extends EventTarget {
 
   /** @param {string} name @param {{ from: { x: number, y: number }, to: { x: number, y: number } }} edge */
   #line(name, { from, to }) {
-    const line = document.createElementNS(SVG, "line");
     const [a, b] = [toScreen(this.#canvas.view, from), toScreen(this.#canvas.view, to)];
-    for (const [key, value] of Object.entries({ x1: a.x, y1: a.y, x2: b.x, y2: b.y }))
-      line.setAttribute(key, String(value));
-    line.setAttribute("class", name);
-    return line;
+    return shape("line", { x1: a.x, y1: a.y, x2: b.x, y2: b.y, class: name });
   }
 
   /** @param {Side} side */

@@ -1,12 +1,11 @@
 /** The capture doctor's report: verdict, what is wrong and what to do, the scan drawn, and plots over the frames. */
 
-import { h } from "../dom.js";
+import { h, shape } from "../dom.js";
 import { strips } from "../lib/strips.js";
 
 /** @typedef {import("../api-types").CaptureFacts} CaptureFacts */
 /** @typedef {import("../lib/strips.js").Strip} Strip */
 
-const SVG = "http://www.w3.org/2000/svg";
 const HEIGHT = 28;
 
 /**
@@ -109,23 +108,21 @@ export function allFigures(capture) {
 
 /** @param {Strip} strip */
 function plot(strip) {
-  const svg = document.createElementNS(SVG, "svg");
-  svg.setAttribute("viewBox", `0 0 ${strip.bars.length} ${HEIGHT}`);
-  svg.setAttribute("preserveAspectRatio", "none");
-  svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", `${strip.name} over the frames: ${strip.summary}`);
-  strip.bars.forEach((bar, k) => {
-    const rect = document.createElementNS(SVG, "rect");
+  const bars = strip.bars.map((bar, k) => {
     const height = Math.max(bar.height * HEIGHT, 1);
-    const place = { x: k + 0.1, width: 0.8, y: HEIGHT - height, height };
-    for (const [name, value] of Object.entries(place)) rect.setAttribute(name, String(value));
-    if (bar.off) rect.setAttribute("class", "off");
-    const title = document.createElementNS(SVG, "title");
-    title.textContent = `frame ${bar.frame}: ${bar.text}`;
-    rect.append(title);
-    svg.append(rect);
+    const place = { x: k + 0.1, width: 0.8, y: HEIGHT - height, height, ...(bar.off && { class: "off" }) };
+    return shape("rect", place, shape("title", {}, `frame ${bar.frame}: ${bar.text}`));
   });
-  return svg;
+  return shape(
+    "svg",
+    {
+      viewBox: `0 0 ${strip.bars.length} ${HEIGHT}`,
+      preserveAspectRatio: "none",
+      role: "img",
+      "aria-label": `${strip.name} over the frames: ${strip.summary}`,
+    },
+    ...bars,
+  );
 }
 
 /** @param {string} verdict */

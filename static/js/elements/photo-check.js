@@ -5,7 +5,7 @@
  */
 
 import { getPhotos } from "../api.js";
-import { detailOf, h, LiveElement, renew, segments, slider } from "../dom.js";
+import { detailOf, h, LiveElement, renew, segments, shape, slider } from "../dom.js";
 import { Answers } from "../lib/answers.js";
 import { boxEdges } from "../lib/box-view.js";
 import { sheetOf } from "../lib/crop-view.js";
@@ -30,8 +30,6 @@ const LOOKS = { outline: "Outline", ghost: "Ghost", residual: "Distance" };
 const PIN_R = 0.008; // of the photo's width
 const HOLD_PX = 9; // on the screen
 
-const SVG = "http://www.w3.org/2000/svg";
-
 export class PhotoCheck extends LiveElement {
   project = "";
   #answers = new Answers();
@@ -53,10 +51,10 @@ export class PhotoCheck extends LiveElement {
   #photo = h("img", { alt: "" });
   #under = h("img", { class: "over", alt: "" });
   #over = h("img", { class: "over", alt: "" });
-  #lines = document.createElementNS(SVG, "svg");
-  #box = document.createElementNS(SVG, "g");
-  #pins = document.createElementNS(SVG, "g");
-  #leaves = document.createElementNS(SVG, "g");
+  #lines = shape("svg", { class: "over", "aria-hidden": "true" });
+  #box = shape("g");
+  #pins = shape("g");
+  #leaves = shape("g");
   marks = new OpeningMarks();
   #said = ""; // what people marked of the object
   #opacity = h("input", { type: "range", min: "0", max: "100", value: "75", "aria-label": "Opacity over the photo" });
@@ -68,8 +66,6 @@ export class PhotoCheck extends LiveElement {
   #legend = h("p", { class: "muted legend" });
 
   connected() {
-    this.#lines.setAttribute("class", "over");
-    this.#lines.setAttribute("aria-hidden", "true");
     this.#lines.append(this.#pins, this.#box, this.#leaves);
     this.#sheet.append(this.#lines);
     const observer = new ResizeObserver(() => (this.#place(), this.#drawLeaves(), this.marks.draw()));
@@ -291,8 +287,7 @@ export class PhotoCheck extends LiveElement {
    * @param {SVGElement | null} held
    */
   #hold(leaf, at, held) {
-    const hold =
-      held?.dataset.joint === leaf.joint ? held : /** @type {SVGElement} */ (document.createElementNS(SVG, "circle"));
+    const hold = held?.dataset.joint === leaf.joint ? held : shape("circle");
     const scale = this.#sheet.clientWidth / (this.#current?.width ?? 1) || 1;
     for (const [name, value] of Object.entries({ cx: at[0], cy: at[1], r: HOLD_PX / scale }))
       hold.setAttribute(name, String(value));
@@ -342,14 +337,8 @@ export class PhotoCheck extends LiveElement {
 
   /** @param {import("../api-types").Comment} comment @param {Photo} photo */
   #commentPin({ x, y, text, who }, { width }) {
-    const pin = document.createElementNS(SVG, "circle");
-    for (const [name, value] of Object.entries({ cx: x ?? 0, cy: y ?? 0, r: PIN_R * width }))
-      pin.setAttribute(name, String(value));
-    pin.setAttribute("class", "pin");
-    const title = document.createElementNS(SVG, "title");
-    title.textContent = `${who}: ${text}`;
-    pin.append(title);
-    return pin;
+    const at = { cx: x ?? 0, cy: y ?? 0, r: PIN_R * width, class: "pin" };
+    return shape("circle", at, shape("title", {}, `${who}: ${text}`));
   }
 
   /** @param {MouseEvent} event */
@@ -402,10 +391,7 @@ function nearest(photos, frame) {
 /** @param {number[][]} pose @param {number[]} size @param {Photo} photo */
 function boxLines(pose, size, photo) {
   return boxEdges(pose, size, photo).map(({ from, to, front }) => {
-    const line = document.createElementNS(SVG, "line");
     const at = { x1: from[0], y1: from[1], x2: to[0], y2: to[1] };
-    for (const [name, value] of Object.entries(at)) line.setAttribute(name, String(value));
-    line.setAttribute("class", front ? "front" : "side");
-    return line;
+    return shape("line", { ...at, class: front ? "front" : "side" });
   });
 }
