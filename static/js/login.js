@@ -24,7 +24,7 @@ form.addEventListener("submit", async (event) => {
   button.disabled = true; // after wrong passwords the answer takes its time
   alertLine.textContent = "Signing in…";
   const waits = (/** @type {ApiError} */ error) =>
-    (alertLine.textContent = `${error.message}: it goes on by itself in ${Math.ceil((error.retryMs ?? 0) / 1000)} s`);
+    (alertLine.textContent = `${error.message}: retrying in ${Math.ceil((error.retryMs ?? 0) / 1000)} s`);
   try {
     await signIn(String(said.get("name")), String(said.get("password")), waits);
     location.assign(nextPage(wanted, location.origin));

@@ -5,8 +5,8 @@ import { h } from "./dom.js";
 /** @type {Record<string, { word: string, sign: string, title: string }>} */
 const KINDS = {
   measured: { word: "measured", sign: "●", title: "seen in the recording" },
-  at_least: { word: "at least", sign: "≥", title: "the largest opening that was seen; it was not seen to stop there" },
-  inferred: { word: "inferred", sign: "◐", title: "concluded from something else that was seen" },
+  at_least: { word: "at least", sign: "≥", title: "the widest opening that was seen; its stop was not seen" },
+  inferred: { word: "inferred", sign: "◐", title: "inferred from something else that was seen" },
   default: { word: "default", sign: "○", title: "not seen: the usual value of its category" },
   person: { word: "set by a person", sign: "✎", title: "set by a person" },
 };

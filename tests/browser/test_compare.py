@@ -33,7 +33,7 @@ def test_candidates_stand_side_by_side_turn_together_and_say_what_differs(new_co
     expect(compare.get_by_role("article", name="c1")).to_contain_text(
         re.compile(r"Differs from c0 on \d+ % of its surface, by 10\d mm at most")
     )
-    expect(compare.locator(".legend")).to_contain_text("Orange: further than 5 mm from c0")
+    expect(compare.locator(".legend")).to_contain_text("Orange: more than 5 mm away from c0")
     expect(compare.locator(".turntable.waiting")).to_have_count(0)
     assert page.evaluate(SHOWN) == [24, 24]
 

@@ -48,7 +48,7 @@ def test_two_names_on_one_panel_show_two_masks(new_context: NewContext, server: 
     until_drawn(page, whole=True)
     page.get_by_role("button", name="New object").click()
     click_frame(page, 60, 60)
-    wait_for_toast(page, "drawer_2 gave way at the seam to drawer_3")
+    wait_for_toast(page, "drawer_2 now ends at the seam to drawer_3")
     until_drawn(page, whole=False)
     picture(page, "disputes-two")
     page.get_by_role("button", name="Delete drawer_3").click()

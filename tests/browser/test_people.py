@@ -72,7 +72,7 @@ def test_a_printed_address_that_was_used_says_what_to_do_and_wrong_passwords_are
         stranger = new_context()
         late = stranger.new_page()
         late.goto(address)
-        expect(late.get_by_text("a printed address opens one browser")).to_be_visible()
+        expect(late.get_by_text("each printed address works once, in one browser")).to_be_visible()
         assert "token" not in late.url
         picture(late, "22-address-used")
         late.goto(printed_again(address))

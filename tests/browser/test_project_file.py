@@ -36,7 +36,7 @@ def test_a_project_goes_to_another_person_as_one_file(new_context: NewContext, s
     post(page, f"/api/projects/{project}/comments", {"text": "a scratch"})
     page.get_by_role("button", name="Export…").press("Enter")
     dialog = page.get_by_role("dialog", name="Export Kitchen")
-    expect(dialog).to_contain_text("approvals stay here")
+    expect(dialog).to_contain_text("approvals are not exported")
     expect(dialog.get_by_label("With the recording")).to_be_checked()
     picture(page, "export")
     assert serious(page, "export") == []
@@ -55,7 +55,7 @@ def test_a_project_goes_to_another_person_as_one_file(new_context: NewContext, s
     import_file(page, "Kitchen.r2c2r.zip", light)
     expect(page.get_by_role("heading", name="The recording is missing")).to_be_visible()
     expect(page.get_by_role("alert")).to_contain_text("choose the recording it was made from")
-    expect(page.get_by_text("Kept until it is here: 1 object")).to_be_visible()
+    expect(page.get_by_text("Waiting for the recording: 1 object")).to_be_visible()
     picture(page, "recording-missing")
     assert serious(page, "overview") == []
     page.locator("r2c2r-overview > input").set_input_files({"name": "scan.r3d", "mimeType": "application/zip", "buffer": R3D})

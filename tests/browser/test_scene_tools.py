@@ -102,7 +102,7 @@ def test_a_click_in_the_scene_chooses_and_the_scene_stays(new_context: NewContex
     expect(page.get_by_role("button", name="Parallel")).to_have_attribute("aria-pressed", "true")
     page.get_by_role("button", name="Hide bottle_1 in the scene").click()
     expect(page.get_by_role("button", name="Show bottle_1 in the scene")).to_be_visible()
-    page.get_by_label("What is drawn of the scene").select_option("both")
+    page.get_by_label("Layers of the scene").select_option("both")
     picture(page, "scene-tools", still=True)
 
 
@@ -215,7 +215,7 @@ def test_a_section_looks_inside_colours_say_what_was_seen_and_a_comment_keeps_th
     left.press("ArrowRight")
     expect(section.locator("output").nth(0)).not_to_have_text(narrow)
     expect(left).to_be_focused()  # the next key moves it on, though the view has answered
-    page.get_by_label("What is drawn of the scene").select_option("unobserved")
+    page.get_by_label("Layers of the scene").select_option("unobserved")
     expect(page.locator(".heat-legend")).to_contain_text("50 cm from any observation")
     picture(page, "section")
 
@@ -225,11 +225,11 @@ def test_a_section_looks_inside_colours_say_what_was_seen_and_a_comment_keeps_th
     note = page.get_by_role("button", name="this side was never filmed", exact=True)
     expect(page.locator("r2c2r-comments")).to_contain_text("with a view")
     section.get_by_role("button", name="Show all").click()
-    page.get_by_label("What is drawn of the scene").select_option("meshes")
+    page.get_by_label("Layers of the scene").select_option("meshes")
     page.keyboard.press("5")
     note.click()
     expect(page.get_by_role("button", name="Scene", exact=True)).to_have_attribute("aria-pressed", "true")
-    expect(page.get_by_label("What is drawn of the scene")).to_have_value("unobserved")
+    expect(page.get_by_label("Layers of the scene")).to_have_value("unobserved")
     expect(left).to_have_value(share)
 
     page.get_by_label("Look from").select_option("run")
@@ -267,7 +267,7 @@ def test_a_tape_in_the_room_is_held_against_the_scan_and_rescales_it(new_context
     card.get_by_role("button", name="Rescale the recording").click()
     warning = page.get_by_role("dialog", name="Rescale the recording")
     expect(warning).to_contain_text("Every length of the recording changes by +1.0 %")
-    expect(warning).to_contain_text("Only one true length says so")
+    expect(warning).to_contain_text("Only one true length supports this")
     picture(page, "rescale")
     warning.get_by_role("button", name=re.compile(r"Multiply every length by 1\.010\d")).click()
     expect(card).to_contain_text("Every length is multiplied by 1.010")

@@ -683,12 +683,12 @@ test("a mask that leaves out a click on it or takes in one off it says so", () =
   );
   assert.match(
     contradictionsOn([columns(1, 0, 50, [click(60.5, 1)])])[0].text,
-    /leaves out a click/,
+    /lies outside its mask/,
   );
   assert.match(
     contradictionsOn([columns(1, 0, 50, [click(20.5, 1), click(30.5, 0)])])[0]
       .text,
-    /takes in a click/,
+    /lies inside its mask/,
   );
 });
 
@@ -716,7 +716,7 @@ test("an answer that a later one overtook is not taken, and one before a failure
 test("who gave way to whom is said by their names, and also that a front is whole again", () => {
   assert.equal(
     partedText("door_1", ["door_2", "door_3"]),
-    "door_1 gave way at the seam to door_2, door_3",
+    "door_1 now ends at the seam to door_2, door_3",
   );
   assert.equal(partedText("door_1", []), "door_1 has its whole front again");
 });

@@ -63,7 +63,7 @@ export class Cropper extends EventTarget {
     if (this.on) return this.#end();
     const { chosen } = this.#objects;
     if (!chosen) return say("Choose a thing first.");
-    if (chosen.front) return say("A crop box is for things: a front is set right in the elevation.");
+    if (chosen.front) return say("A crop box is for things. Correct a front on the Elevation page.");
     const crop = chosen.crop ?? (await this.#around(chosen.id));
     if (!crop) return say("It has no points yet: click the object first.");
     this.#object = chosen.id;

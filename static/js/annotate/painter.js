@@ -111,7 +111,7 @@ export class Painter extends EventTarget {
       ? changes.leaveFrame(this.project, object.id, frame)
       : changes.setFrame(this.project, object.id, frame, null);
     this.#local = null;
-    this.#store(change, `${object.name}: ${said ? "as found again" : "not visible"} in frame ${frame}`);
+    this.#store(change, `${object.name}: ${said ? "mask as found" : "not visible"} in frame ${frame}`);
     return undefined;
   }
 
@@ -134,7 +134,7 @@ export class Painter extends EventTarget {
     const coming = this.#isComing(object.id); // asked first: what is not there after that is not to come
     const before = await this.#maskOf(now);
     const where = `${object.name} in frame ${frame}`;
-    if (!before && coming) return say(`The mask of ${where} is not here yet: try again in a moment.`);
+    if (!before && coming) return say(`The mask of ${where} is still loading: try again in a moment.`);
     if (!before && !fromNothing) return say(`There is no mask of ${where}.`);
     const mask = alter(before ?? blank(size), size);
     const gone = isEmpty(mask);

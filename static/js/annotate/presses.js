@@ -58,7 +58,7 @@ export class Presses extends EventTarget {
     if (frame === undefined) return;
     if (this.#pinning) return this.#pin({ frame, x, y });
     if (this.#objects.current === null && label === 0)
-      return say("Left click on the object first: a right click takes away from the chosen one.");
+      return say("Left-click the object first: a right click removes from the chosen object.");
     const other = label === 1 && !hold ? this.#otherAt({ x, y }) : null;
     if (other) return this.#choose(other);
     this.#place([{ frame, x, y, label }], hold);
@@ -75,8 +75,10 @@ export class Presses extends EventTarget {
   #choose({ id, name }) {
     const { chosen } = this.#objects;
     this.#objects.choose(id);
-    say(`${name} is chosen: it is there already`, {
-      hint: chosen ? `Ctrl-click there belongs to ${chosen.name}` : "Ctrl-click or New object makes another one there",
+    say(`${name} is chosen: this spot already belongs to it`, {
+      hint: chosen
+        ? `Ctrl-click adds the spot to ${chosen.name}`
+        : "Ctrl-click or New object makes another object there",
     });
   }
 

@@ -10,14 +10,14 @@ import { SegmenterChip } from "./segmenter-chip.js";
 /** @type {[string, string, string][]} */
 const PAINTS = [
   ["brush", "Brush", "Paint the chosen object's mask in this frame (B)"],
-  ["eraser", "Eraser", "Take away from it (Shift B)"],
-  ["lasso", "Lasso", "Draw around what belongs to it (L)"],
-  ["polygon", "Polygon", "Click its corners, Enter closes it (O)"],
+  ["eraser", "Eraser", "Erase from its mask in this frame (Shift B)"],
+  ["lasso", "Lasso", "Lasso: draw around what belongs to it (L)"],
+  ["polygon", "Polygon", "Polygon: click its corners, Enter closes it (O)"],
 ];
 /** @type {[string, string, string, string][]} what it says, its icon, its name, what it does */
 const HERE = [
-  ["keep", "check", "Keep", "Its mask in this frame is right: it stands (W)"],
-  ["absent", "eye-off", "Not here", "It is not visible in this frame; again: as found (A)"],
+  ["keep", "check", "Keep", "Its mask in this frame is right: keep it (W)"],
+  ["absent", "eye-off", "Not here", "It is not visible in this frame; again restores its mask (A)"],
 ];
 
 export class StageTools extends EventTarget {

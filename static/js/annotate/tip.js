@@ -25,8 +25,8 @@ export class Tip {
 /** @param {Now} now */
 function textOf({ cropping, pinning, proposed, name }) {
   if (cropping)
-    return "Drag a side of the box, or choose one and press arrow keys; Esc ends. What lies outside is none of the object.";
-  if (pinning) return "Click where the comment belongs. Esc leaves it.";
+    return "Drag a side of the box, or choose one and press arrow keys; Esc ends. What lies outside does not belong to the object.";
+  if (pinning) return "Click where the comment belongs. Esc cancels.";
   if (proposed) return proposed;
   if (name === undefined)
     return "Click a drawer, a door or a thing, or draw a box around it. The first click starts a new object.";

@@ -158,7 +158,7 @@ export class AppShell extends LiveElement {
       : "";
     this.#online.hidden = live.connected && !outbox.stuck;
     this.#online.textContent = live.refusal
-      ? `This page is not told what others do: ${live.refusal}.${waiting}`
+      ? `Live updates are off: ${live.refusal}.${waiting}`
       : `The server does not answer; trying again.${waiting}`;
   }
 

@@ -54,7 +54,7 @@ export class BeforeRun {
       h("h2", {}, told.length ? "Mend this before the run" : "Before the run"),
       ...(told.length ? [lines(told)] : []),
       ...(coming
-        ? [h("p", { class: "muted" }, `${counted(coming, "object")} still being found: the run finds what is left.`)]
+        ? [h("p", { class: "muted" }, `${counted(coming, "object")} still being found: the run finds the rest.`)]
         : []),
       ...(unsure.length
         ? [

@@ -18,7 +18,7 @@ export function assetCard(inside, bundle) {
     "section",
     { class: "card stack" },
     h("h2", {}, "Each object alone"),
-    inside.assets.length ? assetTable(inside) : h("p", { class: "muted" }, "This bundle holds no object alone."),
+    inside.assets.length ? assetTable(inside) : h("p", { class: "muted" }, "This bundle has no separate objects."),
     ...(inside.robots.some((robot) => robot.map) ? [] : armLines(bundle)),
   );
 }
@@ -30,7 +30,7 @@ function armLines(bundle) {
     h(
       "p",
       { class: "muted" },
-      "A Franka Panda tries every joint where one is chosen on the overview before a run. On the bundle that you download, with films (pip install 'r2c2r[arm]'):",
+      "Choose a Franka Panda on the Overview before a run, and it tries every joint. To test a downloaded bundle, with films (pip install 'r2c2r[arm]'):",
     ),
     copyable(`r2c2r check ${bundle.file_name} --arm --films films/`, "the line that lets an arm try it"),
   ];
@@ -104,7 +104,7 @@ export function simulatorCard(inside, certificate) {
   return h(
     "section",
     { class: "card stack" },
-    h("h2", {}, "Take it into your simulator"),
+    h("h2", {}, "Load it in your simulator"),
     h("p", { class: "muted" }, "Unpack the bundle and run these in its folder."),
     ...inside.simulators.map((lines, k) => simulator(lines, certificate, k === 0)),
   );
@@ -118,7 +118,7 @@ export function simulatorCard(inside, certificate) {
 function simulator({ simulator: name, install, code, note, loader }, certificate, open) {
   const verdict = certificate?.loaders.find((result) => result.loader === loader);
   const tone = verdict?.state === "passed" ? "good" : verdict?.state === "failed" ? "bad" : "";
-  const tried = verdict ? `${verdict.loader}: ${verdict.state}` : "not tried by the certificate";
+  const tried = verdict ? `${verdict.loader}: ${verdict.state}` : "not tested by the certificate";
   return h(
     "details",
     { class: "simulator", name: "simulator", open },

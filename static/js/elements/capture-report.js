@@ -24,8 +24,8 @@ export function verdictCard(capture, notices) {
           "p",
           { class: "muted" },
           notices
-            ? "Poses, depth and colour agree frame by frame; what reading it noticed is listed below."
-            : "Poses, depth and colour agree; nothing stands in the way.",
+            ? "Poses, depth and colour agree frame by frame; remarks from reading it are listed below."
+            : "Poses, depth and colour agree; no problem was found.",
         ),
   );
 }

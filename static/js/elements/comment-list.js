@@ -54,7 +54,7 @@ export class CommentList extends LiveElement {
    */
   async ask(pin, about) {
     const names = await listNames(this.project).catch(() => []); // a comment can be written without
-    const label = names.length ? "What should change? @ names somebody" : "What should change?";
+    const label = names.length ? "What should change? @ mentions somebody" : "What should change?";
     const text = await askForText(`Comment on ${about}`, label, { button: "Comment", names });
     if (!text) return;
     try {

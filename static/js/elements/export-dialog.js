@@ -7,7 +7,7 @@ import { bytes } from "../lib/format.js";
 const WITHIN =
   "objects with their clicks, drawn fronts and painted masks, corrections, meshes that were uploaded, comments and true lengths";
 const NOT_WITHIN =
-  "Masks and results are computed again where it is imported. Members, verdicts and approvals stay here: there it is a draft.";
+  "Masks and results are computed again after the import. Members, verdicts and approvals are not exported: the imported project is a draft.";
 
 /**
  * Offer the download; the dialog closes with it.

@@ -36,7 +36,7 @@ function content(close) {
   return [
     h("div", { class: "row" }, h("h1", { class: "grow" }, "Keyboard and mouse"), shut),
     h("p", { class: "muted" }, MOUSE),
-    h("label", { class: "row" }, plain, "Letters alone are commands (the palette, Ctrl+K, works without)"),
+    h("label", { class: "row" }, plain, "Single letters are shortcuts (the palette, Ctrl+K, always works)"),
     h("div", { class: "keys" }, ...Object.entries(TITLES).map(([page, title]) => section(page, title))),
   ];
 }

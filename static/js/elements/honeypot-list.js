@@ -10,7 +10,7 @@ import { say, sayError } from "./toasts.js";
 /** @typedef {import("../api-types").HoneypotScore} HoneypotScore */
 
 const WHAT =
-  "The recording of a sample kitchen waits in somebody's inbox like any other; only admins are told, and see how what the person makes of it compares with what is really there. An object counts as found where its masks and the true ones have an IoU of 0.5 and more. The table of effort of such a project says it object by object. A sample that is kept to you (Overview) is met by nobody else.";
+  "The recording of a sample kitchen waits in somebody's inbox like any other. Only admins know, and see how the person's objects compare with the ground truth. An object counts as found where its masks and the true ones have an IoU of 0.5 and more. The table of effort of such a project gives the result for each object. Nobody else sees a sample whose only member is you (Overview).";
 const SAMPLE = "sample"; // what a synthetic kitchen names as its source
 const HEAD = ["Person", "Project", "Found", "On nothing", "Mask IoU", "Categories", "Effort"];
 

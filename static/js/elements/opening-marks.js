@@ -187,7 +187,7 @@ export class OpeningMarks extends EventTarget {
   /** @param {Leaf} leaf */
   #words(leaf) {
     const state = this.#state(leaf);
-    if (!state || !leaf.opening) return "not seen to open: say how far it stands open here";
+    if (!state || !leaf.opening) return "no opening was filmed: mark how far it is open here";
     return state.value === null ? "not known in this photo" : stateIn(leaf.opening, this.#photo?.frame ?? -1);
   }
 

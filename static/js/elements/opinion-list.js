@@ -12,7 +12,7 @@ import { say, sayError } from "./toasts.js";
 /** @typedef {import("../api-types").Opinion} Opinion */
 
 const WHAT =
-  "Somebody clicks a copy of this recording that begins without objects; then both are compared object by object.";
+  "Another person annotates a copy of this recording that starts without objects; then both are compared object by object.";
 
 export class OpinionList extends LiveElement {
   project = "";

@@ -21,8 +21,8 @@ import { sayError } from "./toasts.js";
 
 /** @type {Record<Look, string>} */
 const LEGENDS = {
-  outline: "Lines: edges of the model; faint: behind something.",
-  ghost: "The model over the photo; faint: behind something.",
+  outline: "Lines: edges of the model; faint where something covers them.",
+  ghost: "The model over the photo; faint where something covers it.",
   residual: "Red: the mesh stands before the measured surface. Blue: behind it. Full colour at 3 cm. Pale: they agree.",
 };
 /** @type {Record<Look, string>} */
@@ -378,7 +378,7 @@ export class PhotoCheck extends LiveElement {
 /** Why there is nothing to look at. @param {ObjectPhotos} all */
 function missing({ of }) {
   return of.length
-    ? "No mask of it yet: its photos are shown once it is found."
+    ? "No mask yet: the photos appear once the object is found."
     : "No model to lay over the photos yet: run the pipeline first.";
 }
 

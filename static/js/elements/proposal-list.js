@@ -313,7 +313,7 @@ export class ProposalList extends LiveElement {
 function likeNote({ name, kind }, count) {
   if (!count) return `No proposal is like ${name}. Click what is missing.`;
   const by = kind.sides ? "By category, size and handle." : "By category: it has no flat front to compare.";
-  return `${by} Enter confirms the highlighted one as ${kind.category}, Shift+Enter all so much alike, X dismisses, Esc ends.`;
+  return `${by} Enter confirms the highlighted one as ${kind.category}, Shift+Enter all that are as similar, X dismisses, Esc ends.`;
 }
 
 /** @param {Proposal} item */

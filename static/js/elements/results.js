@@ -121,7 +121,7 @@ export function certificateCard(certificate) {
     certificate.likeness ? likenessLine(certificate.likeness) : null,
     certificate.current
       ? null
-      : h("p", {}, `Of version ${certificate.version}: something was changed since, and the next run certifies that.`),
+      : h("p", {}, `Certificate of version ${certificate.version}: the next run certifies the changes made since.`),
     h("dl", { class: "facts" }, ...facts.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
     h(
       "div",

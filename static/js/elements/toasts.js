@@ -55,7 +55,7 @@ export function say(text, options) {
  * @param {ApiError} error
  */
 export function sayWaiting(error) {
-  say(error.message, { hint: `It goes on by itself in ${Math.ceil((error.retryMs ?? 0) / 1000)} s.` });
+  say(error.message, { hint: `Retrying in ${Math.ceil((error.retryMs ?? 0) / 1000)} s.` });
 }
 
 /**

@@ -95,8 +95,8 @@ export class TrueLengthList extends LiveElement {
 
   #none() {
     const how = this.#items.length
-      ? "Measure one or two edges in the room with a tape: the scan is held against them, and can be rescaled by them."
-      : "After the first run, edges that were measured in the room can be held against the scan here.";
+      ? "Measure one or two edges in the room with a tape: the scan is compared with them, and can be rescaled by them."
+      : "After the first run you can compare edges measured in the room with the scan here.";
     return h("p", { class: "muted" }, `${how} The tape of the review (T) keeps a length between any two points, too.`);
   }
 
@@ -211,7 +211,7 @@ export class TrueLengthList extends LiveElement {
   async #rescale(scale) {
     try {
       this.emit("rescaled", await readAgain(this.project, { scale }));
-      say("The recording is read again", { kind: "good", hint: "run the project once it is read" });
+      say("The recording is read again", { kind: "good", hint: "then run the project again" });
     } catch (error) {
       sayError(error);
     }

@@ -89,7 +89,7 @@ export class UnknownList extends HTMLElement {
 }
 
 const WHY =
-  "The database does not know these: it was lost, or an older copy was restored. Nothing of them is deleted by itself. Adopting " +
+  "These folders are not in the database: it was lost, or an older copy was restored. Nothing is deleted automatically. Adopting " +
   "makes a project with its clicks, verdicts, corrections, comments, recording and bundles; what is newer than the database is " +
   "added to its project, and can be undone.";
 const KINDS = { project: "project", newer: "newer than the database", upload: "upload", other: "no project" };

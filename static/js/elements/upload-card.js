@@ -33,7 +33,11 @@ export class UploadCard extends LiveElement {
     /** @param {number} fraction @param {boolean} waiting */
     const show = (fraction, waiting) => {
       bar.value = fraction;
-      state.textContent = waiting ? "no connection: it goes on by itself" : fraction === 1 ? "looking at it…" : "";
+      state.textContent = waiting
+        ? "no connection: the upload resumes by itself"
+        : fraction === 1
+          ? "looking at it…"
+          : "";
     };
     try {
       return await uploadRecording(file, show, controller.signal, project);

@@ -14,7 +14,8 @@ import { sayError } from "./toasts.js";
 /** @typedef {import("../api-types").VariantSet} VariantSet */
 /** @typedef {import("../api-types").VariantsOffer} VariantsOffer */
 
-const WHAT = "Sizes, masses, friction, colours and poses drawn anew; all share the bundle's meshes and textures.";
+const WHAT =
+  "Sizes, masses, friction, colours and poses are drawn at random; all variants share the bundle's meshes and textures.";
 
 export class VariantSets extends LiveElement {
   project = "";
@@ -114,7 +115,9 @@ export class VariantSets extends LiveElement {
     const made = sets.some((one) => one.version === offer.version && one.count === count && one.seed === seed);
     const { text, fits } = variantsTake(offer, this.#count.validity.valid ? count : 0);
     this.#make.disabled = made || !fits;
-    this.#take.textContent = made ? `These are below: another seed gives others. ${most}` : `${text} ${most}`;
+    this.#take.textContent = made
+      ? `These variants are listed below: another seed gives others. ${most}`
+      : `${text} ${most}`;
   }
 
   /** @param {VariantSet} made */

@@ -228,7 +228,7 @@ export class FrontEdits {
       corners: plane.cornersOf(elevation, rect),
     }));
     if (make.length) this.#fronts.do({ make });
-    else say("No panel was cut here that has no front yet.");
+    else say("Every panel cut here has a front already.");
   }
 
   addByKey() {

@@ -143,7 +143,7 @@ export class FrontPane extends EventTarget {
     set(this.#hinge, leading?.hinge ?? "");
     set(this.#handle, leading?.handle === "none" ? "none" : leading?.handle && leading.drawn ? "drawn" : "");
     this.#copy.hidden = !leading || chosen.size < 2;
-    this.#copy.title = `Those of ${leading?.name}, to the other chosen fronts`;
+    this.#copy.title = `Copy those of ${leading?.name} to the other chosen fronts`;
     this.#adopt.hidden = cut === 0;
     this.#adopt.textContent = cut === 1 ? "Take the cut panel (A)" : `Take ${cut} cut panels (A)`;
     renew(this.#list, ...inOrder(fronts).map((front) => this.#row(front, chosen.has(front.key), paint(front))));

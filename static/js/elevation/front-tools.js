@@ -6,8 +6,8 @@ import { h, segments } from "../dom.js";
 
 /** @type {[Tool, string, string][]} */
 const TOOLS = [
-  ["seam", "Seam │", "Click a front: an upright seam there (S at the pointer)"],
-  ["level-seam", "Seam ─", "Click a front: a level seam there (Shift S at the pointer)"],
+  ["seam", "Seam │", "Click a front to split it by a vertical seam (S at the pointer)"],
+  ["level-seam", "Seam ─", "Click a front to split it by a horizontal seam (Shift S at the pointer)"],
   ["handle", "Handle", "Click where the handle is (K at the pointer)"],
   ["hinge", "Hinge", "Click near the side it turns on (J at the pointer)"],
 ];

@@ -78,9 +78,9 @@ function disobeyed({ object, mask, pixels, clicks }) {
   const taken = clicks.some((click) => click.label === 0 && near(mask, pixels, click, 0));
   return [
     ...(missed
-      ? [{ object, text: "Its mask leaves out a click on it: take that away, or click nearer to its middle" }]
+      ? [{ object, text: "A click on it lies outside its mask: remove the click, or click nearer to its middle" }]
       : []),
-    ...(taken ? [{ object, text: "Its mask takes in a click off it: click off it in a second place there" }] : []),
+    ...(taken ? [{ object, text: "A click off it lies inside its mask: click off it in a second place there" }] : []),
   ];
 }
 

@@ -37,7 +37,7 @@ export function rescaleNotes({ lengths, scale, scale_wanted: wanted, mean_error,
     `Every length of the recording changes by ${signedPercent(factor - 1)}: depth, the camera's path, all objects.`,
     ...(moved.length ? [`The longest sides become: ${moved.join(", ")}.`] : []),
     `The true lengths are off by ${percent(mean_error)} on average, and by ${percent(mean_error_scaled)} afterwards.`,
-    ...(compared === 1 ? ["Only one true length says so: measure another one, in another direction."] : []),
+    ...(compared === 1 ? ["Only one true length supports this: measure another one, in another direction."] : []),
     "The recording is read again; clicks stay, masks and results are computed anew.",
     "Sizes and places that somebody typed stay as they were typed.",
   ];

@@ -6,5 +6,5 @@
  */
 export function partedText(name, others) {
   if (others.length === 0) return `${name} has its whole front again`;
-  return `${name} gave way at the seam to ${others.join(", ")}`;
+  return `${name} now ends at the seam to ${others.join(", ")}`;
 }

@@ -47,7 +47,7 @@ export class AgreementPage extends LiveElement {
       h(
         "p",
         { class: "muted" },
-        `Objects are paired by their masks, over ${counted(found.frames, "frame")}. Mask IoU: pixels in both masks of the pixels in either, over all of these frames; a frame in which only one of the two has a mask counts against it.`,
+        `Objects are paired by their masks, over ${counted(found.frames, "frame")}. Mask IoU: pixels in both masks divided by pixels in either, over all of these frames; a frame in which only one of the two has a mask counts against it.`,
       ),
       objects.length ? this.#table(found) : h("p", {}, "Neither has a mask yet."),
       unmasked(found),
@@ -122,5 +122,5 @@ function link(object, project) {
 function unmasked({ unmasked: objects }) {
   if (!objects.length) return "";
   const names = objects.map(({ name }) => name).join(", ");
-  return h("p", { class: "muted" }, `Without a mask, and so in neither: ${names}.`);
+  return h("p", { class: "muted" }, `Not compared, as they have no mask: ${names}.`);
 }

@@ -195,7 +195,7 @@ export class DownloadPage extends LiveElement {
       try {
         const found = await compareBundles(this.project, bundle.version, before?.version ?? bundle.version);
         const lines = found.map(({ object, text }) => h("li", {}, object ? h("strong", {}, object) : "", ` ${text}`));
-        changes.replaceChildren(lines.length ? h("ul", { class: "plain" }, ...lines) : "nothing a person would see");
+        changes.replaceChildren(lines.length ? h("ul", { class: "plain" }, ...lines) : "no visible change");
       } catch (error) {
         sayError(error);
       }

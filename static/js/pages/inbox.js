@@ -64,7 +64,7 @@ export class InboxPage extends LiveElement {
   #object({ project, object, name, category, review_state, at }) {
     const done = h("button", { type: "button", class: "quiet", "data-at": `done:${object}` }, "Done");
     done.setAttribute("aria-label", `Done: ${name}`);
-    done.title = "It is assigned to nobody then";
+    done.title = "Removes it from your inbox: it is then assigned to nobody";
     done.addEventListener("click", () => assignObject(project, object, null).then(() => this.#load(), sayError));
     const page = REVIEWED.includes(review_state) ? "review" : "annotate";
     return h(

@@ -105,7 +105,7 @@ export class OverviewPage extends LiveElement {
     return h(
       "p",
       {},
-      made ? `Kept until it is here: ${counted(made, "object")}, and what people said. ` : "",
+      made ? `Waiting for the recording: ${counted(made, "object")}, with their comments. ` : "",
       h("button", { type: "button", class: "primary", onClick: () => this.#picker.click() }, "Choose the recording"),
     );
   }
@@ -226,8 +226,8 @@ export class OverviewPage extends LiveElement {
     const beside = capture.remarks.some((remark) => BESIDE.has(remark.cause));
     if (!beside && !project.register_depth) return null;
     const said = project.register_depth
-      ? "Depth was moved onto the colour images when the recording was read."
-      : "Depth can be moved onto the colour images by the fit above: the recording is read again, clicks stay.";
+      ? "Depth was registered to the colour images when the recording was read."
+      : "Depth can be registered to the colour images by the fit above: the recording is read again, clicks stay.";
     const button = h(
       "button",
       { type: "button" },

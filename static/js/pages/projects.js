@@ -292,7 +292,7 @@ export class ProjectsPage extends LiveElement {
       if (wanted && wanted !== name) await changeProject(id, { name: wanted });
     },
     tag: async ({ id, name, tags }) => {
-      const label = "Words to find it by, with commas between them";
+      const label = "Tags, separated by commas";
       const given = await askForText(`Tags of ${name}`, label, {
         button: "Keep",
         required: false,

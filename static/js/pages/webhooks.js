@@ -133,9 +133,9 @@ export class WebhooksPage extends LiveElement {
 
   /** @param {Webhook} webhook */
   #remove({ id, url }) {
-    if (!confirm(`Remove ${url}? What waits for it is not sent.`)) return;
+    if (!confirm(`Remove ${url}? Pending messages are not sent.`)) return;
     this.#secret.hidden = true;
-    removeWebhook(id).then(() => (say(`${url} hears of nothing any more`, { kind: "good" }), this.#load()), sayError);
+    removeWebhook(id).then(() => (say(`${url} is removed`, { kind: "good" }), this.#load()), sayError);
   }
 
   async #drawForm() {
@@ -173,7 +173,7 @@ export class WebhooksPage extends LiveElement {
     this.#secret.hidden = false;
     this.#secret.replaceChildren(
       h("h2", {}, `Secret of ${url}`),
-      h("p", {}, "It signs what is posted there, and is shown this once."),
+      h("p", {}, "It signs every message to this address, and is shown only once."),
       h("div", { class: "row form" }, h("label", {}, "Secret", field), copy, seen),
     );
     field.focus();
@@ -182,8 +182,8 @@ export class WebhooksPage extends LiveElement {
 }
 
 const WHAT =
-  "r2c2r posts to these addresses when a run ends and when a project's review state changes, signed with the secret of each, and again " +
-  "for two days until it is answered with a 2xx.";
+  "r2c2r posts to these addresses when a run ends and when a project's review state changes, signed with the secret of each. It retries " +
+  "for two days until the address answers with a 2xx.";
 
 /**
  * @param {string[]} titles

@@ -154,7 +154,7 @@ export class Centre extends EventTarget {
   async #keepLength() {
     const [points, typed] = [
       this.#tape,
-      await askForText("True length", "What does a tape say in the room? In mm, then what it is of", {
+      await askForText("True length", "Length measured in the room in mm, then what was measured", {
         button: "Keep",
         value: "",
       }),

@@ -126,7 +126,7 @@ export class CandidateCompare extends LiveElement {
     const { tolerance, longest_m: longest } = this.#found;
     const far =
       longest === null ? `${100 * tolerance} % of the longest side` : `${Math.round(1000 * tolerance * longest)} mm`;
-    return `Orange: further than ${far} from ${this.#against}, once their fronts lie on each other.`;
+    return `Orange: more than ${far} away from ${this.#against}, with their fronts aligned.`;
   }
 
   /** @param {CandidateGroup} group @param {Candidate} candidate */

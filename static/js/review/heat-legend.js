@@ -5,7 +5,12 @@ import { h } from "../dom.js";
 /** By what is drawn: its class, the ends of its scale, and what is to be known of it. @type {Record<string, [string, string, string, string]>} */
 const SCALES = {
   distance: ["viridis", "0 mm", "30 mm from the scan", "Grey: nothing was measured within 60 mm."],
-  unobserved: ["magma", "observed", "50 cm from any observation", "What is light was made up: nobody filmed it."],
+  unobserved: [
+    "magma",
+    "observed",
+    "50 cm from any observation",
+    "Light surfaces were not filmed: their shape is inferred.",
+  ],
 };
 
 /** @param {string | undefined} draw */

@@ -45,7 +45,7 @@ export class ViewBar extends EventTarget {
   moving = false;
   full = false;
   #opacity = h("input", { type: "range", min: "0", max: "100", value: "85", "aria-label": "Opacity of the mesh" });
-  #draw_as = h("select", { "aria-label": "What is drawn of the scene" });
+  #draw_as = h("select", { "aria-label": "Layers of the scene" });
   #look = h("select", { "aria-label": "Look from" });
   #measure = toggle("Measure", () => this.toggleMeasure());
   /** What the tape says. */
@@ -82,7 +82,7 @@ export class ViewBar extends EventTarget {
     });
     this.#section.title = "Cut the scene and the scan by a box, to look inside";
     this.clip.addEventListener("change", () => this.#say());
-    this.#parallel.title = "Seen from so far off, through a long lens, that parallel lines stay parallel";
+    this.#parallel.title = "Parallel projection: parallel lines stay parallel";
     const modes = segments("View", ...this.#modes.map(({ button }) => button));
     const spring = h("span", { class: "spring" });
     this.element.append(
