@@ -69,7 +69,7 @@ def _refuse_two_of_a_name(members: list[zipfile.ZipInfo]) -> None:
     seen: set[str] = set()
     for member in members:
         if member.filename in seen:
-            raise CaptureError(f"the archive holds two files named {member.filename[:80]!r}", hint="pack the folder anew")
+            raise CaptureError(f"the archive holds two files named {member.filename[:80]!r}", hint="pack the folder again")
         seen.add(member.filename)
 
 

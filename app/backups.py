@@ -38,7 +38,7 @@ def backup(data_dir: Path, target: Path, *, progress: Progress = SILENT) -> Move
     """
     settings, target = Settings(data_dir=resolved(data_dir)), target.expanduser().absolute()
     if target.exists():
-        raise InputError(f"{target}: is there already", hint="choose a new name: backups are never written over")
+        raise InputError(f"{target}: is there already", hint="choose a new name: backups are never overwritten")
     size = _require_rows(settings)
     only_database = target.suffix == ".db"
     files = 0 if only_database else folder_bytes(_projects(settings))
@@ -62,11 +62,11 @@ def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> Mov
     settings, source = Settings(data_dir=resolved(data_dir)), source.expanduser().absolute()
     database = source / DATABASE if source.is_dir() else source
     if not database.is_file():
-        raise InputError(f"{database}: no such file", hint="name a .db file or a folder that r2c2r backup made")
+        raise InputError(f"{database}: no such file", hint="give a .db file or a folder made by r2c2r backup")
     if database.resolve() == settings.database:
-        raise Conflict(f"{database}: that is the database itself", hint="name a backup")
+        raise Conflict(f"{database}: this is the database itself", hint="name a backup")
     if settings.postgres:
-        raise Conflict("the rows are in a Postgres", hint=f"r2c2r db restore {database}, and copy the folder projects/")
+        raise Conflict("the database is a Postgres", hint=f"r2c2r db restore {database}, and copy the folder projects/")
     require_usable(database, to_write=False)
     keep_private(settings.data_dir, DATABASE)
     with only_server(settings.data_dir):
@@ -88,7 +88,7 @@ def _require_rows(settings: Settings) -> int:
     if settings.postgres:
         return 0
     if not settings.database.is_file():
-        raise InputError(f"{settings.database}: no such file", hint="name the data folder: r2c2r backup DATA -o OUT")
+        raise InputError(f"{settings.database}: no such file", hint="give the data folder: r2c2r backup DATA -o OUT")
     require_usable(settings.database)
     return settings.database.stat().st_size
 

@@ -42,12 +42,12 @@ def check_data(data_dir: Path, *, progress: Progress = SILENT) -> list[DataFindi
     """
     settings = Settings(data_dir=resolved(data_dir))
     if settings.postgres:  # a file beside it would predate the move of the rows
-        raise InputError("the rows are in a Postgres, and check-data looks into a file", hint="r2c2r db check")
+        raise InputError("the database is a Postgres; check-data reads SQLite files only", hint="r2c2r db check")
     if not settings.data_dir.is_dir():
         raise InputError(f"{data_dir}: no such folder", hint="name the data folder")
     revision = require_usable(settings.database, to_write=False)
     if revision is None:
-        raise InputError(f"{settings.database}: no database yet", hint="r2c2r serve begins one; is it the right folder?")
+        raise InputError(f"{settings.database}: no database yet", hint="r2c2r serve makes one; is this the right folder?")
     progress.at(0.0, "reading the database")
     found = [*_modes(settings), *_revision(settings.database, revision), *_damage(settings.database)]
     with (
@@ -94,7 +94,7 @@ def _damage(database: Path) -> Iterator[DataFinding]:
             if said != "ok":
                 yield DataFinding("damaged", str(database), said)
         for table, row, parent, _ in connection.execute("PRAGMA foreign_key_check"):
-            yield DataFinding("damaged", str(database), f"row {row} of {table} belongs to a row of {parent} that is not there")
+            yield DataFinding("damaged", str(database), f"row {row} of {table} refers to a missing row of {parent}")
 
 
 def _missing(session: Session, settings: Settings, progress: Progress) -> Iterator[DataFinding]:
@@ -121,11 +121,13 @@ def _bundles(session: Session, project: Project, files: ProjectFiles) -> Iterato
         if not kept.is_file():
             yield DataFinding("missing", str(kept), f"bundle {row.version} of {project.name}")
         elif _sha256(kept) != row.sha256:
-            yield DataFinding("damaged", str(kept), f"bundle {row.version} of {project.name}: other bytes than were certified")
+            yield DataFinding(
+                "damaged", str(kept), f"bundle {row.version} of {project.name}: its bytes differ from the certified ones"
+            )
     known = {row.path for row in rows}
     for kept in files.bundles.glob("v*.zip"):
         if kept.name not in known:
-            yield DataFinding("unknown", str(kept), f"a bundle of {project.name} that the database does not know")
+            yield DataFinding("unknown", str(kept), f"a bundle of {project.name} that is not in the database")
 
 
 def _description(session: Session, project: Project, files: ProjectFiles) -> Iterator[DataFinding]:
@@ -138,7 +140,9 @@ def _description(session: Session, project: Project, files: ProjectFiles) -> Ite
         yield DataFinding("missing", str(files.description), f"what {project.name} is; `r2c2r serve` writes it")
         return
     if then != changed(session, project):
-        yield DataFinding("outdated", str(files.description), f"it is not of what the database says of {project.name}")
+        yield DataFinding(
+            "outdated", str(files.description), f"it does not match what the database stores about {project.name}"
+        )
 
 
 def _unknown(session: Session, settings: Settings) -> Iterator[DataFinding]:
@@ -147,10 +151,10 @@ def _unknown(session: Session, settings: Settings) -> Iterator[DataFinding]:
     for folder in (settings.data_dir / "projects").glob("*"):
         half_made = project_files(settings.data_dir, folder.name).half_made
         if folder.name not in projects and not (half_made and folder.name in uploads):
-            yield DataFinding("unknown", str(folder), "a project's folder that the database does not know")
+            yield DataFinding("unknown", str(folder), "a project's folder that is not in the database")
     for path in settings.uploads.glob("*"):
         if path.stem not in uploads and not half_received(path):
-            yield DataFinding("unknown", str(path), "bytes of an upload that the database does not know")
+            yield DataFinding("unknown", str(path), "bytes of an upload that is not in the database")
     for path in settings.unknown.glob("*"):
         yield DataFinding("unknown", str(path), "set aside; an admin can adopt it on the page Projects")
 

@@ -206,7 +206,7 @@ def inside(root: Path, *parts: str) -> Path:
     base = root.resolve()
     path = base.joinpath(*parts).resolve()
     if not path.is_relative_to(base):
-        raise Forbidden("the path leads out of the project")
+        raise Forbidden("the path leaves the project's folder")
     return path
 
 
@@ -266,7 +266,7 @@ def only_server(data_dir: Path) -> Iterator[Callable[[dict[str, Any]], None]]:
         except OSError as error:
             owner = _said_in(handle).get("process", "unknown")
             raise EnvironmentProblem(
-                f"{data_dir}: another r2c2r serves this folder (process {owner})", hint="use that one, or another --data"
+                f"{data_dir}: another r2c2r serves this folder (process {owner})", hint="use that server, or another --data"
             ) from error
 
         def announce(facts: dict[str, Any]) -> None:

@@ -53,7 +53,7 @@ class Gate:
         asker = self._askers.get(who)
         if asker is not None and asker.taken >= self._each:
             raise TooMany(
-                f"{asker.taken} {self._what} are under way already, at most {self._each} at a time",
+                f"{asker.taken} {self._what} are already running, at most {self._each} at a time",
                 hint=f"try again in {self._retry_s} s",
                 retry_s=self._retry_s,
             )

@@ -31,7 +31,7 @@ class JsonLines(logging.Formatter):
 def log_as(kind: str) -> None:
     """Send all loggers of this process to stderr from `info` on, in R2C2R_LOG's format; raises InputError if it is unknown."""
     if kind != "json":
-        raise InputError(f"R2C2R_LOG {kind[:40]!r}: not json", hint="leave it out for warnings in words")
+        raise InputError(f"R2C2R_LOG {kind[:40]!r}: not json", hint="leave it out for plain text")
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonLines())
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)

@@ -21,7 +21,7 @@ from r2c2r_core.errors import InputError
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 TOTAL_S = 10.0  # from connecting to the answer's last header
 PORTS = {"http": 80, "https": 443}
-ALLOW = "who runs this server can allow a network: R2C2R_WEBHOOKS_TO=10.1.0.0/16"
+ALLOW = "the server's operator can allow a network: R2C2R_WEBHOOKS_TO=10.1.0.0/16"
 
 
 def networks(text: str) -> tuple[Network, ...]:

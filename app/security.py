@@ -122,19 +122,24 @@ class Guard:
         if person is None and not _brings_token(scope):
             return session, None, (401, "unauthorised", "no session", NO_SESSION)
         if person is not None and not _reaches(person, scope):
-            said = f"this token is for {person.scope} alone"
-            return session, None, (403, "forbidden", said, "make another one: r2c2r token add")
+            said = f"this token allows only {person.scope}"
+            return session, None, (403, "forbidden", said, "make another token: r2c2r token add")
         return session, person, None
 
     def _misnamed(self, scope: Scope, named: Sequence[str]) -> Refusal | None:
         """Reason to reject the user header, which must come only from a trusted proxy; None if it is valid."""
         if named and not scope.get("state", {}).get("proxied"):
             _log.warning("%s from %s, which is no trusted proxy: refused", self.named_in, _client(scope))
-            said = f"{self.named_in} is believed of trusted proxies alone, and this came from {_client(scope)}"
-            return 403, "forbidden", said, "come by the proxy's address; R2C2R_TRUSTED_PROXIES says which proxies are trusted"
+            said = f"{self.named_in} is accepted only from trusted proxies, and this request came from {_client(scope)}"
+            return 403, "forbidden", said, "open the proxy's address; R2C2R_TRUSTED_PROXIES lists the trusted proxies"
         if len(named) > 1:
             _log.warning("%s twice in a request that a trusted proxy passed on: refused", self.named_in)
-            return 403, "forbidden", f"{self.named_in} stands twice in the request", "the proxy must replace it, not add to it"
+            return (
+                403,
+                "forbidden",
+                f"{self.named_in} occurs twice in the request",
+                "the proxy must replace the header, not add a second one",
+            )
         return None
 
     def _foreign(self, scope: Scope, headers: Headers, *, by_token: bool) -> Refusal | None:

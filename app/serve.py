@@ -64,7 +64,9 @@ def serve(
     settings = replace(settings, heavy_jobs=heavy_jobs, workers=workers, max_upload_bytes=max_upload_bytes, quotas=quotas)
     settings = replace(settings, import_roots=(*settings.roots, *(resolved(folder) for folder in import_from)))
     if heavy_jobs == 0 and not settings.postgres:
-        raise InputError("--jobs 0: no other machine takes jobs from a file", hint="leave it out, or set R2C2R_DATABASE")
+        raise InputError(
+            "--jobs 0: other machines cannot take jobs from a SQLite file", hint="leave it out, or set R2C2R_DATABASE"
+        )
     if settings.log:
         log_as(settings.log)
     require_store(settings)
@@ -183,7 +185,7 @@ def _settings(data_dir: Path, host: str, names: Sequence[str], proxies: tuple[st
 def _check_identity(settings: Settings) -> None:
     """Raise InputError where no proxy could be trusted to identify users, or no role assigned."""
     if settings.identity_header and not settings.trusted_proxies:
-        hint = "R2C2R_TRUSTED_PROXIES=ADDRESS, or --behind-proxy ADDRESS, says which proxy is"
+        hint = "name the proxy with R2C2R_TRUSTED_PROXIES=ADDRESS or --behind-proxy ADDRESS"
         raise InputError(f"R2C2R_IDENTITY {settings.identity}: no proxy is trusted", hint=hint)
     accounts.known_role(settings.default_role)
     if settings.identity_issuer:
@@ -198,8 +200,8 @@ def _require_accounts(engine: Engine, proxies: Sequence[str]) -> None:
         )
     if not proxies:
         sys.stderr.write(
-            "r2c2r: passwords and scans cross the network as they are; put it behind a proxy that speaks TLS, and say which: "
-            "--behind-proxy ADDRESS, else all people are one address to it\n"
+            "r2c2r: passwords and scans cross the network unencrypted; put the server behind a TLS proxy and name it with "
+            "--behind-proxy ADDRESS, otherwise all requests seem to come from one address\n"
         )
 
 
@@ -242,11 +244,11 @@ def _bound(host: str, port: int) -> Iterator[socket.socket]:
             listening.bind((host, port))
         except (TypeError, UnicodeError) as error:  # a name that IDNA cannot encode
             raise EnvironmentProblem(
-                f"cannot listen on {host[:60]!r}: no host's name or address", hint="check --host"
+                f"cannot listen on {host[:60]!r}: not a host name or address", hint="check --host"
             ) from error
         except OSError as error:
             if error.errno == errno.EADDRINUSE:
-                hint = f"stop what uses it, or choose another one: --port {port + 1}"
+                hint = f"stop the program that uses it, or choose another port: --port {port + 1}"
                 raise EnvironmentProblem(f"port {port} is taken", hint=hint) from error
             hint = "choose a port above 1023" if error.errno == errno.EACCES else "check --host and --port"
             raise EnvironmentProblem(f"cannot listen on {host}:{port}: {error.strerror}", hint=hint) from error

@@ -41,7 +41,7 @@ def quotas_from(wishes: Sequence[str]) -> Quotas:
         name, _, number = wish.partition("=")
         if name not in names or not number.isdecimal() or len(number) > 9:
             raise InputError(
-                f"--quota {wish[:80]!r}: not NAME=N", hint=f"NAME is one of {', '.join(names)}; N is what one may have"
+                f"--quota {wish[:80]!r}: not NAME=N", hint=f"NAME is one of {', '.join(names)}; N is the limit per person"
             )
         wanted[name] = int(number)
     return Quotas(**wanted)

@@ -37,8 +37,8 @@ def work(*, data_dir: Path, heavy_jobs: int = 1, workers: int = 0, live: bool = 
     """
     settings = Settings(data_dir=resolved(data_dir), heavy_jobs=heavy_jobs, workers=workers)
     if not settings.postgres:
-        hint = "R2C2R_DATABASE=postgresql+psycopg://USER@HOST/NAME, as where it is served; r2c2r db move takes rows there"
-        raise EnvironmentProblem("the rows are in a file, which one machine holds", hint=hint)
+        hint = "R2C2R_DATABASE=postgresql+psycopg://USER@HOST/NAME, as for r2c2r serve; r2c2r db move copies the rows there"
+        raise EnvironmentProblem("the database is in a file (SQLite), which only one machine can use", hint=hint)
     if settings.log:
         log_as(settings.log)
     require_store(settings)

@@ -268,4 +268,4 @@ def _refuse_taken_name(session: Session, item: SceneObject, wanted: State) -> No
         SceneObject.project_id == item.project_id, SceneObject.id != item.id, col(SceneObject.deleted).is_(False)
     )
     if any(other.casefold() == name.casefold() for other in session.exec(others)):
-        raise Conflict(f"another object is called '{name}' by now", hint="rename that one first")
+        raise Conflict(f"another object is now called '{name}'", hint="rename that one first")

@@ -36,7 +36,7 @@ def _migrate_server(engine: Engine, revision: str) -> None:
         now = MigrationContext.configure(connection).get_current_revision()
         if now is not None and now not in known:
             found = f"revision {now}, where this r2c2r knows {known[0]} to {known[-1]}"
-            raise DatabaseUnusable(f"{shown(engine.url)}: {found}", hint="use the r2c2r that made it")
+            raise DatabaseUnusable(f"{shown(engine.url)}: {found}", hint="use the version of r2c2r that made it")
         if _is_newest(now, revision):
             return
         config.attributes["connection"] = connection
@@ -57,7 +57,7 @@ def _migrate_file(engine: Engine, revision: str) -> None:
         command.upgrade(config, revision)
         loose = _loose_rows(connection) - before
         if loose > 0:  # the transaction is rolled back
-            found = f"{loose} rows would refer to what is not there in revision {revision}"
+            found = f"{loose} rows would refer to missing rows in revision {revision}"
             raise DatabaseUnusable(f"{engine.url.database}: {found}, none expected", hint=RESTORE)
 
 

@@ -47,7 +47,7 @@ def move(source: str, target: str, *, progress: Progress = SILENT) -> list[Table
     """
     source_at, target_at = _address(source), _address(target)
     if isinstance(target_at, Path) and target_at.exists():
-        raise Conflict(f"{target_at}: is there already", hint="choose a new name: no database is written over")
+        raise Conflict(f"{target_at}: is there already", hint="choose a new name: databases are never overwritten")
     with _at_rest(source_at), opened(source_at) as old:
         return _into(old, target_at, progress)
 
@@ -56,7 +56,7 @@ def backup(data_dir: Path, target: Path, *, progress: Progress = SILENT) -> None
     """Write the rows to one SQLite file, even while a server runs; raises InputError where there are none."""
     settings = Settings(data_dir=resolved(data_dir))
     if target.exists():
-        raise Conflict(f"{target}: is there already", hint="choose a new name: backups are never written over")
+        raise Conflict(f"{target}: is there already", hint="choose a new name: backups are never overwritten")
     copy_rows(settings, target.absolute(), progress)
 
 
@@ -73,7 +73,7 @@ def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> lis
     """Copy a SQLite file's rows into the empty Postgres of the settings."""
     settings = Settings(data_dir=resolved(data_dir))
     if isinstance(settings.rows, Path):
-        raise InputError("R2C2R_DATABASE is not set: the rows are a file", hint=f"r2c2r restore {source} {data_dir}")
+        raise InputError("R2C2R_DATABASE is not set: the database is a file", hint=f"r2c2r restore {source} {data_dir}")
     return move(str(source), settings.rows, progress=progress)
 
 
@@ -89,7 +89,9 @@ def check(data_dir: Path) -> list[TableRows]:
         if found != revisions()[-1]:
             raise DatabaseUnusable(f"revision {found}, expected {revisions()[-1]}", hint="start this r2c2r once: it migrates")
         if differing := compare_metadata(context, SQLModel.metadata):
-            raise DatabaseUnusable(f"other tables than expected: {str(differing[0])[:200]}", hint="restore a backup")
+            raise DatabaseUnusable(
+                f"the tables differ from the expected ones: {str(differing[0])[:200]}", hint="restore a backup"
+            )
         return [_held(connection, table) for table in _kept_tables()]
 
 
@@ -122,14 +124,16 @@ def _copied(old: Engine, new: Engine, progress: Progress) -> list[TableRows]:
         reads, writes = source.connection(), target.connection()
         filled = [table.name for table in tables if writes.execute(select(table).limit(1)).first()]
         if filled:
-            raise Conflict(f"{shown(new.url)}: {', '.join(filled)} hold rows", hint="name an empty database")
+            raise Conflict(f"{shown(new.url)}: {', '.join(filled)} hold rows", hint="choose an empty database")
         for number, table in enumerate(tables):
             progress.at(number / len(tables), f"rows of {table.name}")
             for rows in _rows(reads, table):
                 writes.execute(_insert(table, new), rows)
             before, after = _held(reads, table), _held(writes, table)
             if before != after:
-                raise DatabaseUnusable(f"{table.name}: {after.rows} rows arrived of {before.rows}, or others", hint="report it")
+                raise DatabaseUnusable(
+                    f"{table.name}: {after.rows} of {before.rows} rows arrived, or their content differs", hint="report it"
+                )
             _go_on_counting(writes, table, _counted(reads, table))
             held.append(after)
     return held

@@ -76,7 +76,7 @@ def claim(session: Session) -> None:
     if sending is not None:
         row = {"digest": sending.digest, "request": sending.request, "project_id": sending.project_id, "at": time.time()}
         if not session.connection().execute(_CLAIM, {**row, "answer": ""}).rowcount:
-            raise Conflict("this change is stored already", hint="look at what is there now")
+            raise Conflict("this change is stored already", hint="check the current state")
 
 
 def keep_answer(session: Session, body: str) -> None:

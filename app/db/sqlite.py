@@ -15,10 +15,16 @@ _FAULTS = {
     sqlite3.SQLITE_NOTADB: ("no database", RESTORE),
     sqlite3.SQLITE_CORRUPT: ("a damaged database", RESTORE),
     sqlite3.SQLITE_ERROR: ("a database that lacks something", RESTORE),
-    sqlite3.SQLITE_IOERR: ("the disk does not read or write it", "look after the disk before anything else"),
-    sqlite3.SQLITE_READONLY: ("may not be written", "make it and its folder yours, or choose another data folder"),
-    sqlite3.SQLITE_PERM: ("may not be opened", "make it and its folder yours, or choose another data folder"),
-    sqlite3.SQLITE_CANTOPEN: ("may not be opened", "make it and its folder yours, or choose another data folder"),
+    sqlite3.SQLITE_IOERR: ("the disk does not read or write it", "check the disk first"),
+    sqlite3.SQLITE_READONLY: (
+        "may not be written",
+        "make yourself the owner of it and its folder, or choose another data folder",
+    ),
+    sqlite3.SQLITE_PERM: ("may not be opened", "make yourself the owner of it and its folder, or choose another data folder"),
+    sqlite3.SQLITE_CANTOPEN: (
+        "may not be opened",
+        "make yourself the owner of it and its folder, or choose another data folder",
+    ),
 }
 
 

@@ -34,8 +34,8 @@ def require_projects_known(engine: Engine, data_dir: Path) -> None:
     folders = _project_folders(data_dir)
     if folders and not known:
         raise DatabaseUnusable(
-            f"{shown(engine.url)}: no project, beside {len(folders)} project folders in {data_dir}",
-            hint="r2c2r db move brings rows over, or r2c2r serve --adopt makes new ones of what the folders say",
+            f"{shown(engine.url)}: no project in the database, but {len(folders)} project folders in {data_dir}",
+            hint="r2c2r db move copies the rows here; r2c2r serve --adopt makes new rows from the folders",
         )
 
 
@@ -55,12 +55,12 @@ def _known_revision(connection: sqlite3.Connection, database: Path, tables: set[
     """The tables' revision; raises DatabaseUnusable where it is missing or unknown."""
     row = connection.execute("SELECT version_num FROM alembic_version").fetchone() if "alembic_version" in tables else None
     if row is None:
-        raise DatabaseUnusable(f"{database}: tables that do not say which revision they are", hint=RESTORE)
+        raise DatabaseUnusable(f"{database}: its tables do not say which revision they are", hint=RESTORE)
     known = revisions()
     if row[0] not in known:
         raise DatabaseUnusable(
             f"{database}: revision {row[0]}, where this r2c2r knows {known[0]} to {known[-1]}",
-            hint="use the r2c2r that made it, or a copy from the folder backups/ beside it",
+            hint="use the version of r2c2r that made it, or a copy from the folder backups/ beside it",
         )
     return str(row[0])
 
@@ -71,7 +71,7 @@ def _refuse_beside_projects(database: Path) -> None:
     if folders:
         raise DatabaseUnusable(
             f"{database}: no database beside {len(folders)} project folders; an empty one would not know them",
-            hint="r2c2r restore a backup, or r2c2r serve --adopt makes a new one of what the folders say",
+            hint="r2c2r restore brings back a backup; r2c2r serve --adopt makes a new database from the folders",
         )
 
 

@@ -77,7 +77,7 @@ def refuse_another(name: str, found: list[dict[str, Any]], awaited: list[dict[st
         np.subtract(*(np.linalg.norm(way - way[0], axis=1) for way in ways))
     ).max()  # independent of the up direction
     if far_m > SAME_PATH_M:
-        raise CaptureError(f"{name}: its camera's path is {far_m:.2f} m off the project's", hint=hint)
+        raise CaptureError(f"{name}: the camera path is {far_m:.2f} m away from the project's", hint=hint)
 
 
 def describe(capture: Capture, folder: Path, source: Path | None) -> None:

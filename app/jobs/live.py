@@ -31,7 +31,7 @@ IDLE_LOOK_S = 5.0
 MOST_DEATHS = 2  # maximum automatic restarts of a crashed process
 LEFT_S = 10.0
 """Seconds after which a preparation without watching tabs is stopped: longer than a page reload takes."""
-VANISHED = body("worker-died", "the live segmenter ended early", "click again to restart it; see its log")
+VANISHED = body("worker-died", "the live segmenter stopped unexpectedly", "click again to restart it; see its log")
 
 
 class LiveSegmenters:

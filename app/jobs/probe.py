@@ -57,7 +57,7 @@ def probe_recording(file: Path) -> None:
             stored_jpeg(recording.colour_of(frame), frame.rgb_name, (frame.rgb_camera.width, frame.rgb_camera.height))
             metres = recording.depth_of(frame).metres
             if not (np.isfinite(metres) & (metres > 0)).any():
-                problems.append(f"frame {frame.index}: its depth holds no measurement")
+                problems.append(f"frame {frame.index}: its depth image has no measurement")
         except (UnreadableFrame, CaptureError) as problem:
             problems.append(str(problem))
     if len(problems) > len(frames) / 2:

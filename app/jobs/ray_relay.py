@@ -77,7 +77,7 @@ def _joined(order: Order, stopped: threading.Event) -> Any:
         import ray
     except ModuleNotFoundError as error:
         raise EnvironmentProblem(f"no module {error.name}", hint="pip install 'r2c2r[ray]'") from error
-    waiting = _Waiting(order, stopped, "waits for a Ray cluster: none answers, or not to this token; see the log")
+    waiting = _Waiting(order, stopped, "waits for a Ray cluster: none answers, or it refuses this token; see the log")
     while True:
         try:
             ray.init(address="auto", log_to_driver=False, logging_level="ERROR", configure_logging=False)
@@ -86,7 +86,7 @@ def _joined(order: Order, stopped: threading.Event) -> Any:
         except ConnectionError:
             waiting.wait()
         except RuntimeError as error:  # mismatching versions of Ray or Python
-            raise EnvironmentProblem(f"Ray: {_first_line(error)}", hint="install the same on all machines") from error
+            raise EnvironmentProblem(f"Ray: {_first_line(error)}", hint="install the same version on all machines") from error
 
 
 def _started(ray: Any, seat: Any, order: Order, stopped: threading.Event, takes: str) -> Line | None:

@@ -46,7 +46,8 @@ class NodeSeat:
         try:
             if version() != order.version:
                 raise EnvironmentProblem(
-                    f"this is r2c2r {order.version}, and the Ray node's is {version()}", hint="install the same on all machines"
+                    f"this is r2c2r {order.version}, and the Ray node's is {version()}",
+                    hint="install the same version on all machines",
                 )
             here = self._left.enter_context(_data_folder(order))
             settings = Settings(data_dir=here, store=order.store, cache_gb=order.cache_gb)

@@ -29,7 +29,7 @@ class OwnSeat:
             for other in session.exec(select(Seat).where(Seat.version != version())):
                 raise EnvironmentProblem(
                     f"this is r2c2r {version()}, and the seat {other.owner} is {other.version}",
-                    hint="install the same on both machines; one that vanished is forgotten in a minute",
+                    hint="install the same version on both machines; one that stopped is forgotten after a minute",
                 )
             self._add(session)
 

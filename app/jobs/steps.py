@@ -111,11 +111,11 @@ def outcome(last: Line, status: int, stage: str) -> dict[str, Any] | None:
     if "done" in last:  # its results are stored, so its exit status does not matter
         return None
     if status == -signal.SIGXCPU:  # a retry would reach the limit again
-        hint = f"give a smaller recording, or allow more with {HOURS_VARIABLE}"
-        return {"kind": "EnvironmentProblem", "message": f"{stage}: it took all the processor time it may use", "hint": hint}
+        hint = f"use a smaller recording, or raise the limit with {HOURS_VARIABLE}"
+        return {"kind": "EnvironmentProblem", "message": f"{stage}: it used up its processor time", "hint": hint}
     reason = f"signal {-status}" if status < 0 else f"exit status {status}"
     hint = "the system may have run out of memory; see the log" if status == -9 else "see the log"
-    return {"kind": VANISHED, "message": f"{stage}: its process ended early ({reason})", "hint": hint}
+    return {"kind": VANISHED, "message": f"{stage}: its process ended unexpectedly ({reason})", "hint": hint}
 
 
 VANISHED = "worker-died"

@@ -37,6 +37,6 @@ def _refused(scope: Scope) -> JSONResponse | None:
         return JSONResponse(body("not-found", "there is nothing at this address", "check the address"), 404)
     for name, value in parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True):
         if OBEYED.search(value) or len(value) > LONGEST_VALUE:
-            message = f"{name[:60]!a}: it holds what cannot be shown, or more than {LONGEST_VALUE} characters"
+            message = f"{name[:60]!a}: it holds characters that cannot be shown, or more than {LONGEST_VALUE} characters"
             return JSONResponse(body("invalid", message, "write it without"), 422)
     return None

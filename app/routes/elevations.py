@@ -11,7 +11,7 @@ router = APIRouter(prefix="/api/projects/{project}/elevations", tags=["elevation
 
 @router.get("", operation_id="getElevations")
 def get_elevations(context: Ctx, project: str) -> schemas.Elevations:
-    """The planes to scale, with what edges snap to; none while the live segmenter has not drawn them."""
+    """The planes to scale, with the lines that edges snap to; none until the live segmenter has drawn them."""
     return elevations.current(context, project)
 
 

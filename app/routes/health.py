@@ -12,18 +12,18 @@ router = APIRouter(include_in_schema=False)
 
 @router.get("/healthz")
 async def alive() -> dict[str, str]:
-    """The process answers; waits for nothing. Begin it anew when this does not come."""
+    """Whether the process answers; waits for nothing. Restart the process when no answer comes."""
     return {"state": "ok"}
 
 
 @router.get("/readyz")
 def ready(context: OpenCtx) -> dict[str, str]:
-    """Requests can be served; 503 with the reason while the database does not answer. Send them elsewhere meanwhile."""
+    """Whether requests can be served; 503 with the reason while the database does not answer: send them elsewhere then."""
     health.require_ready(context)
     return {"state": "ready"}
 
 
 @router.get("/metrics")
 def read_metrics(context: Ctx) -> Response:
-    """Metrics for Prometheus: requests, stages, the queue, seats, bytes; 403 but for an admin, or a token made for it."""
+    """Metrics for Prometheus: requests, stages, the queue, seats, bytes; 403 unless an admin or a metrics token asks."""
     return Response(metrics.exposed(context), media_type=CONTENT_TYPE)

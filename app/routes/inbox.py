@@ -17,13 +17,13 @@ def get_inbox(context: Ctx) -> schemas.Inbox:
 
 @router.get("/projects/{project}/people", operation_id="listNames")
 def list_names(context: Ctx, project: str) -> list[str]:
-    """Everybody with an account who sees the project: whom a comment can name, and whose turn it can be."""
+    """Everybody with an account who sees the project: the people to mention in comments or to assign."""
     return assigning.names(context, project)
 
 
 @router.put("/projects/{project}/assignee", operation_id="assignProject")
 def assign_project(context: Ctx, project: str, body: schemas.AssigneeIn) -> schemas.Project:
-    """Make it somebody's turn, or nobody's."""
+    """Assign the project to somebody, or to nobody."""
     return assigning.assign(context, project, body)
 
 
@@ -35,5 +35,5 @@ def get_news(context: Ctx, project: str) -> schemas.News:
 
 @router.put("/projects/{project}/news", operation_id="markSeen")
 def mark_seen(context: Ctx, project: str, body: schemas.SeenIn) -> schemas.News:
-    """Say up to which event you have read them."""
+    """Mark the changes as read up to an event."""
     return news.mark_seen(context, project, body)

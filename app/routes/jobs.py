@@ -31,7 +31,7 @@ def get_job(context: Ctx, job: RowId) -> schemas.Job:
 
 @router.post("/jobs/{job}/cancel", operation_id="cancelJob")
 def cancel_job(context: Ctx, job: RowId) -> schemas.Job:
-    """Ask the job to stop; finished stages are kept. Asking twice is the same as once."""
+    """Ask the job to stop; finished stages are kept. Idempotent."""
     return jobs.cancel(context, job)
 
 

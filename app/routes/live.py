@@ -29,12 +29,12 @@ async def live(
     since: int | None = None,
     epoch: str | None = None,
 ) -> None:
-    """Messages as they happen; `since` and `epoch` (of the last hello) bring what was missed, or a reset."""
+    """Messages as they happen; `since` and `epoch` (of the last hello) bring the missed messages, or a reset."""
     context: Context = socket.app.state.context
     person = socket.state.person
     await socket.accept()
     if context.hub.tabs_of(person.name) >= MOST_TABS:
-        await socket.close(TOO_MANY_TABS, f"{MOST_TABS} tabs of yours are connected already: close some")
+        await socket.close(TOO_MANY_TABS, f"you already have {MOST_TABS} tabs connected: close some")
         return
     listener = context.hub.join(project, since, epoch, person.name, lambda at: context.access.sees(socket.state.person, at))
     try:

@@ -21,13 +21,13 @@ Width = Annotated[int | None, Query(ge=16, le=4096)]
 
 @router.get("/frames/{frame}.jpg", operation_id="frameImage")
 def frame_image(context: Ctx, request: Request, project: str, frame: FrameNumber, w: Width = None, v: str = "") -> Response:
-    """A frame, at its stored size or `w` pixels wide (rounded up to a size that is kept)."""
+    """A frame, at its stored size or `w` pixels wide (rounded up to a cached size)."""
     return send(request, media.frame(context, project, frame, w), "image/jpeg", immutable=bool(v))
 
 
 @router.get("/depth/{frame}.png", operation_id="depthImage")
 def depth_image(context: Ctx, request: Request, project: str, frame: FrameNumber, v: str = "") -> Response:
-    """A frame's depth in colours, near to far; what was not measured is faint."""
+    """A frame's depth in colours, near to far; pixels without a measurement are faint."""
     return send(request, media.depth(context, project, frame), "image/png", immutable=bool(v))
 
 
@@ -71,7 +71,7 @@ def candidate_picture(context: Ctx, request: Request, project: str, object: RowI
 def candidate_turns(
     context: Ctx, request: Request, project: str, object: RowId, candidate: str, against: str = "", v: str = ""
 ) -> Response:
-    """A candidate from 24 sides, from left to right; in another colour what lies off the candidate `against`."""
+    """A candidate from 24 sides, from left to right; surfaces that differ from the candidate `against` in another colour."""
     return send(request, differences.strip(context, project, object, candidate, against), "image/png", immutable=bool(v))
 
 
@@ -104,7 +104,7 @@ def scene_picture(context: Ctx, request: Request, project: str, v: str = "") -> 
 
 @router.get("/report.html", operation_id="sceneReport")
 def scene_report(context: Ctx, request: Request, project: str) -> Response:
-    """The newest bundle's report, without the right to run anything; its pictures are asked for as this origin's."""
+    """The newest bundle's report, which may run no script; its pictures load from this origin."""
     answer = send(request, bundles.member(context, project, "report.html"), "text/html", immutable=False)
     answer.headers["content-security-policy"] = (
         "sandbox allow-same-origin; default-src 'none'; style-src 'unsafe-inline'; img-src data: 'self'; frame-ancestors 'self'"
@@ -120,7 +120,7 @@ def scene_readme(context: Ctx, request: Request, project: str) -> Response:
 
 @router.get("/review.html", operation_id="sceneReview")
 def scene_review(context: Ctx, request: Request, project: str, v: str = "") -> Response:
-    """The newest bundle's 3D page: its own script may run, in an origin of its own, and reach nothing."""
+    """The newest bundle's 3D page: its script runs in an opaque origin without network access."""
     answer = send(request, bundles.member(context, project, "review.html"), "text/html", immutable=bool(v))
     answer.headers["content-security-policy"] = (
         "sandbox allow-scripts; default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
@@ -131,7 +131,7 @@ def scene_review(context: Ctx, request: Request, project: str, v: str = "") -> R
 
 @router.get("/project.zip", operation_id="downloadProject")
 async def download_project(context: Ctx, project: str, recording: bool = False) -> Response:
-    """The project as one file, which an upload to another server makes a project of; with its recording where asked for."""
+    """The project as one file, to be imported by another server; on request with its recording."""
     export = await context.gates.looks.run(context.who, project_export.gathered, context, project, recording=recording)
     headers = {"content-disposition": f'attachment; filename="{export.file_name}"', "cache-control": "no-store"}
     return StreamingResponse(project_export.streamed(export), media_type="application/zip", headers=headers)
@@ -139,7 +139,7 @@ async def download_project(context: Ctx, project: str, recording: bool = False) 
 
 @router.get("/bundles/{version}.zip", operation_id="downloadBundle")
 def download_bundle(context: Ctx, project: str, version: RowId, formats: Formats = ()) -> Response:
-    """A bundle, or some formats of it; ranges are answered, so a download can go on where it stopped."""
+    """A bundle, or some formats of it; range requests let a download resume."""
     bundle = bundles.part(context, project, version, frozenset(formats)) if formats else bundles.file(context, project, version)
     return _download(context, project, bundle)
 
@@ -169,7 +169,7 @@ def download_variants(context: Ctx, project: str, variants_name: schemas.Variant
 
 @router.get("/variants/{variants_name}.jpg", operation_id="variantsWall")
 def variants_wall(context: Ctx, request: Request, project: str, variants_name: schemas.VariantsName, v: str = "") -> Response:
-    """The first of them as they start, side by side."""
+    """The first variants in their initial state, side by side."""
     return send(request, variants.wall(context, project, variants_name), "image/jpeg", immutable=bool(v))
 
 

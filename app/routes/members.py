@@ -32,7 +32,7 @@ def get_members(context: Ctx, project: str) -> schemas.ProjectMembers:
 
 @router.put("", operation_id="setMembers")
 def set_members(context: Ctx, project: str, body: schemas.MembersIn) -> schemas.ProjectMembers:
-    """Open it to everybody who may sign in, or to its owner and these alone; 403 unless yours, or you are an admin."""
+    """Open it to everybody who may sign in, or only to its owner and these people; 403 unless you are its owner or an admin."""
     return project_members.set_members(context, project, body)
 
 

@@ -12,19 +12,19 @@ router = APIRouter(prefix="/api/projects/{project}/opinions", tags=["people"])
 
 @router.get("", operation_id="listOpinions")
 def list_opinions(context: Ctx, project: str) -> list[schemas.Opinion]:
-    """The projects in which others work on the same recording, apart from this one."""
+    """Second opinions: other projects on the same recording."""
     return opinions.listed(context, project)
 
 
 @router.post("", operation_id="askOpinion", status_code=201)
 async def ask_opinion(context: Ctx, project: str, body: schemas.OpinionIn) -> schemas.Project:
-    """A copy of the recording, without objects, for somebody to work on; 409 while a job of the project is under way."""
+    """Make a copy of the recording without objects for a second opinion; 409 while a job of the project is running."""
     return await context.gates.looks.run(context.who, opinions.ask, context, project, body)
 
 
 @router.get("/{other}", operation_id="getAgreement")
 async def get_agreement(context: Ctx, project: str, other: str) -> schemas.Agreement:
-    """Objects that both have, with their mask IoU and categories, and those that one of the two has."""
+    """Objects in both projects, with mask IoU and categories, and objects in only one of them."""
     return await context.gates.looks.run(context.who, opinions.agreement, context, project, other)
 
 

@@ -20,9 +20,9 @@ REVALIDATED = {"cache-control": "no-cache"}
 @router.get("/webhooks")
 @router.get("/p/{rest:path}")
 def page(context: OpenCtx, request: Request, rest: str = "", token: str | None = None, frame: str = "") -> Response:
-    """The one page; the address says what it shows. A key in the address becomes a cookie and leaves the address.
+    """The single page; its address selects the content. A key in the address becomes a cookie and is removed from the address.
 
-    A key that was used already is no matter to the browser that used it; others see the sign-in page, which says what to do.
+    The browser that used a key may open it again; other browsers see the sign-in page with instructions.
     """
     if token is not None:
         answer: Response = RedirectResponse(request.url.remove_query_params("token").path, status_code=303)

@@ -18,7 +18,7 @@ PageSize = Annotated[int, Query(ge=1, le=200)]
 
 @router.post("/login", operation_id="signIn", status_code=204)
 async def sign_in(context: OpenCtx, request: Request, response: Response, body: schemas.Credentials) -> None:
-    """A session for an account, as a cookie. After some wrong ones each is looked at later, 429 when many wait."""
+    """A session for an account, as a cookie. Failed attempts delay the next ones; 429 when many wait."""
     give_cookie(request, response, await context.people.sign_in(body.name, body.password, address_of(request)))
 
 
@@ -50,13 +50,13 @@ def list_audit(context: AdminCtx, before: OptionalId = None, limit: PageSize = 5
 
 @router.post("/accounts", operation_id="addAccount", status_code=201)
 async def add_account(context: AdminCtx, body: schemas.AccountIn) -> schemas.AccountInfo:
-    """Let somebody in; 409 when the name is taken, 422 with the reason for a password that is easily guessed."""
+    """Make an account; 409 when the name is taken, 422 with the reason for a password that is easily guessed."""
     return await context.gates.passwords.run(context.who, members.add, context, body)
 
 
 @router.patch("/accounts/{name}", operation_id="changeAccount")
 async def change_account(context: AdminCtx, name: str, body: schemas.AccountPatch) -> schemas.AccountInfo:
-    """Another role or password, from now on; 409 for the last admin's role."""
+    """Change role or password; 409 for the last admin's role."""
     return await context.gates.passwords.run(context.who, members.change, context, name, body)
 
 

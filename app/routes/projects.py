@@ -45,13 +45,13 @@ def get_project(context: Ctx, project: str) -> schemas.Project:
 
 @router.patch("/{project}", operation_id="changeProject")
 def change_project(context: Ctx, project: str, body: schemas.ProjectPatch) -> schemas.Project:
-    """A new name, tags, in the archive or not, or another segmenter (refused while its libraries or weights are missing)."""
+    """Change name, tags, archive state or segmenter (refused while its libraries or weights are missing)."""
     return projects.change(context, project, body)
 
 
 @router.put("/{project}/reading", operation_id="readAgain", status_code=202)
 def read_again(context: Ctx, project: str, body: schemas.ReadingIn) -> schemas.Project:
-    """Read the recording again with its depth moved onto the colour images, or as it was recorded."""
+    """Read the recording again with its depth registered to the colour images, or as it was recorded."""
     return rereading.read_again(context, project, body)
 
 
@@ -63,7 +63,7 @@ async def delete_project(context: AdminCtx, project: str) -> schemas.Trashed:
 
 @router.post("/{project}/duplicate", operation_id="duplicateProject", status_code=201)
 async def duplicate_project(context: Ctx, project: str) -> schemas.Project:
-    """A second project that is as this one, as a draft of yours."""
+    """A copy of the project, as a draft of yours."""
     return await context.gates.looks.run(context.who, copies.duplicate, context, project)
 
 
@@ -87,7 +87,7 @@ def list_frames(context: Ctx, project: str) -> list[schemas.FrameInfo]:
 
 @router.get("/{project}/frames/{frame}/camera", operation_id="getCamera")
 def get_camera(context: Ctx, project: str, frame: FrameNumber) -> schemas.FrameCamera:
-    """A frame's camera, for what is drawn in space over its photo."""
+    """A frame's camera, to draw 3D overlays on its photo."""
     return cameras.camera(context, project, frame)
 
 

@@ -32,7 +32,7 @@ def edit_object(context: Ctx, project: str, object: RowId, body: schemas.ObjectP
 
 @router.delete("/objects/{object}", operation_id="deleteObject")
 def delete_object(context: Ctx, project: str, object: RowId) -> schemas.SceneObject:
-    """Take the object out; undo brings it back."""
+    """Delete the object; undo brings it back."""
     return prompts.delete(context, project, object)
 
 
@@ -44,7 +44,7 @@ def add_point(context: Ctx, project: str, object: RowId, body: schemas.PointIn, 
 
 @router.post("/objects/{object}/clicks", operation_id="addPoints", status_code=201)
 def add_points(context: Ctx, project: str, object: RowId, body: schemas.PointsIn, infer: bool = True) -> schemas.SceneObject:
-    """Clicks that belong together, such as those of a box: one change, one undo."""
+    """Clicks that belong together, such as those of a box: one change with one undo."""
     return prompts.add_points(context, project, object, body, infer)
 
 
@@ -70,13 +70,13 @@ def delete_point(context: Ctx, project: str, object: RowId, point: RowId, infer:
 
 @router.put("/objects/{object}/frames/{frame}", operation_id="setFrame")
 def set_frame(context: Ctx, project: str, object: RowId, frame: FrameNumber, body: schemas.FrameIn) -> schemas.SceneObject:
-    """Its mask in that frame, which stands, or that it is not visible there."""
+    """Set the object's mask in that frame for good, or mark it as not visible there."""
     return prompts.say_of_frame(context, project, object, frame, body)
 
 
 @router.delete("/objects/{object}/frames/{frame}", operation_id="leaveFrame")
 def leave_frame(context: Ctx, project: str, object: RowId, frame: FrameNumber) -> schemas.SceneObject:
-    """As found there again."""
+    """Restore the mask found in that frame."""
     return prompts.say_of_frame(context, project, object, frame, None)
 
 
@@ -88,7 +88,7 @@ def undo(context: Ctx, project: str, body: schemas.UndoRequest) -> schemas.Undon
 
 @router.post("/redo", operation_id="redo")
 def redo(context: Ctx, project: str, body: schemas.UndoRequest) -> schemas.Undone:
-    """Redo what was undone last; 409 when there is nothing, or `version` is old."""
+    """Redo the last undone change; 409 when there is nothing, or `version` is old."""
     return undoing.redo(context, project, body)
 
 

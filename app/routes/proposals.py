@@ -17,17 +17,17 @@ def get_proposals(context: Ctx, project: str) -> schemas.Proposals:
 
 @router.post("/confirm", operation_id="confirmProposals", status_code=201)
 def confirm_proposals(context: Ctx, project: str, body: schemas.ProposalsConfirmed) -> list[schemas.SceneObject]:
-    """Make objects of them; undo takes each back."""
+    """Make objects of the proposals; undo removes each."""
     return proposals.confirm(context, project, body.ids, body.category)
 
 
 @router.post("/dismiss", operation_id="dismissProposals")
 def dismiss_proposals(context: Ctx, project: str, body: schemas.ProposalIds) -> schemas.Proposals:
-    """Leave them out from now on."""
+    """Dismiss the proposals."""
     return proposals.dismiss(context, project, body.ids)
 
 
 @router.post("/restore", operation_id="restoreProposals")
 def restore_proposals(context: Ctx, project: str) -> schemas.Proposals:
-    """Bring all dismissed ones back."""
+    """Bring back all dismissed proposals."""
     return proposals.restore(context, project)

@@ -22,7 +22,7 @@ LONGEST_NEXT = 1000  # characters: a browser keeps no cookie of more than four t
 
 @router.get(PAGE)
 async def begin(context: OpenCtx, request: Request, next: str = "/") -> Response:
-    """To the provider; what its answer must fit stays in a cookie that goes nowhere else."""
+    """Redirect to the provider; a cookie keeps the values that its answer is checked against."""
     try:
         page, begun = await _provider(context).begin(f"{_origin(request)}{PAGE}/back", _ours(next))
     except R2C2RError as error:
@@ -35,7 +35,7 @@ async def begin(context: OpenCtx, request: Request, next: str = "/") -> Response
 
 @router.get(f"{PAGE}/back")
 async def end(context: OpenCtx, request: Request) -> Response:
-    """From the provider: a session for whom it names, and the page that was asked for."""
+    """Return from the provider: a session for the person it names, then the page asked for first."""
     provider, begun = _provider(context), oidc.begun(cookie_parser(request.headers.get("cookie", "")).get(_name(request), ""))
     try:
         named = await provider.end(f"{_origin(request)}{PAGE}/back", request.query_params, begun)
@@ -53,7 +53,7 @@ async def end(context: OpenCtx, request: Request) -> Response:
 
 @router.get(f"{PAGE}/out")
 async def leave(context: OpenCtx, request: Request) -> Response:
-    """End the provider's own session too: else the next visit is signed in again without being asked."""
+    """End the provider's own session too: otherwise the next visit is signed in again without a question."""
     back = f"{_origin(request)}/login"
     try:
         return RedirectResponse(await _provider(context).leave(back), status_code=303)

@@ -30,7 +30,7 @@ def get_candidates(context: Ctx, project: str, object: RowId) -> schemas.Candida
 
 @router.get("/objects/{object}/differences", operation_id="getDifferences")
 async def get_differences(context: Ctx, project: str, object: RowId, against: Candidate) -> schemas.Differences:
-    """By how much every candidate lies off `against`, and the crops they were made from."""
+    """Distance of every candidate from `against`, and the crops they were made from."""
     return await context.gates.views.run(context.who, differences.differences, context, project, object, against)
 
 

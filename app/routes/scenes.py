@@ -30,7 +30,7 @@ def list_bundles(context: Ctx, project: str) -> list[schemas.Bundle]:
 
 @router.get("/bundles/{version}/check", operation_id="checkBundle")
 def check_bundle(context: Ctx, project: str, version: RowId) -> schemas.BundleCheck:
-    """Look at a bundle now: its bytes against its checksum, and the linter's findings."""
+    """Check a bundle now: its bytes against its checksum, and the linter's findings."""
     return bundles.check(context, project, version)
 
 

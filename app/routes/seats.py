@@ -12,11 +12,11 @@ router = APIRouter(prefix="/api/seats", tags=["seats"])
 
 @router.get("", operation_id="listSeats")
 def list_seats(context: AdminCtx) -> schemas.Seats:
-    """Each seat that lives, what it does, and how many jobs wait."""
+    """Each running seat, its current work, and the number of waiting jobs."""
     return seats.everyone(context)
 
 
 @router.patch("/{seat}", operation_id="drainSeat")
 def drain_seat(context: AdminCtx, seat: RowId, body: schemas.SeatIn) -> schemas.Seats:
-    """Let a seat end what it does and take nothing more, or take jobs again."""
+    """Drain a seat: it finishes its work and takes no new jobs; or let it take jobs again."""
     return seats.drain(context, seat, body)

@@ -13,13 +13,13 @@ router = APIRouter(prefix="/api/projects/{project}", tags=["reviews"])
 
 @router.get("/review", operation_id="getReview")
 def get_review(context: Ctx, project: str) -> schemas.ReviewStatus:
-    """Where the project stands, and its legal next steps with what each still lacks."""
+    """The project's state, and its possible next states with the open conditions of each."""
     return states.status(context, project)
 
 
 @router.post("/review", operation_id="stepReview")
 def step_review(context: Ctx, project: str, body: schemas.ReviewStep) -> schemas.ReviewStatus:
-    """Take one legal step; 409 for any other, and where something is unmet and no reason is given."""
+    """Change the state; 409 for an impossible change, or for open conditions without a reason."""
     return states.step(context, project, body)
 
 
@@ -33,7 +33,7 @@ def get_figures(context: Ctx, project: str) -> schemas.Figures:
 async def get_effort(context: Ctx, project: str) -> Response:
     """Clicks, verdicts, comments and minutes of each person on each object, as a table to download.
 
-    To admins a honeypot's also says what each object really is.
+    For admins, a honeypot's table also gives the true object of each row.
     """
     text = await context.gates.looks.run(context.who, effort.table, context, project)
     headers = {"content-disposition": f'attachment; filename="effort-{project}.csv"', "cache-control": "no-store"}

@@ -12,7 +12,7 @@ router = APIRouter(prefix="/api", tags=["projects"])
 
 @router.get("/templates", operation_id="listTemplates")
 def list_templates(context: Ctx) -> list[schemas.Template]:
-    """Lists of objects to click, of all people of the server, by name."""
+    """Lists of objects to click, shared by everybody on the server, by name."""
     return templates.listed(context)
 
 
@@ -24,17 +24,17 @@ def add_template(context: Ctx, body: schemas.TemplateIn) -> schemas.Template:
 
 @router.put("/templates/{template}", operation_id="changeTemplate")
 def change_template(context: Ctx, template: RowId, body: schemas.TemplateIn) -> schemas.Template:
-    """Another name or other objects, from now on; 403 unless yours, or you are an admin."""
+    """Change its name or objects; 403 unless it is yours or you are an admin."""
     return templates.change(context, template, body)
 
 
 @router.delete("/templates/{template}", operation_id="removeTemplate", status_code=204)
 def remove_template(context: Ctx, template: RowId) -> None:
-    """Projects that took it over keep what they took; 403 unless yours, or you are an admin."""
+    """Delete it; projects keep the objects they took over. 403 unless it is yours or you are an admin."""
     templates.remove(context, template)
 
 
 @router.put("/projects/{project}/checklist", operation_id="setChecklist")
 def set_checklist(context: Ctx, project: str, body: schemas.ChecklistIn) -> schemas.Project:
-    """The objects of a template are to be clicked in the project from now on, or none are listed."""
+    """Use the objects of a template as the project's list of objects to click, or clear that list."""
     return templates.set_checklist(context, project, body)

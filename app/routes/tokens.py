@@ -18,11 +18,11 @@ def list_tokens(context: Ctx) -> list[schemas.ApiToken]:
 
 @router.post("", operation_id="addToken", status_code=201)
 def add_token(context: Ctx, body: schemas.ApiTokenIn) -> schemas.NewApiToken:
-    """A token for a program, which sends `Authorization: Bearer SECRET`; its secret is told this once."""
+    """A token for a program, which sends `Authorization: Bearer SECRET`; its secret is shown only once."""
     return own_tokens.add(context, body)
 
 
 @router.delete("/{token}", operation_id="revokeToken", status_code=204)
 def revoke_token(context: Ctx, token: RowId) -> None:
-    """It opens nothing from now on."""
+    """Revoke a token."""
     own_tokens.revoke(context, token)

@@ -17,7 +17,7 @@ def list_trash(context: AdminCtx) -> list[schemas.Trashed]:
 
 @router.post("/{entry}/restore", operation_id="restoreProject")
 def restore_project(context: AdminCtx, entry: str) -> schemas.Project:
-    """The project again as it was."""
+    """Restore the project from the trash."""
     return trash.restore(context, entry)
 
 

@@ -23,7 +23,7 @@ async def adopt_unknown(context: AdminCtx, entry: str) -> schemas.Project:
 
 @router.post("/{entry}/leave", operation_id="leaveUnknown")
 def leave_unknown(context: AdminCtx, entry: str) -> schemas.UnknownFolder:
-    """Leave it where it is; it is shown as left."""
+    """Leave it where it is; it is listed as left in place."""
     return unknown.leave(context, entry)
 
 

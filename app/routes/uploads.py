@@ -30,25 +30,25 @@ def begin_upload(context: Ctx, body: schemas.UploadIn, response: Response) -> sc
 
 @router.head("/{upload}", operation_id="uploadOffset")
 def upload_offset(context: Ctx, upload: str) -> Response:
-    """How many bytes are here (Upload-Offset) of how many (Upload-Length)."""
+    """Bytes received (Upload-Offset) and expected (Upload-Length)."""
     found = uploads.state(context, upload)
     return Response(headers={"upload-offset": str(found.offset), "upload-length": str(found.size)})
 
 
 @router.patch("/{upload}", operation_id="continueUpload", status_code=204, max_body_size=STREAMED)
 async def continue_upload(context: Ctx, request: Request, upload: str, offset: Offset) -> Response:
-    """Bytes from Upload-Offset on; 409 with the right offset in `current` when they do not fit."""
+    """Append bytes at Upload-Offset; 409 with the right offset in `current` when it is wrong."""
     reached = await uploads.append(context, upload, offset, request.stream())
     return Response(status_code=204, headers={"upload-offset": str(reached)})
 
 
 @router.post("/{upload}/finish", operation_id="finishUpload", status_code=202)
 async def finish_upload(context: Ctx, upload: str) -> schemas.Project:
-    """Make it a project; starts the import. Asking twice is the same as once; 429 while others of yours are looked at."""
+    """Turn it into a project and start the import. Idempotent; 429 while others of yours are being checked."""
     return await context.gates.looks.run(context.who, uploads.finish, context, upload)
 
 
 @router.delete("/{upload}", operation_id="cancelUpload", status_code=204)
 def cancel_upload(context: Ctx, upload: str) -> None:
-    """Give the upload up; its bytes are deleted."""
+    """Cancel the upload; its bytes are deleted."""
     uploads.forget(context, upload)

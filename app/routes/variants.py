@@ -11,7 +11,7 @@ router = APIRouter(prefix="/api/projects/{project}/variants", tags=["variants"])
 
 @router.get("", operation_id="listVariants")
 def list_variants(context: Ctx, project: str) -> schemas.Variants:
-    """All that were made, newest first, and what variants of the newest bundle would take."""
+    """All sets of variants, newest first, and the disk space that variants of the newest bundle would take."""
     return variants.list_variants(context, project)
 
 

@@ -13,7 +13,7 @@ router = APIRouter(tags=["viewer"])
 
 @router.post("/api/projects/{project}/viewer", operation_id="openViewer")
 async def open_viewer(context: Ctx, request: Request, project: str) -> schemas.ViewerSession:
-    """Where the 3D view is; says so, with a picture and a mesh to show instead, when it is down."""
+    """Address of the 3D view; when it is down, a picture and a mesh to show instead."""
     return await context.gates.views.run(context.who, viewers.open_view, context, project, request.state.session)
 
 
@@ -31,7 +31,7 @@ async def set_joints(context: Ctx, request: Request, project: str, body: schemas
 
 @router.post("/api/projects/{project}/viewer/place", operation_id="placeInViewer")
 async def place_in_viewer(context: Ctx, request: Request, project: str, body: schemas.ViewerPlace) -> schemas.ViewerPlaced:
-    """Put what is being moved in the 3D view at a pose; without one, say where it was dragged to."""
+    """Set the pose of the object being moved in the 3D view; without a pose, return where it was dragged to."""
     return await context.gates.views.run(context.who, viewers.place, context, project, request.state.session, body)
 
 

@@ -12,19 +12,19 @@ router = APIRouter(prefix="/api/webhooks", tags=["people"])
 
 @router.get("", operation_id="listWebhooks")
 def list_webhooks(context: Ctx) -> list[schemas.Webhook]:
-    """Yours; an admin sees everybody's."""
+    """Your webhooks; an admin sees everybody's."""
     return webhooks.listed(context)
 
 
 @router.post("", operation_id="addWebhook", status_code=201)
 def add_webhook(context: Ctx, body: schemas.WebhookIn) -> schemas.NewWebhook:
-    """POST to it from now on; X-R2C2R-Signature is `sha256=` and the HMAC of `timestamp.body` by the secret told here once."""
+    """Add an address; X-R2C2R-Signature is `sha256=` and the HMAC of `timestamp.body` with the secret shown only here."""
     return webhooks.add(context, body)
 
 
 @router.delete("/{webhook}", operation_id="removeWebhook", status_code=204)
 def remove_webhook(context: Ctx, webhook: RowId) -> None:
-    """It hears of nothing any more."""
+    """Remove a webhook."""
     webhooks.remove(context, webhook)
 
 

@@ -13,7 +13,7 @@ def readable(value: Any) -> Any:
     """The given value; ValueError for text that cannot be displayed (r2c2r_core/texts.py)."""
     found = OBEYED.search(value) if isinstance(value, str) else None
     if found is not None:
-        raise ValueError(f"it holds U+{ord(found.group()):04X}, which cannot be shown; write it without")
+        raise ValueError(f"it holds the character U+{ord(found.group()):04X}, which cannot be shown; remove it")
     return value
 
 

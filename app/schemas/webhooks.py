@@ -16,7 +16,7 @@ def _address(text: str) -> str:
     """The text itself; ValueError where nothing can be posted to it."""
     parts = urlsplit(text)
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.username is not None or parts.port == 0:
-        raise ValueError("no address to post to, such as https://lab.example/r2c2r; without a name and password in it")
+        raise ValueError("not an address to post to: give one such as https://lab.example/r2c2r, without name and password")
     if not text.isascii() or " " in text:
         raise ValueError("an address is ASCII without spaces; write it percent-encoded")
     return text

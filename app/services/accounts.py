@@ -26,7 +26,7 @@ def add(engine: Engine, name: str, role: str, password: str, *, by: str = audit.
     account = Account(name=name, role=known_role(role), password=_hashed(password), created=time.time())
     with writing(engine) as session:
         if session.exec(select(Account).where(Account.name == name)).first() is not None:
-            raise Conflict(f"there is an account {name} already", hint="r2c2r user role, or r2c2r user password")
+            raise Conflict(f"the account {name} already exists", hint="r2c2r user role, or r2c2r user password")
         session.add(account)
         audit.note(session, "added", account=name, who=by, detail=account.role)
 
@@ -53,7 +53,7 @@ def of_subject(session: Session, subject: str, name: str, role: str | None, defa
     if found is None:
         if session.exec(select(Account).where(Account.name == name.lower())).first() is not None:
             hint = f"an admin removes that one first, r2c2r user remove {name}: what it did stays under the name"
-            raise Conflict(f"there is an account {name} already, and it is not yours", hint=hint)
+            raise Conflict(f"the account {name} belongs to somebody else", hint=hint)
         found = seen(session, name, role or default, by=by)
         found.subject = subject
     elif role is not None and role != found.role:
@@ -138,13 +138,13 @@ def _refuse_last_admin(session: Session, account: Account) -> None:
     """Raise Conflict for the last admin, checked in the transaction of the change, so that two concurrent ones cannot pass."""
     admins = session.exec(select(Account.name).where(Account.role == "admin")).all()
     if admins == [account.name]:
-        raise Conflict(f"{account.name} is the only admin", hint="make somebody else admin first")
+        raise Conflict(f"{account.name} is the only admin", hint="make another account admin first")
 
 
 def _checked(name: str) -> str:
     name = name.lower()
     if not _NAME.fullmatch(name):
-        raise InputError(f"{name[:80]!r} is no name for an account", hint="letters, digits and . _ - @ +; at most 60")
+        raise InputError(f"{name[:80]!r} is not a valid account name", hint="letters, digits and . _ - @ +; at most 60")
     return name
 
 
@@ -162,7 +162,7 @@ def _hashed(password: str) -> str:
 
 @cache
 def _nobodys_password() -> str:
-    return _hashed("nobody knows this one")
+    return _hashed("no such account")
 
 
 @cache

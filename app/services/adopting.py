@@ -234,7 +234,7 @@ def _of_an_older_version(files: ProjectFiles) -> Description:
     """Description of a folder without a project.json, from the recording's facts and the last run's prompts."""
     found, sources = _json(files.facts), sorted(files.source.glob("*"))
     if not found and not sources:
-        raise InputError(f"{files.root}: neither project.json nor a recording in it", hint="take out of it what you need")
+        raise InputError(f"{files.root}: neither project.json nor a recording in it", hint="copy what you need out of it")
     source = str(found.get("source") or (sources[0] if sources else ""))
     overrides = _json(files.work / "overrides.json").get("objects", {})
     prompts = _json(files.work / "prompts.json") or _json(files.finished_prompts)

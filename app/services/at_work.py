@@ -17,7 +17,7 @@ _WAIT_FOR: dict[Work, tuple[Work, ...]] = {  # an upload may be given up while i
 }
 _SAID: dict[Work, tuple[str, str]] = {
     "sent": ("another request is still sending this file", "wait a moment, then ask for its offset"),
-    "finished": ("this upload is being made a project", "wait a moment, then delete the project"),
+    "finished": ("this upload is being turned into a project", "wait a moment, then delete the project"),
     "deleted": ("this upload is being deleted", "begin it anew"),
 }
 

@@ -161,7 +161,7 @@ def candidate_mesh(files: ProjectFiles, name: str, candidate: str) -> Any:
     for asset in found.candidates if found else ():
         if asset.candidate_id == candidate:
             return asset
-    raise NotFound(f"{name} has no candidate {candidate}", hint="the candidates may have been made anew")
+    raise NotFound(f"{name} has no candidate {candidate}", hint="the candidates may have been made again")
 
 
 def generate_key(files: ProjectFiles, name: str) -> str:

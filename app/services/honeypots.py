@@ -59,7 +59,7 @@ def score(context: Context, project_id: str) -> schemas.HoneypotScore:
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
         if not project.honeypot:
-            raise NotFound(f"{project.name} is no honeypot", hint="slip a sample kitchen into somebody's queue first")
+            raise NotFound(f"{project.name} is no honeypot", hint="put a sample kitchen into somebody's queue first")
         side = opinions.side(context, session, project)
         folder = context.files(project).source
     overlaps, drawn = Overlaps(), set[Hashable]()

@@ -53,7 +53,7 @@ def into_project(context: Context, project_id: str, upload: Upload, received: Pa
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
         if not project_shapes.awaits_recording(project):
-            raise Conflict(f"{project.name} was given a recording meanwhile", hint="look at it again")
+            raise Conflict(f"{project.name} got a recording in the meantime", hint="look at it again")
         target = context.files(project).source / name
         target.parent.mkdir(parents=True, exist_ok=True)
         received.replace(target)

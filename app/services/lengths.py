@@ -58,7 +58,7 @@ def remove(context: Context, project_id: str, length_id: int) -> schemas.TrueLen
         project = queries.project_row(session, project_id)
         row = session.get(TrueLength, length_id)
         if row is None or row.project_id != project_id:
-            raise NotFound(f"no true length {length_id} in this project", hint="it may have been removed meanwhile")
+            raise NotFound(f"no true length {length_id} in this project", hint="it may have been removed in the meantime")
         _note(session, row, "unmeasure", f"removed: {row.text} is {_mm(row.metres)}", context.who)
         session.delete(row)
         session.flush()

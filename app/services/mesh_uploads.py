@@ -71,7 +71,7 @@ async def _received(context: Context, name: str, stream: AsyncIterator[bytes]) -
         await _receive(stream, received)
         yield received, await context.gates.looks.run(context.who, probing.look_at, context, "mesh", received, name)
     except ClientDisconnect as error:
-        raise OverrideError("the sender left before the last byte", hint="upload it again") from error
+        raise OverrideError("the connection ended before the last byte", hint="upload it again") from error
     finally:
         with anyio.CancelScope(shield=True):
             await anyio.Path(received).unlink(missing_ok=True)

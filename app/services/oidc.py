@@ -16,7 +16,7 @@ from r2c2r_core.errors import EnvironmentProblem, InputError
 
 TIMEOUT_S = 10.0  # of each request to the provider
 SIGNED_BY = ("RS", "PS", "ES", "Ed")  # algorithms with a public key; a provider may offer "none" as well
-BEGIN = "begin at the sign-in page again"
+BEGIN = "start again at the sign-in page"
 Result = TypeVar("Result")
 
 
@@ -50,7 +50,7 @@ class Provider:
         except ImportError as error:
             raise EnvironmentProblem("R2C2R_IDENTITY oidc: authlib is missing", hint="pip install 'r2c2r[oidc]'") from error
         if not settings.oidc_client:
-            raise InputError("R2C2R_OIDC_CLIENT is empty", hint="the id under which the provider knows this server")
+            raise InputError("R2C2R_OIDC_CLIENT is empty", hint="the client id that the provider gave this server")
         self.issuer, self._roles = settings.identity_issuer, roles_of_groups(settings.oidc_roles)
         self._client_id = settings.oidc_client
         self._app: Any = StarletteOAuth2App(
@@ -71,7 +71,7 @@ class Provider:
     async def end(self, back: str, said: Mapping[str, str], begun: Begun | None) -> Named:
         """Complete a sign-in; raises Unauthorised for an answer that does not match it, Forbidden for users without access."""
         if begun is None or not hmac.compare_digest(said.get("state", "").encode(), begun.state.encode()):
-            raise Unauthorised("this sign-in was not begun in this browser, or over ten minutes ago", hint=BEGIN)
+            raise Unauthorised("this sign-in was not started in this browser, or is more than ten minutes old", hint=BEGIN)
         if said.get("iss", self.issuer) != self.issuer:
             raise Unauthorised(f"the answer is of {said['iss'][:80]}, not of {self.issuer}", hint=BEGIN)
         if "code" not in said:
@@ -108,13 +108,13 @@ class Provider:
             return claims
         further = await self._asked(self._app.userinfo(token=token))
         if further.get("sub") != claims["sub"]:
-            raise Unauthorised(f"{self.issuer} tells of another person", hint=BEGIN)
+            raise Unauthorised(f"{self.issuer} answered for another person", hint=BEGIN)
         return {**further, **claims}
 
     def _named(self, claims: Mapping[str, Any]) -> Named:
         name = claims.get("preferred_username") or (claims.get("email") if claims.get("email_verified") is True else None)
         if not isinstance(name, str):
-            raise Forbidden(f"{self.issuer} gives you no name", hint="preferred_username, or an email that is verified")
+            raise Forbidden(f"{self.issuer} sent no user name", hint="preferred_username, or an email that is verified")
         return Named(f"{self.issuer} {claims['sub']}", name, self._role(name, claims.get("groups")))
 
     def _role(self, name: str, groups: Any) -> Role | None:
@@ -123,7 +123,7 @@ class Provider:
         theirs = [groups] if isinstance(groups, str) else groups if isinstance(groups, list) else []
         reached = [self._roles[group] for group in theirs if isinstance(group, str) and group in self._roles]
         if not reached:
-            raise Forbidden(f"{name} is in no group that may come in", hint="ask whoever keeps the lab's groups")
+            raise Forbidden(f"{name} is in no group that may sign in", hint="ask the administrator of the groups")
         return max(reached, key=ROLES.index)
 
     async def _asked(self, answer: Awaitable[Result]) -> Result:
@@ -137,11 +137,9 @@ class Provider:
         except OAuthError as error:
             raise Unauthorised(f"{self.issuer} says: {str(error)[:200]}", hint=BEGIN) from error
         except JoseError as error:
-            raise Unauthorised(f"what {self.issuer} sent is not believed: {str(error)[:200]}", hint=BEGIN) from error
+            raise Unauthorised(f"what {self.issuer} sent is not valid: {str(error)[:200]}", hint=BEGIN) from error
         except (httpx2.HTTPError, ValueError) as error:
-            raise Unavailable(
-                f"{self.issuer} does not answer as it should: {str(error)[:200]}", hint="try again later"
-            ) from error
+            raise Unavailable(f"{self.issuer} gave an unexpected answer: {str(error)[:200]}", hint="try again later") from error
 
 
 def begun(cookie: str) -> Begun | None:

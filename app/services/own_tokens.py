@@ -33,4 +33,4 @@ def _only(context: Context) -> str | None:
 
 def _require_in_person(context: Context) -> None:
     if context.person.scope is not None:
-        raise Forbidden("a token makes and revokes none", hint="sign in, or r2c2r token on the server's machine")
+        raise Forbidden("a token cannot make or revoke tokens", hint="sign in, or r2c2r token on the server's machine")

@@ -20,9 +20,7 @@ _COMMON = (
 )
 _READ_AS = str.maketrans("013457@$!", "oieastasi")  # digits and symbols substituted for letters
 _AT_THE_END = "0123456789!$.#*?-_"  # usual suffixes
-_HINT = (
-    f"at least {SHORTEST} characters that nobody would try first, such as three words that have nothing to do with each other"
-)
+_HINT = f"at least {SHORTEST} characters that are hard to guess, such as three unrelated words"
 
 
 def refuse_weak(name: str, password: str) -> None:
@@ -45,7 +43,7 @@ def weakness(name: str, password: str) -> str:
         return "is characters in order"
     own = re.sub(r"[\W\d_]", "", name)
     if own and own in _letters(folded) and len(_letters(folded).replace(own, "")) < FEWEST_OWN_LETTERS:
-        return "is the account's own name with little beside it"
+        return "is little more than the account's own name"
     readings = (folded, folded.translate(_READ_AS), folded.rstrip(_AT_THE_END).translate(_READ_AS))
     if any(_made_of_common_words(_letters(reading)) for reading in readings):
         return "is one of the commonest"

@@ -97,8 +97,8 @@ class People:
                 return self._begin(session, None, self._settings.user, client, "by a printed address")
         if time.monotonic() - self._key_refused > KEY_REFUSAL_S:
             self._key_refused = time.monotonic()
-            audit.note_refusal(self._engine, "", client, "a printed address that is used or not this server's")
-        raise Unauthorised("the key in this address is not valid any more", hint="r2c2r key prints a new address")
+            audit.note_refusal(self._engine, "", client, "a printed address that was used or is not this server's")
+        raise Unauthorised("the key in this address is no longer valid", hint="r2c2r key prints a new address")
 
     async def sign_in(self, name: str, password: str, client: str) -> str:
         """A new session; raises Unauthorised for a wrong name or password, TooMany while too many attempts are waiting."""

@@ -42,9 +42,9 @@ def look_at(context: Context, kind: Kind, path: Path, name: str) -> Any:
         except queue.Empty:
             line = None
     if line is None and context.probes.stopped:
-        raise Unavailable("the server stops", hint="what was sent is kept: finish it when the server is there again")
+        raise Unavailable("the server stops", hint="the sent bytes are kept: finish the upload when the server is back")
     if line is None:
-        raise _REFUSAL[kind](f"{name} cannot be read: looking at it took too long or too much memory", hint="export it again")
+        raise _REFUSAL[kind](f"{name} cannot be read: checking it took too long or too much memory", hint="export it again")
     if "error" in line:
         raise _refusal(kind, name, line["error"])
     return line.get("seen")

@@ -131,7 +131,7 @@ def _check_places(given: _Given, name: str) -> None:
         raise InputError(f"{name}: {ABOUT}: {len(about.colours)} colours of {objects} objects", hint=_HINT)
     for place in (*(one.said.object for one in about.comments), *(one.said.object for one in about.true_lengths)):
         if place is not None and place >= objects:
-            raise InputError(f"{name}: {ABOUT}: something is said of object {place}, the last is {objects - 1}", hint=_HINT)
+            raise InputError(f"{name}: {ABOUT}: it refers to object {place}, the last is {objects - 1}", hint=_HINT)
     for comment in about.comments:
         if comment.said.frame is not None:
             in_frames.check_frame(table, comment.said.frame)

@@ -34,7 +34,7 @@ def set_members(context: Context, project_id: str, body: schemas.MembersIn) -> s
     with writing(context.engine) as session:
         row = queries.project_row(session, project_id)
         if not _may_change(context, session, row):
-            raise Forbidden("only the project's owner or an admin names its members", hint="ask one of them")
+            raise Forbidden("only the project's owner or an admin may choose its members", hint="ask one of them")
         accounts = session.exec(select(Account).where(col(Account.name).in_({name.lower() for name in body.members}))).all()
         unknown = {name.lower() for name in body.members} - {account.name for account in accounts}
         if unknown:

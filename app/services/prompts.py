@@ -378,7 +378,7 @@ def _gives_masks(body: schemas.ObjectIn) -> bool:
 def _point(session: Session, item: SceneObject, point_id: int) -> Point:
     found = session.get(Point, point_id)
     if found is None or found.object_id != item.id:
-        raise NotFound(f"no point {point_id} on {item.name}", hint="it may have been removed meanwhile")
+        raise NotFound(f"no point {point_id} on {item.name}", hint="it may have been removed in the meantime")
     return found
 
 

@@ -102,7 +102,7 @@ def _wanted(context: Context, project_id: str, ids: list[str]) -> list[schemas.P
     items = {line["id"]: _shape(line) for line in found.lines if line["id"] not in found.dismissed}
     for proposal in ids:
         if proposal not in items:
-            raise NotFound(f"no proposal {proposal}", hint="it may have been confirmed or dismissed meanwhile")
+            raise NotFound(f"no proposal {proposal}", hint="it may have been confirmed or dismissed in the meantime")
     return [items[proposal] for proposal in dict.fromkeys(ids)]
 
 

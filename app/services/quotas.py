@@ -21,7 +21,8 @@ def check_job(context: Context, session: Session) -> None:
     found = session.exec(mine).one()
     if found >= most:
         raise TooMany(
-            f"{found} of your jobs wait or run, at most {most} may", hint=f"wait for one, or cancel one; {RAISE} jobs=N"
+            f"{found} of your jobs are waiting or running, the limit is {most}",
+            hint=f"wait for one, or cancel one; {RAISE} jobs=N",
         )
 
 
@@ -35,10 +36,10 @@ def check_upload(context: Context, session: Session, size: int) -> None:
     stop = "finish or cancel one of your uploads"
     if found >= quotas.uploads:
         raise TooMany(
-            f"{found} of your uploads are under way, at most {quotas.uploads} may be", hint=f"{stop}; {RAISE} uploads=N"
+            f"{found} of your uploads are under way, the limit is {quotas.uploads}", hint=f"{stop}; {RAISE} uploads=N"
         )
     if announced + size > quotas.upload_gb * 2**30:
-        said = f"your uploads would be {(announced + size) / 2**30:.1f} GB, at most {quotas.upload_gb} may be under way"
+        said = f"your uploads would be {(announced + size) / 2**30:.1f} GB, the limit is {quotas.upload_gb} GB"
         raise TooMany(said, hint=f"{stop}; {RAISE} upload_gb=N")
 
 
@@ -56,7 +57,7 @@ def check_project(context: Context, session: Session, *, sample: bool = False) -
 
 def _refuse_beyond(name: str, most: int, found: int) -> None:
     if found >= most:
-        raise Conflict(f"you have {found} {name}, at most {most} may be", hint=f"ask an admin to delete one; {RAISE} {name}=N")
+        raise Conflict(f"you have {found} {name}, the limit is {most}", hint=f"ask an admin to delete one; {RAISE} {name}=N")
 
 
 def _free(context: Context) -> bool:

@@ -52,7 +52,7 @@ def give_verdict(context: Context, project_id: str, object_id: int, body: schema
         before = history.override_data(session, item)
         known = {c["candidate_id"] for c in facts["candidates"]} if facts else set()
         if body.candidate not in known | set(before.get("rejected", [])):
-            raise NotFound(f"{item.name} has no candidate {body.candidate}", hint="the candidates may have been made anew")
+            raise NotFound(f"{item.name} has no candidate {body.candidate}", hint="the candidates may have been made again")
         text = f"{body.verdict} {body.candidate} of {item.name}" + (f": {body.reason}" if body.reason else "")
         with history.change(session, item, "review", body.verdict, text, who=context.who):
             _store_verdict(session, item, body, context.who)
@@ -118,7 +118,7 @@ def _category_made(context: Context, project: Project, name: str) -> str:
     scene = fitted(context.files(project)) or {"objects": []}
     category: str | None = next((item["category"] for item in scene["objects"] if item["name"] == name), None)
     if category is None:
-        raise NotFound(f"the scene has no {name[:60]}", hint="it may be called otherwise since the last run")
+        raise NotFound(f"the scene has no {name[:60]}", hint="it may have been renamed since the last run")
     return category
 
 

@@ -26,7 +26,7 @@ def everyone(context: Context) -> schemas.Seats:
 def drain(context: Context, seat_id: int, body: schemas.SeatIn) -> schemas.Seats:
     """Start or stop draining a seat; it takes effect with its next heartbeat."""
     if not context.runner.rows.shared:
-        raise Conflict("this server is the only seat", hint="stop it instead: its jobs wait for the next start")
+        raise Conflict("this server is the only seat", hint="stop the server instead: its jobs wait for the next start")
     with writing(context.engine) as session:
         row = session.get(Seat, seat_id)
         if row is None:

@@ -30,8 +30,8 @@ def check_person(person: Person, named: str | None) -> None:
     """Refuse pending changes of a page whose user differs from the signed-in one; `named` is percent-encoded."""
     if named is not None and unquote(named) != person.name:
         raise Unauthorised(
-            f"this change was made by {unquote(named)!r}, and {person.name!r} is signed in now",
-            hint="sign in as the one who made it: it waits until then",
+            f"this change was made by {unquote(named)!r}, but {person.name!r} is signed in now",
+            hint="sign in as the person who made it: the change waits until then",
         )
 
 
@@ -44,7 +44,7 @@ def answer_of(context: Context, change: Sending) -> Answer | None:
     if found.request != change.request:
         raise InputError("this Idempotency-Key was used for another change", hint="make a new key for each change")
     if found.status is None:
-        raise Conflict("this change is stored; the server stopped before it could say so", hint="look at what is there now")
+        raise Conflict("this change is stored; the server stopped before it could confirm that", hint="check the current state")
     return Answer(found.status, found.answer)
 
 

@@ -59,9 +59,9 @@ def step(context: Context, project_id: str, body: schemas.ReviewStep) -> schemas
         context.require(transition.role)
         unmet = transition.check(context, session, project) if transition.check else []
         if unmet and not reason:
-            raise Conflict(f"not {body.to} yet: {'; '.join(unmet)}", hint="mend that, or give a reason")
+            raise Conflict(f"not {body.to} yet: {'; '.join(unmet)}", hint="correct that, or give a reason")
         if transition.says_why and not reason:
-            raise Conflict(f"nobody knows why it should be {body.to}", hint="say what has to change")
+            raise Conflict(f"no reason is given why it should be {body.to}", hint="write what has to change")
         _record(context, session, project, body.to, reason, unmet)
     projects.tell(context, project_id)
     context.hub.publish("review", project_id, object=None)

@@ -68,7 +68,7 @@ def browse(context: Context, path: str | None) -> schemas.FolderListing:
             (p for p in folder.iterdir() if not p.name.startswith(".")), key=lambda p: (p.is_file(), p.name.casefold())
         )
     except PermissionError as error:
-        raise Forbidden(f"{folder} may not be read by this app", hint="choose another folder") from error
+        raise Forbidden(f"this app has no permission to read {folder}", hint="choose another folder") from error
     entries = [entry for p in found[:2000] if (entry := _entry(p))]
     parent = folder.parent if _is_allowed(context, folder.parent) else None
     return schemas.FolderListing(path=str(folder), parent=str(parent) if parent else "", entries=entries)
@@ -83,11 +83,11 @@ def allowed_path(context: Context, path: str) -> Path:
     except (OSError, RuntimeError) as error:
         raise NotFound(f"{path}: {error}") from error
     if any(part.startswith(".") for part in _below_root(context, resolved).parts):
-        raise Forbidden(f"{resolved} is in a hidden folder", hint="recordings are taken from folders that are shown")
+        raise Forbidden(f"{resolved} is in a hidden folder", hint="choose a folder that is not hidden")
     if not _is_allowed(context, resolved):
         roots = ", ".join(str(root) for root in context.settings.roots)
         hint = f"allowed: {roots}; `r2c2r serve --import-from DIR` allows another one"
-        raise Forbidden(f"{resolved} is outside the folders recordings may come from", hint=hint)
+        raise Forbidden(f"{resolved} is outside the folders that recordings may be imported from", hint=hint)
     return resolved
 
 

@@ -27,7 +27,7 @@ def add(context: Context, body: schemas.TemplateIn) -> schemas.Template:
     """Add a template; raises Conflict when the name is taken."""
     with writing(context.engine) as session:
         if len(session.exec(select(Template.id)).all()) >= MOST:
-            raise InputError(f"{MOST} templates are there already", hint="delete those that nobody uses")
+            raise InputError(f"there are already {MOST} templates", hint="delete unused ones")
         return _write(context, session, Template(name="", who=context.who, changed=0.0), body)
 
 
@@ -67,7 +67,7 @@ def _write(context: Context, session: Session, row: Template, body: schemas.Temp
     _check(body.objects)
     same = select(Template.id).where(Template.name == body.name, col(Template.id).is_distinct_from(row.id))
     if session.exec(same).first() is not None:
-        raise Conflict(f"there is a template {body.name} already", hint="choose another name, or change that one")
+        raise Conflict(f"the template {body.name} already exists", hint="choose another name, or change that one")
     row.name, row.objects = body.name, [entry.model_dump() for entry in body.objects]
     row.changed = time.time()
     session.add(row)
@@ -95,7 +95,7 @@ def _row(session: Session, number: int) -> Template:
 def _mine(context: Context, session: Session, number: int) -> Template:
     row = _row(session, number)
     if not _may_change(context, row):
-        raise Forbidden(f"the template {row.name} is of {row.who}", hint="ask them or an admin, or make one of your own")
+        raise Forbidden(f"the template {row.name} belongs to {row.who}", hint="ask them or an admin, or make your own")
     return row
 
 

@@ -39,7 +39,7 @@ def add(
         _check_scope(scope, account)
         account_id = account.id if account else None
         if len(session.exec(select(ApiToken.id).where(ApiToken.account_id == account_id)).all()) >= MOST:
-            raise InputError(f"{MOST} tokens are there already", hint="revoke those that nothing uses")
+            raise InputError(f"there are already {MOST} tokens", hint="revoke unused ones")
         row = ApiToken(digest=_digest(secret), account_id=account_id, name=name, scope=scope, created=time.time())
         session.add(row)
         session.flush()
@@ -93,9 +93,9 @@ def _narrowed(person: Person, scope: str) -> Person:
 def _check_scope(scope: str, account: Account | None) -> None:
     role, reach = accounts.person(account).role if account else ROLES[-1], _role_of(_known(scope))
     if reach is not None and ROLES.index(reach) > ROLES.index(role):
-        raise Forbidden(f"the scope {scope} reaches further than the role {role}", hint=f"at most {role}")
+        raise Forbidden(f"the scope {scope} allows more than the role {role}", hint=f"at most {role}")
     if scope == "metrics" and role != "admin":
-        raise Forbidden("metrics are an admin's", hint="ask an admin of this server")
+        raise Forbidden("only admins may read metrics", hint="ask an admin of this server")
 
 
 def _known(scope: str) -> TokenScope:

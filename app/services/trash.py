@@ -69,7 +69,7 @@ def _stop(context: Context, project_id: str) -> None:
     for job in jobs:
         context.runner.cancel(job or 0)
     if not context.runner.wait_until_idle(project_id, context.settings.kill_grace_s + 5.0):
-        raise Conflict("a job of this project does not stop", hint="try again in a moment")
+        raise Conflict("a job of this project is still stopping", hint="try again in a moment")
     crossing.shut(context, project_id)
 
 

@@ -75,7 +75,9 @@ def discard(context: Context, entry: str) -> None:
     """Delete the bytes of an upload; a project's folder is never deleted from here."""
     path = _found(context, entry)
     if path.is_dir():
-        raise InputError(f"{entry} is a folder, and only bytes of an upload are discarded", hint="adopt it, or leave it there")
+        raise InputError(
+            f"{entry} is a folder; only the bytes of an upload can be discarded", hint="adopt it, or leave it there"
+        )
     path.unlink()
     _log.warning("%s: discarded by %s", path, context.who)
 
@@ -93,7 +95,7 @@ def _found(context: Context, entry: str) -> Path:
     for path in context.settings.unknown.glob("*"):
         if path.name == entry:
             return path
-    raise NotFound(f"nothing called {entry!r} was set aside", hint="look at the list again")
+    raise NotFound(f"nothing named {entry!r} was set aside", hint="look at the list again")
 
 
 def _only_said(folder: Path) -> bool:

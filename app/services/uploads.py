@@ -132,7 +132,7 @@ async def whole(
         with anyio.CancelScope(shield=True), contextlib.suppress(NotFound):  # refused ones are already deleted
             await anyio.to_thread.run_sync(forget, context, upload.id)
         if isinstance(error, ClientDisconnect):
-            raise CaptureError("the sender left before the last byte", hint="upload it again") from error
+            raise CaptureError("the connection ended before the last byte", hint="upload it again") from error
         raise
 
 
@@ -153,7 +153,7 @@ async def _store(context: Context, upload_id: str, at: int, size: int, stream: A
         async for chunk in stream:
             if at + len(chunk) > size:
                 _refuse_size(context, at + len(chunk))
-                raise TooLarge(f"more than the {size} bytes that were announced", hint="begin the upload anew")
+                raise TooLarge(f"more than the announced {size} bytes", hint="start the upload again")
             if (at + len(chunk)) % (64 << 20) < len(chunk):
                 reserve = context.settings.min_free_bytes
                 await anyio.to_thread.run_sync(require_free, context.settings.data_dir, 0, reserve)
@@ -233,5 +233,6 @@ def _refuse_size(context: Context, size: int) -> None:
     limit = context.settings.max_upload_bytes
     if size > limit:
         raise TooLarge(
-            f"the file is larger than {limit / 1e9:.1f} GB", hint="import it by its path, or serve with a larger --max-upload"
+            f"the file is larger than {limit / 1e9:.1f} GB",
+            hint="import it by its path, or start the server with a larger --max-upload",
         )

@@ -73,7 +73,9 @@ def make(context: Context, project_id: str, body: schemas.VariantsIn) -> int:
         require_free(Path(tempfile.gettempdir()), packed + unpacked, context.settings.min_free_bytes)
         name = f"v{body.version}-n{body.count}-s{body.seed}"
         if VariantFiles(files.variants / name).facts.exists():
-            raise Conflict(f"{body.count} variants of seed {body.seed} are there", hint="download them, or give another seed")
+            raise Conflict(
+                f"{body.count} variants of seed {body.seed} already exist", hint="download them, or give another seed"
+            )
         payload = {"bundle": bundle.name, "name": name, "count": body.count, "seed": body.seed}
         job = _under_way(session, project_id, name) or queue_job(context, session, project, "vary", payload)
         number = job.id or 0

@@ -57,7 +57,7 @@ def show(context: Context, project_id: str, session_id: str, body: schemas.Viewe
         wish["name"] = item.result_name
     if body.mode == "candidate":
         if item is None:
-            raise NotReady("a candidate of which object?", hint="give the object")
+            raise NotReady("no object is given for the candidate", hint="give the object")
         wish["candidate"] = body.candidate or _chosen(context, project_id, item.id or 0)
         wish["rotation"] = upright(files, item.result_name, wish["candidate"]).tolist()
     if body.mode == "scene":

@@ -33,7 +33,7 @@ def add(context: Context, body: schemas.WebhookIn) -> schemas.NewWebhook:
     with writing(context.engine) as session:
         _check_project(context, session, body.project)
         if len(session.exec(select(Webhook.id)).all()) >= MOST:
-            raise InputError(f"{MOST} webhooks are there already", hint="remove those that nothing needs")
+            raise InputError(f"there are already {MOST} webhooks", hint="remove unused ones")
         account = session.exec(select(Account).where(Account.name == context.who)).first() if context.person.account else None
         row = Webhook(project_id=body.project, url=body.url, secret=secrets.token_urlsafe(32), created=time.time())
         row.account_id = account.id if account else None
@@ -83,7 +83,7 @@ def _check_project(context: Context, session: Session, project_id: str | None) -
     if not context.access.sees(context.person, project_id):
         raise NotFound("there is no such project", hint="it may have been deleted")
     if not context.person.account or queries.owner(session, queries.project_row(session, project_id)) != context.who:
-        raise Forbidden("only the project's owner or an admin lets others hear of it", hint="ask one of them")
+        raise Forbidden("only the project's owner or an admin may add a webhook for it", hint="ask one of them")
 
 
 def _mine(context: Context) -> Any:

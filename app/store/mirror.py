@@ -104,7 +104,7 @@ class Mirror:
                     kept = {path: entry for path, entry in held.names.items() if path in names} | wanted
                     self._note(project_id, Held(kept, found.tag, recording or held.recording))
                     return
-            raise Unavailable(f"{project_id}: its files change all the time", hint="try again in a moment")
+            raise Unavailable(f"{project_id}: its files keep changing", hint="try again in a moment")
 
     def keep(self, project_id: str) -> None:
         """Upload local changes since the last synchronisation.
@@ -140,7 +140,7 @@ class Mirror:
                 self._note(project_id, Held(mine, tag if alone else None, held.recording))
                 self._sweep(project_id, names)
                 return
-            raise Unavailable(f"{project_id}: its files change all the time", hint="try again in a moment")
+            raise Unavailable(f"{project_id}: its files keep changing", hint="try again in a moment")
 
     def hold(self, project_id: str, holder: str, *, taken: bool = False) -> None:
         """Enter the holder in the manifest; raises NotFound where the project was deleted."""
@@ -226,7 +226,7 @@ class Mirror:
                 content = _written(Manifest(_said(found).names, holder))
                 self._objects.write(_manifest(project_id), content, after=found.tag if found else None)
                 return
-        raise Unavailable(f"{project_id}: its files change all the time", hint="try again in a moment")
+        raise Unavailable(f"{project_id}: its files keep changing", hint="try again in a moment")
 
     def _drop(self, project_id: str, held: Held, changed: Names, gone: set[str]) -> None:
         """Discard local results of a lost job; raises Lost."""
@@ -260,7 +260,7 @@ class Mirror:
         part = path.with_name(f".{path.name}.{threading.get_ident()}.tmp")
         try:
             if self._objects.get(_object(project_id, entry), part) != entry.sha256:
-                raise Unavailable(f"{path.name}: the store gave other bytes than were kept", hint="try again in a moment")
+                raise Unavailable(f"{path.name}: the store returned other bytes than were stored", hint="try again in a moment")
             os.utime(part, ns=(entry.mtime_ns, entry.mtime_ns))
             part.replace(path)
         finally:

@@ -22,10 +22,10 @@ _WRONG = tuple(
         # where cloud machines request credentials if none are set
         (r"169\.254\.169\.254|metadata\.google\.internal", "no credentials are set", "set {credentials}"),
         (r"builder error", "its endpoint has no TLS", "set AWS_ENDPOINT_URL to an https address, or AWS_ALLOW_HTTP=true"),
-        (r"code: 404", "there is no bucket {bucket}", "make it, or name another one; AWS_ENDPOINT_URL says whose"),
+        (r"code: 404", "there is no bucket {bucket}", "make it, or name another one; AWS_ENDPOINT_URL sets the provider"),
         (r"code: 40[13]", "it refuses the credentials ({code})", "check {credentials}, and that they may list, read and write"),
-        (r"code: (30\d|400)", "it does not understand ({code})", "check AWS_REGION and AWS_ENDPOINT_URL"),
-        (r"Permission denied|Read-only", "nothing can be written there", "give its folder to whoever runs r2c2r"),
+        (r"code: (30\d|400)", "it does not understand the request ({code})", "check AWS_REGION and AWS_ENDPOINT_URL"),
+        (r"Permission denied|Read-only", "nothing can be written there", "give its folder to the account that runs r2c2r"),
     )
 )
 

@@ -135,7 +135,7 @@ class Viewer:
         if view is None:
             raise Forbidden("this 3D view has been closed", hint="open the review page again")
         if self._connections[who] >= MOST_CONNECTIONS:
-            raise TooMany(f"{MOST_CONNECTIONS} 3D views of yours are connected already", hint="close some tabs")
+            raise TooMany(f"you already have {MOST_CONNECTIONS} 3D views connected", hint="close some tabs")
         self._connections[who] += 1
         view.watching += 1
         try:
@@ -216,7 +216,9 @@ class Viewer:
             return
         idle = sorted((view for view in running if not view.watching), key=lambda view: view.used)
         if not idle:
-            raise Unavailable(f"{len(running)} people look at 3D views already", hint="try again when one has left")
+            raise Unavailable(
+                f"{len(running)} people already have a 3D view open", hint="try again when one of them has closed it"
+            )
         self._end(idle[0])
 
     def _end(self, view: Opened) -> None:
@@ -264,7 +266,7 @@ class Viewer:
 
     def _running(self) -> Worker:
         if not self.enabled:
-            raise Unavailable("the 3D view is switched off", hint="see the picture and the mesh instead")
+            raise Unavailable("the 3D view is switched off", hint="use the picture and the mesh instead")
         if self._stopped:
             raise Unavailable("the server stops", hint="try again in a moment")
         if self._worker is not None and not self._worker.alive:
@@ -279,4 +281,4 @@ class Viewer:
         return self._worker
 
     def _down(self) -> Unavailable:
-        return Unavailable("the 3D view has stopped", hint="try again: it starts anew; its log is logs/viewer.log")
+        return Unavailable("the 3D view has stopped", hint="try again: it restarts; its log is logs/viewer.log")

@@ -108,7 +108,7 @@ def test_a_socket_from_anywhere_else_is_refused_and_the_proxys_is_open_until_the
 
 def test_a_header_that_was_added_to_instead_of_replaced_is_refused(web: Running) -> None:
     answer = by(web, PROXY).get("/api/system", headers=[("X-Forwarded-User", "ann"), ("X-Forwarded-User", "root")])
-    assert (answer.status_code, answer.json()["message"]) == (403, "X-Forwarded-User stands twice in the request")
+    assert (answer.status_code, answer.json()["message"]) == (403, "X-Forwarded-User occurs twice in the request")
 
 
 @pytest.mark.parametrize("name", ["", "two words", "a" * 61, "../admin", "{http.auth.user.id}"])
@@ -129,7 +129,7 @@ def test_without_the_header_people_sign_in_and_a_token_stays_what_it_is(web: Run
     assert program.get("/api/system").json()["user"] == "ann"
 
 
-@pytest.mark.parametrize("password", ["", "nobody knows this one"])
+@pytest.mark.parametrize("password", ["", "no such account"])
 def test_no_password_opens_an_account_that_has_none(web: Running, password: str) -> None:
     assert by(web, PROXY, "ann").get("/api/system").status_code == 200
     assert accounts.verified(web.context.engine, "ann", password) is None

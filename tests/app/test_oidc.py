@@ -144,7 +144,7 @@ def test_who_is_in_no_group_that_may_is_refused_on_the_page_and_recorded(
     provider.knows("2", preferred_username="bob", groups=groups)
     client, answer = sign_in(web, provider, "2")
     assert (answer.status_code, COOKIE in client.cookies) == (403, False)
-    assert "bob is in no group that may come in" in answer.text
+    assert "bob is in no group that may sign in" in answer.text
     assert "bob is in no group" in refusal(web)
     assert accounts.everyone(web.context.engine) == []
 
@@ -172,7 +172,7 @@ def test_who_chooses_somebody_elses_name_at_the_provider_does_not_become_them(we
     provider.knows("5", preferred_username="root", groups=["lab"])
     client, answer = sign_in(web, provider, "5")
     assert (answer.status_code, COOKIE in client.cookies) == (409, False)
-    assert "there is an account root already, and it is not yours" in answer.text
+    assert "the account root belongs to somebody else" in answer.text
 
 
 def test_an_answer_is_of_use_to_the_browser_alone_that_began_and_once(web: Running, provider: Identities) -> None:
@@ -183,7 +183,7 @@ def test_an_answer_is_of_use_to_the_browser_alone_that_began_and_once(web: Runni
     for stranger in (browser(web), other):
         answer = stranger.get(back, follow_redirects=False)
         assert (answer.status_code, COOKIE in stranger.cookies) == (401, False)
-    assert "not begun in this browser" in refusal(web)
+    assert "not started in this browser" in refusal(web)
     assert client.get(back, follow_redirects=False).status_code == 303
     assert client.get(back, follow_redirects=False).status_code == 401
 
@@ -212,7 +212,7 @@ def test_a_token_that_says_otherwise_than_was_asked_is_not_believed(
     provider.bend(**{claim: value})
     answer = client.get(provider.lets_in(page, "1"), follow_redirects=False)
     assert (answer.status_code, COOKIE in client.cookies) == (401, False)
-    assert "is not believed" in answer.text
+    assert "is not valid" in answer.text
 
 
 def test_algorithms_without_a_public_key_are_none_even_where_the_provider_offers_them(

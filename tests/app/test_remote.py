@@ -110,7 +110,7 @@ def test_a_token_that_reaches_less_far_is_told_so(
 ) -> None:
     monkeypatch.setenv("R2C2R_TOKEN", remote.token("read"))
     assert main(["remote", "upload", str(scan)]) == 2
-    assert "this token is for read alone" in capsys.readouterr().err
+    assert "this token allows only read" in capsys.readouterr().err
     monkeypatch.setenv("R2C2R_TOKEN", "r2c2r_wrong")
     assert main(["remote", "list"]) == 2
     monkeypatch.delenv("R2C2R_TOKEN")

@@ -57,7 +57,7 @@ def test_accounts_are_made_and_changed_from_the_command_line(
         (("add", "bob"), "bob1234567", "own name"),
         (("remove", "zoe"), "", "only admin"),
         (("add", "bob", "--role", "king"), "three plain words", "no role"),
-        (("add", "../bob"), "three plain words", "no name"),
+        (("add", "../bob"), "three plain words", "not a valid account name"),
         (("remove", "eve"), "", "no account eve"),
     ):
         code, text = user(*words, said=said)

@@ -215,7 +215,7 @@ def test_an_empty_postgres_beside_projects_is_not_served(
     assert main(["serve", "--port", "0", "--data", str(tmp_path)]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert "no project, beside 1 project folders" in printed.err
+    assert "no project in the database, but 1 project folders" in printed.err
     assert "r2c2r db move" in printed.err
     assert main(["serve", "--port", "0", "--adopt", "--data", str(tmp_path)]) == 0
     postgres_server.drop_all()

@@ -17,7 +17,7 @@ def test_a_refused_path_stays_and_says_what_allows_it(new_context: NewContext, s
     field.fill("/usr/share/kitchen.r3d")
     field.press("Enter")
     alert = page.get_by_role("dialog").get_by_role("alert")
-    expect(alert).to_contain_text("/usr/share/kitchen.r3d is outside the folders recordings may come from")
+    expect(alert).to_contain_text("/usr/share/kitchen.r3d is outside the folders that recordings may be imported from")
     expect(alert).to_contain_text("--import-from DIR")
     expect(field).to_have_value("/usr/share/kitchen.r3d")
     picture(page, "import-refused")

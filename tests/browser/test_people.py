@@ -30,7 +30,7 @@ def test_who_is_added_may_work_and_who_is_removed_is_shown_out(new_context: NewC
     ann.get_by_label("Name").fill("carl")
     ann.get_by_label("Password, at least 10 characters", exact=True).fill("carl123456")
     ann.get_by_role("button", name="Add").click()
-    wait_for_toast(ann, "own name with little beside it")
+    wait_for_toast(ann, "is little more than the account's own name")
     ann.get_by_label("Password, at least 10 characters", exact=True).fill("a password of carl")
     ann.get_by_role("button", name="Add").click()
     wait_for_toast(ann, "carl may sign in now")
