@@ -27,7 +27,7 @@ def test_objects_that_spoil_a_run_are_told_before_it(new_context: NewContext, se
     post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "mug", "points": [SAME]})  # type: ignore[dict-item]
     expect(rows(page).last).to_contain_text("3 frames")
     page.get_by_role("link", name="Run", exact=True).click()
-    expect(before.get_by_role("heading")).to_have_text("Mend this before the run")
+    expect(before.get_by_role("heading")).to_have_text("Fix this before the run")
     told = before.get_by_role("listitem")
     expect(told).to_have_count(2)
     expect(told.first).to_contain_text("bottle_1: Has no click yet")

@@ -74,6 +74,6 @@ def test_a_crop_box_is_dragged_typed_undone_and_taken_away(new_context: NewConte
     page.keyboard.press("Escape")
     expect(sides).to_have_count(0)
     with changed(page):
-        page.get_by_role("button", name="Take it away").click()
-    expect(page.get_by_role("button", name="Take it away")).to_have_count(0)
+        page.get_by_role("button", name="Remove box").click()
+    expect(page.get_by_role("button", name="Remove box")).to_have_count(0)
     assert crop(page) is None

@@ -21,7 +21,7 @@ def test_a_honeypot_is_slipped_in_done_and_scored(new_context: NewContext, serve
     ann.goto(f"{server.address}/people")
     ann.get_by_role("combobox", name="For", exact=True).select_option("cleo")
     ann.get_by_label("Called", exact=True).fill("Flat 7")
-    ann.get_by_role("button", name="Slip it in").press("Enter")
+    ann.get_by_role("button", name="Add to the inbox").press("Enter")
     wait_for_toast(ann, "Flat 7 is in the inbox of cleo")
     line = ann.get_by_role("region", name="Honeypots").locator("tbody tr")
     expect(line).to_contain_text("0 of 2")

@@ -38,7 +38,7 @@ def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Serve
     expect(names).to_have_count(2)
     page.get_by_label("Which projects").select_option("Archived")
     expect(names).to_have_text(["Attic"])
-    page.get_by_role("button", name="Take out: Attic").click()
+    page.get_by_role("button", name="Unarchive: Attic").click()
     expect(page.get_by_text("Nothing is archived.")).to_be_visible()
     page.get_by_label("Which projects").select_option("In work")
     expect(names).to_have_count(3)

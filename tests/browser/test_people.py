@@ -147,7 +147,7 @@ def test_a_project_is_kept_to_the_people_its_owner_names(new_context: NewContext
     expect(card).to_have_count(1)
 
     panel = ann.get_by_role("region", name="Who sees this project")
-    nobody = panel.get_by_text("Nobody is named yet")
+    nobody = panel.get_by_text("No members yet")
     panel.get_by_label("Everybody who may sign in").press("ArrowDown")
     expect(nobody).to_be_visible()
     expect(panel.get_by_label("Only these people")).to_be_focused()

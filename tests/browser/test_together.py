@@ -176,7 +176,7 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     move(bea, "Request changes", "answer the comment")
     expect(ann.locator("r2c2r-review-state")).to_contain_text("answer the comment")
     ann.get_by_role("button", name=re.compile("^Resolve")).click()
-    expect(ann.locator("r2c2r-comments")).to_contain_text("None open.")  # the steps are drawn anew with it
+    expect(ann.locator("r2c2r-comments")).to_contain_text("No open comments.")  # the steps are drawn anew with it
     expect(ann.locator("r2c2r-review-state")).not_to_contain_text("open comment")
     move(ann, "Send to review again", "one drawer")
     move(bea, "Start the review")
@@ -330,5 +330,5 @@ def test_what_waits_for_a_person_is_in_their_inbox_and_what_happened_meanwhile_o
     expect(bea).to_have_url(re.compile(r"/annotate\?frame=3"))
     bea.go_back()
     bea.get_by_role("button", name="Resolve: one drawer or two, @bea").press("Enter")
-    expect(bea.get_by_role("region", name="Comments that name you")).to_be_hidden()
+    expect(bea.get_by_role("region", name="Comments that mention you")).to_be_hidden()
     expect(inbox).to_have_text("Inbox 1")

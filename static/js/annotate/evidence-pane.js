@@ -11,7 +11,7 @@ export class EvidencePane extends EventTarget {
   comments = new CommentList();
   cloud = new ObjectCloud();
   #crop = this.#button("crop", "Crop box");
-  #uncrop = this.#button("uncrop", "Take it away");
+  #uncrop = this.#button("uncrop", "Remove box");
   #depth = h("img", { class: "depth", alt: "Depth of this frame: red is near, blue is far" });
   element = h(
     "aside",

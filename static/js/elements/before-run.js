@@ -51,7 +51,7 @@ export class BeforeRun {
     const coming = objects.filter(isComing).length;
     this.element.hidden = !told.length && !unsure.length && !coming;
     this.element.replaceChildren(
-      h("h2", {}, told.length ? "Mend this before the run" : "Before the run"),
+      h("h2", {}, told.length ? "Fix this before the run" : "Before the run"),
       ...(told.length ? [lines(told)] : []),
       ...(coming
         ? [h("p", { class: "muted" }, `${counted(coming, "object")} still being found: the run finds the rest.`)]

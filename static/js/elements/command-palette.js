@@ -61,7 +61,7 @@ export class CommandPalette extends HTMLElement {
       option.addEventListener("click", () => this.#run(command));
       return option;
     });
-    this.#list.replaceChildren(...(options.length ? options : [h("li", { class: "muted" }, "Nothing of that name.")]));
+    this.#list.replaceChildren(...(options.length ? options : [h("li", { class: "muted" }, "No matches.")]));
     this.#input.setAttribute("aria-activedescendant", options.length ? `palette-${this.#at}` : "");
     options[this.#at]?.scrollIntoView({ block: "nearest" });
   }

@@ -21,7 +21,7 @@ export class CommentList extends LiveElement {
   #settled = h("input", { type: "checkbox" });
   #heading = h("h2", {}, "Comments");
   #list = h("ul", { class: "comments" });
-  #showSettled = h("label", { class: "row" }, this.#settled, "Settled ones too");
+  #showSettled = h("label", { class: "row" }, this.#settled, "Show resolved");
 
   connected() {
     this.replaceChildren(this.#heading, this.#list, this.#showSettled);
@@ -74,7 +74,7 @@ export class CommentList extends LiveElement {
       this.#list,
       ...(shown.length
         ? shown.map((comment) => this.#item(comment))
-        : [h("li", { class: "muted none" }, "None open.")]),
+        : [h("li", { class: "muted none" }, "No open comments.")]),
     );
   }
 

@@ -30,7 +30,7 @@ export class HoneypotList extends LiveElement {
     h("label", {}, "Sample kitchen", this.#sample),
     h("label", {}, "For", this.#person),
     h("label", {}, "Called", this.#name),
-    h("button", { type: "submit", class: "primary" }, "Slip it in"),
+    h("button", { type: "submit", class: "primary" }, "Add to the inbox"),
   );
   #none = h("p", { class: "muted" }, "Make a sample kitchen on the page Projects first.");
 

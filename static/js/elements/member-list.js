@@ -57,7 +57,7 @@ export class MemberList extends LiveElement {
 
   /** @param {string[]} names */
   #list(names) {
-    if (!names.length) return h("p", { class: "muted" }, "Nobody is named yet.");
+    if (!names.length) return h("p", { class: "muted" }, "No members yet.");
     return h("ul", { class: "plain", "aria-label": "Members" }, ...names.map((name) => this.#member(name)));
   }
 

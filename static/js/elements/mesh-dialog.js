@@ -19,7 +19,7 @@ export function askToUseMesh(file, name, look) {
     const shown = h(
       "div",
       { class: "stack", "aria-live": "polite" },
-      h("p", {}, `Looking at ${file.name}…`),
+      h("p", {}, `Checking ${file.name}…`),
       h("progress"),
     );
     const use = h("button", { type: "submit", class: "primary", value: "use", disabled: true }, "Use this mesh");

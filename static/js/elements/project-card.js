@@ -49,7 +49,7 @@ export function projectCard(project, { admin, act, find }) {
         button("tag", "Tags"),
         button("duplicate", "Duplicate"),
         project.status === "ready" ? button("export", "Export") : null,
-        button("archive", project.archived ? "Take out" : "Archive"),
+        button("archive", project.archived ? "Unarchive" : "Archive"),
         admin ? button("delete", "Delete") : null,
       ),
     ),

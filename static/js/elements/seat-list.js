@@ -41,7 +41,7 @@ export class SeatList extends LiveElement {
 
   /** @param {Seats} seats */
   #show({ waiting, shared, seats }) {
-    const text = waiting ? `${counted(waiting, "job")} in the queue` : "No job waits";
+    const text = waiting ? `${counted(waiting, "job")} in the queue` : "No waiting jobs";
     if (this.#waiting.textContent !== text) this.#waiting.textContent = text;
     renew(this.#rows, ...seats.map((seat) => this.#row(seat, shared)));
   }

@@ -36,7 +36,7 @@ export class UploadCard extends LiveElement {
       state.textContent = waiting
         ? "no connection: the upload resumes by itself"
         : fraction === 1
-          ? "looking at it…"
+          ? "checking the file…"
           : "";
     };
     try {

@@ -29,7 +29,7 @@ export class FrontPane extends EventTarget {
   /** Kinds that slide along their front: their side is where to. @type {Set<string>} */
   #sideways = new Set();
   #hinge = h("select", {}, ...options({ "": "inferred", left: "left", right: "right", top: "top", bottom: "bottom" }));
-  #handle = h("select", {}, ...options({ "": "looked for", none: "none", drawn: "drawn" }));
+  #handle = h("select", {}, ...options({ "": "detected", none: "none", drawn: "drawn" }));
   #adopt = h("button", { type: "button", onClick: () => this.#say("adopt") });
   #copy = h("button", { type: "button", onClick: () => this.#say("copy") }, "Copy handle and hinge (C)");
   #fields = h(

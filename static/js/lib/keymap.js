@@ -38,7 +38,7 @@ export const KEYMAP = [
     text: "Crop box of this thing: what lies outside does not belong to it",
     page: "annotate",
   },
-  { keys: ["Shift+s"], action: "uncrop", text: "Take its crop box away", page: "annotate" },
+  { keys: ["Shift+s"], action: "uncrop", text: "Remove its crop box", page: "annotate" },
   { keys: ["h"], action: "hide", text: "Hide or show this object's mask", page: "annotate" },
   { keys: ["Shift+h"], action: "solo", text: "Show this object's mask alone", page: "annotate" },
   { keys: ["Shift+l"], action: "lock", text: "Lock this object against changes, or unlock it", page: "annotate" },

@@ -167,7 +167,7 @@ export class DownloadPage extends LiveElement {
   /** @param {Bundle[]} bundles newest first */
   #versions(bundles) {
     const rows = bundles.map((bundle, k) => this.#row(bundle, bundles[k + 1]));
-    const titles = ["Bundle", "Made", "Certificate", "Size", "SHA-256", "Since the one before"];
+    const titles = ["Bundle", "Made", "Certificate", "Size", "SHA-256", "Since the version before"];
     return h(
       "section",
       { class: "card stack scroll" },

@@ -43,7 +43,7 @@ export class InboxPage extends LiveElement {
     const groups = [
       group("Sent back to you", returned.map(projectLine)),
       group(
-        "Comments that name you",
+        "Comments that mention you",
         mentions.map((one) => this.#mention(one)),
       ),
       ...projectsOf(objects).map((some) =>
@@ -54,7 +54,7 @@ export class InboxPage extends LiveElement {
       ),
       ...states.map((some, k) => group(`Assigned to you: ${STATES[k]}`, some.map(projectLine))),
     ].filter((one) => one !== null);
-    const none = h("p", { class: "muted" }, "Nothing waits for you.");
+    const none = h("p", { class: "muted" }, "Your inbox is empty.");
     const how =
       "Projects are assigned on their overview, objects in Annotate; @ and a name in a comment puts it into that person's inbox.";
     renew(this.#body, h("h1", {}, "Inbox"), ...(groups.length ? groups : [none]), h("p", { class: "muted" }, how));

@@ -77,7 +77,7 @@ export class PeoplePage extends LiveElement {
 
   /** @param {AccountInfo[]} accounts */
   #table(accounts) {
-    const titles = ["Name", "Role", "Last here", ""].map((text) => h("th", { scope: "col" }, text));
+    const titles = ["Name", "Role", "Last seen", ""].map((text) => h("th", { scope: "col" }, text));
     const rows = accounts.map((account) => this.#row(account));
     return h("table", {}, h("thead", {}, h("tr", {}, ...titles)), h("tbody", {}, ...rows));
   }

@@ -315,7 +315,7 @@ export class ProjectsPage extends LiveElement {
     archive: async ({ id, name, archived }) => {
       await changeProject(id, { archived: !archived });
       const undo = () => changeProject(id, { archived }).then(() => this.#load(), sayError);
-      say(archived ? `${name} is in work again` : `${name} is archived`, { offer: { text: "Undo", run: undo } });
+      say(archived ? `${name} is out of the archive` : `${name} is archived`, { offer: { text: "Undo", run: undo } });
     },
     delete: async ({ id, name }) => {
       await deleteProject(id);

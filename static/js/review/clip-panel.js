@@ -45,8 +45,8 @@ export class ClipPanel extends EventTarget {
     h(
       "div",
       { class: "row" },
-      this.#preset("Front off", { low: [0, HALF, 0], high: [1, 1, 1] }),
-      this.#preset("Left half off", { low: [HALF, 0, 0], high: [1, 1, 1] }),
+      this.#preset("Cut the front off", { low: [0, HALF, 0], high: [1, 1, 1] }),
+      this.#preset("Cut the left half off", { low: [HALF, 0, 0], high: [1, 1, 1] }),
       this.#preset("Top off", { low: [0, 0, 0], high: [1, 1, HALF] }),
       this.#around,
       this.#reset,
