@@ -139,7 +139,9 @@ class Provider:
         except JoseError as error:
             raise Unauthorised(f"what {self.issuer} sent is not valid: {str(error)[:200]}", hint=BEGIN) from error
         except (httpx2.HTTPError, ValueError) as error:
-            raise Unavailable(f"{self.issuer} gave an unexpected answer: {str(error)[:200]}", hint="try again later") from error
+            raise Unavailable(
+                f"{self.issuer} does not answer as expected: {str(error)[:200]}", hint="try again later"
+            ) from error
 
 
 def begun(cookie: str) -> Begun | None:

@@ -104,7 +104,7 @@ def test_a_gate_does_one_piece_of_each_asker_at_a_time_and_refuses_what_is_beyon
                 with anyio.fail_after(PATIENCE_S):
                     while sorted(at_work) != ["ann", "bob"]:
                         await anyio.sleep(LOOK_S)
-                with pytest.raises(TooMany, match="3 looks are under way") as refused:
+                with pytest.raises(TooMany, match="3 looks are already running") as refused:
                     await gate.run("ann", work, "ann")
                 assert refused.value.retry_s == 7
             finally:

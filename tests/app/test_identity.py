@@ -81,7 +81,7 @@ def test_from_anywhere_else_the_header_is_refused_and_said(web: Running, path: s
     with caplog.at_level(logging.WARNING, "app.security"):
         answer = by(web, ELSEWHERE, "ann", **{"X-Forwarded-For": PROXY}).get(path)
     assert answer.status_code == 403
-    assert f"this came from {ELSEWHERE}" in answer.json()["message"]
+    assert f"this request came from {ELSEWHERE}" in answer.json()["message"]
     assert f"X-Forwarded-User from {ELSEWHERE}" in caplog.text
     assert {line.action for line in record(web)} == {"added"}
 

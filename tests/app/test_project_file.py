@@ -179,7 +179,7 @@ REFUSED: list[tuple[str, Callable[[Any], Any], str]] = [
     (
         "project.json",
         lambda d: {**d, "comments": [{**d["comments"][0], "said": {"object": 2, "text": "x"}}]},
-        "said of object 2",
+        "refers to object 2",
     ),
     ("project.json", lambda d: {**d, "reading": {"scale": 1e9}}, "scale"),
     ("prompts.json", _objects(lambda o: [{**o[0], "points": [{**CLICK, "frame": 4}]}, o[1]]), "no frame 4"),

@@ -54,7 +54,7 @@ def sample(client: TestClient) -> Any:
 def test_jobs_that_wait_are_counted_a_person(web: Running) -> None:
     alice, bob = browser(web, "alice"), browser(web, "bob")
     made = [sample(alice).json()["job"]["id"] for _ in range(2)]
-    refused(sample(alice), 429, "2 of your jobs", "at most 2", "cancel")
+    refused(sample(alice), 429, "2 of your jobs", "the limit is 2", "cancel")
     assert sample(bob).status_code == 202
     assert alice.post(f"/api/jobs/{made[0]}/cancel").status_code == 200
     assert sample(alice).status_code == 202
@@ -82,7 +82,7 @@ def test_uploads_under_way_are_counted_and_weighed_a_person(web: Running) -> Non
     alice = browser(web, "alice")
     begun = alice.post("/api/uploads", json={"file_name": "a.r3d", "size": 2**29})
     assert begun.status_code == 201
-    refused(alice.post("/api/uploads", json={"file_name": "b.r3d", "size": 2**30}), 429, "1.5 GB", "at most 1")
+    refused(alice.post("/api/uploads", json={"file_name": "b.r3d", "size": 2**30}), 429, "1.5 GB", "the limit is 1 GB")
     assert alice.post("/api/uploads", json={"file_name": "b.r3d", "size": 5}).status_code == 201
     refused(alice.post("/api/uploads", json={"file_name": "c.r3d", "size": 5}), 429, "2 of your uploads", "cancel")
     assert alice.delete(f"/api/uploads/{begun.json()['id']}").status_code == 204

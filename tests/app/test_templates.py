@@ -56,7 +56,7 @@ def test_everybody_takes_a_template_and_who_made_it_or_an_admin_changes_it(kept:
     assert (may("alice"), may("bob"), may("root")) == ([True], [False], [True])
     at = f"/api/templates/{made['id']}"
     refused = kept.of["bob"].put(at, json={"name": "Mine", "objects": OBJECTS})
-    assert (refused.status_code, refused.json()["message"]) == (403, "the template Flat is of alice")
+    assert (refused.status_code, refused.json()["message"]) == (403, "the template Flat belongs to alice")
     assert kept.of["bob"].delete(at).status_code == 403
     taken = kept.of["bob"].put(f"/api/projects/{kept.project}/checklist", json={"template": made["id"]})
     assert taken.json()["checklist"] == OBJECTS

@@ -64,7 +64,7 @@ def test_the_connections_of_a_person_to_3d_views_are_bounded(seen: Running, monk
     with connecting(), connecting():
         with pytest.raises(WebSocketDisconnect) as refused, connecting():
             pass
-        assert (refused.value.code, "2 3D views of yours" in refused.value.reason) == (4429, True)
+        assert (refused.value.code, "you already have 2 3D views" in refused.value.reason) == (4429, True)
     seen.until(lambda: not seen.context.viewer._connections)
     with connecting() as again:
         again.send_text("hello")

@@ -57,7 +57,7 @@ def test_a_second_opinion_is_asked_given_and_compared(new_context: NewContext, s
     expect(lines.last).to_contain_text("oven_1")
     expect(lines.last).to_contain_text(re.compile(r"0\.[567]\d"))
     expect(lines.first).to_contain_text("only one has it")
-    expect(ann.get_by_text(re.compile("^Without a mask, and so in neither"))).to_be_visible()
+    expect(ann.get_by_text(re.compile("^Not compared, as they have no mask"))).to_be_visible()
     picture(ann, "opinions-agreement")
     assert serious(ann, "agreement") == []
     ann.set_viewport_size({"width": 390, "height": 800})
