@@ -314,7 +314,7 @@ def test_another_recording_is_refused_by_its_frames() -> None:
     for theirs, words in (
         (table(0.0, 0.5), "3 frames, 2 or others expected"),
         (table(0.0, 0.5, 1.0, width=320), "160x120 pixels, 320x120 expected"),
-        (table(0.0, 0.5, 1.2), "0.20 m off"),
+        (table(0.0, 0.5, 1.2), "0.20 m away"),
     ):
         with pytest.raises(CaptureError, match=words):
             refuse_another("a.r3d", ours, theirs)
