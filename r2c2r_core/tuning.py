@@ -24,9 +24,8 @@ CHOSEN = "chosen on the sample kitchens"
 
 UNITS = frozenset(
     {"m", "m²", "m³", "m/s", "kg", "s", "rad", "deg", "px", "px²", "share", "ratio", "cosine", "log", "σ", "count"}
-) | {
-    *("bytes", "grey", "colour", "score"),
-}
+    | {"bytes", "grey", "colour", "score"}
+)
 """share: a fraction from 0 to 1; ratio: of two like quantities; log: difference of natural logarithms; σ: standard deviations;
 grey: levels of 255; colour: of a channel, 0 to 1; score: on its own scale."""
 

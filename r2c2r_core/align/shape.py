@@ -28,7 +28,6 @@ class Shape:
     faces: Faces
     diameter: float
     frames: tuple[Matrix3, ...]  # columns: candidate box axes of the mesh, right-handed, best first
-    boxiness: float  # 0..1: share of the surface facing along the first frame's axes
     ups: tuple[Vector3, ...]  # directions that may point up (standing.py)
     bases: tuple[Vector3, ...]  # those along which the object stands stably
     oriented: bool  # faces wind outwards
@@ -61,7 +60,6 @@ def prepare_shape(mesh: TexturedMesh, *, point_count: int, face_limit: int, rng:
         faces=faces,
         diameter=diameter,
         frames=frames,
-        boxiness=boxiness,
         ups=ups,
         bases=bases,
         oriented=volume > 0.02 * float(np.prod(np.ptp(points @ frames[0], axis=0))),

@@ -9,6 +9,7 @@ import numpy as np
 from r2c2r_core.arrays import Mask
 from r2c2r_core.documents import read_bounded
 from r2c2r_core.errors import BundleError
+from r2c2r_core.evaluate.joints import mean
 from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.report import Metric
 
@@ -35,16 +36,16 @@ def mask_errors(truth: Path, found: Path, opened: frozenset[int] = frozenset()) 
             ajar.append(overlaps[-1])
     note = f"{len(overlaps)} frames" if overlaps else f"no frame shows {MIN_TRUTH_PX} px of it"
     return (
-        Metric(name="mask_iou", value=_mean(overlaps), unit="share", better="higher", tolerance=0.01, note=note),
+        Metric(name="mask_iou", value=mean(overlaps), unit="share", better="higher", tolerance=0.01, note=note),
         Metric(
             name="mask_frames",
-            value=_mean([float(p) for p in present]),
+            value=mean([float(p) for p in present]),
             unit="share",
             better="higher",
             tolerance=0.02,
             note=note,
         ),
-        _open_iou(_mean(ajar), f"{len(ajar)} frames" if ajar else "no frame shows it open"),
+        _open_iou(mean(ajar), f"{len(ajar)} frames" if ajar else "no frame shows it open"),
     )
 
 
@@ -78,7 +79,3 @@ def read_mask(file: Path, *, like: Mask | None = None) -> Mask:
     if image is None:
         raise BundleError(f"{file}: not a readable image", hint=again)
     return np.asarray(image) > 127
-
-
-def _mean(values: list[float]) -> float | None:
-    return float(np.mean(values)) if values else None

@@ -102,15 +102,16 @@ def _metrics(
     note: str,
 ) -> tuple[Metric, ...]:
     return (
-        Metric(name="joint_type", value=_mean(types), unit="share right", better="higher", tolerance=0.0, note=note),
-        Metric(name="hinge_side", value=_mean(hinges), unit="share right", better="higher", tolerance=0.0),
-        Metric(name="axis", value=_mean(axes), unit="deg", better="lower", tolerance=0.3),
-        Metric(name="pivot", value=_mean(pivots), unit="mm", better="lower", tolerance=3.0),
-        Metric(name="limit_revolute", value=_mean(limits_deg), unit="deg", better="lower", tolerance=2.0),
-        Metric(name="limit_prismatic", value=_mean(limits_mm), unit="mm", better="lower", tolerance=10.0),
-        Metric(name="range_ratio", value=_mean(ratios), unit="share", better="higher", tolerance=0.02),
+        Metric(name="joint_type", value=mean(types), unit="share right", better="higher", tolerance=0.0, note=note),
+        Metric(name="hinge_side", value=mean(hinges), unit="share right", better="higher", tolerance=0.0),
+        Metric(name="axis", value=mean(axes), unit="deg", better="lower", tolerance=0.3),
+        Metric(name="pivot", value=mean(pivots), unit="mm", better="lower", tolerance=3.0),
+        Metric(name="limit_revolute", value=mean(limits_deg), unit="deg", better="lower", tolerance=2.0),
+        Metric(name="limit_prismatic", value=mean(limits_mm), unit="mm", better="lower", tolerance=10.0),
+        Metric(name="range_ratio", value=mean(ratios), unit="share", better="higher", tolerance=0.02),
     )
 
 
-def _mean(values: list[float]) -> float | None:
+def mean(values: list[float]) -> float | None:
+    """Their mean; None where there are none."""
     return float(np.mean(values)) if values else None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2c2r_core.evaluate.joints import axis_deg, line_distance, pair_joints
+from r2c2r_core.evaluate.joints import axis_deg, line_distance, mean, pair_joints
 from r2c2r_core.evaluate.records import JointRecord, MotionRecord, ObjectRecord
 from r2c2r_core.model.report import Metric
 
@@ -49,9 +49,9 @@ def motion_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...
         Metric(
             name="state_open", value=_share(right_open, shown_open), unit="share", better="higher", tolerance=0.02, note=note
         ),
-        Metric(name="stop", value=_mean(stops), unit="share right", better="higher", tolerance=0.0),
-        Metric(name="limit_source", value=_mean(limits), unit="share right", better="higher", tolerance=0.0),
-        Metric(name="inner_depth", value=_mean(depths), unit="mm", better="lower", tolerance=2.0),
+        Metric(name="stop", value=mean(stops), unit="share right", better="higher", tolerance=0.0),
+        Metric(name="limit_source", value=mean(limits), unit="share right", better="higher", tolerance=0.0),
+        Metric(name="inner_depth", value=mean(depths), unit="mm", better="lower", tolerance=2.0),
         Metric(name="false_motion", value=false, unit="joints", better="lower", tolerance=0.0),
     )
 
@@ -130,7 +130,3 @@ def _claims_motion(joint: JointRecord) -> bool:
 
 def _share(part: int, whole: int) -> float | None:
     return part / whole if whole else None
-
-
-def _mean(values: list[float]) -> float | None:
-    return float(np.mean(values)) if values else None

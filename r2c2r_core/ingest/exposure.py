@@ -48,14 +48,6 @@ class Params:
     rounds: int = param(8, "count", "Number of IRLS iterations", ge=1)
 
 
-class Balance(NamedTuple):
-    """The frames with their gains, and the colour spread before and after."""
-
-    frames: tuple[Frame, ...]
-    spread_before: float  # median over the surface of one sigma of log colour across frames
-    spread_after: float
-
-
 class Looks(NamedTuple):
     """Colour observations of surface points, one row per point and frame."""
 
@@ -72,8 +64,8 @@ def balance_exposure(
     noise: DepthNoise,
     rng: np.random.Generator,
     progress: Progress = SILENT,
-) -> Balance:
-    """Gains that equalise exposure and white balance over the frames; none where they hardly reduce the colour spread."""
+) -> tuple[Frame, ...]:
+    """Frames with gains that equalise exposure and white balance over them; unchanged where that hardly reduces the spread."""
     params = tuned(Params)
     chosen = frames[:: max(1, len(frames) // params.frames)]
     points = sample_surface(vertices, faces, params.points, rng).points
@@ -81,11 +73,10 @@ def balance_exposure(
     log_gains = solve_gains(looks, len(chosen))
     before, after = spread(looks, np.zeros_like(log_gains)), spread(looks, log_gains)
     if not after < (1.0 - params.least_gain) * before:
-        return Balance(tuple(frames), before, before)
+        return tuple(frames)
     numbers = np.array([f.index for f in chosen], dtype=np.float64)
     gains = [np.exp([np.interp(f.index, numbers, channel) for channel in log_gains.T]) for f in frames]
-    balanced = (replace(f, gain=(float(g[0]), float(g[1]), float(g[2]))) for f, g in zip(frames, gains, strict=True))
-    return Balance(tuple(balanced), before, after)
+    return tuple(replace(f, gain=(float(g[0]), float(g[1]), float(g[2]))) for f, g in zip(frames, gains, strict=True))
 
 
 def see(frames: Sequence[Frame], images: FrameImages, points: Points, noise: DepthNoise, progress: Progress = SILENT) -> Looks:

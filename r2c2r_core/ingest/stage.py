@@ -113,7 +113,7 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
     noise = estimate_depth_noise(settled.frames, images, surface.vertices, surface.faces)
     rng = np.random.default_rng(config.seed)
     of_light = progress.part(0.97, 0.99)
-    balance = balance_exposure(settled.frames, images, surface.vertices, surface.faces, noise, rng, of_light)
+    balanced = balance_exposure(settled.frames, images, surface.vertices, surface.faces, noise, rng, of_light)
     progress.at(0.99, "hashing")
     sha256 = recording.files.sha256(recording.names)
     own_world = settled.evidence.source != "odometry"  # an estimated one is the first camera's
@@ -122,7 +122,7 @@ def read_recording(source: Path, store: Path, config: IngestConfig, *, progress:
         name=source.stem if source.is_file() else source.name,
         sha256=sha256,
         format=recording.format,
-        frames=balance.frames,
+        frames=balanced,
         surface=SceneSurface(vertices_world=surface.vertices, faces=surface.faces, colours=surface.colours, voxel_m=voxel_m),
         images=images,
         up_capture=recording.up_capture if own_world else None,

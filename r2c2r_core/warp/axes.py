@@ -35,7 +35,6 @@ class CanonicalMesh:
     """Vertices along the object's axes (front towards -Y), centre arbitrary, with warnings for a person."""
 
     vertices: Points
-    turned_rad: float
     warnings: tuple[str, ...]
 
 
@@ -56,9 +55,7 @@ def face_outwards(
     if has_handle and _handle_is_behind(points @ rotation_about_z(correction).T, normals @ rotation_about_z(correction).T):
         warnings.append("the mesh's handle was on the far side: the mesh was turned half round")
         correction += np.pi
-    return CanonicalMesh(
-        vertices=vertices @ rotation_about_z(correction).T, turned_rad=float(correction), warnings=tuple(warnings)
-    )
+    return CanonicalMesh(vertices=vertices @ rotation_about_z(correction).T, warnings=tuple(warnings))
 
 
 def _handle_is_behind(points: Points, normals: Points) -> bool:

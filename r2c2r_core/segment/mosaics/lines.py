@@ -10,8 +10,6 @@ import numpy as np
 from r2c2r_core.segment.mosaics.orthomosaic import Tile
 from r2c2r_core.tuning import param, tuned
 
-"""Evidence is pooled over this much of the line's length, so that a line must be seen along most of its span."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
