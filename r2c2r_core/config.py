@@ -1,4 +1,4 @@
-"""ReconstructConfig: one frozen dataclass per stage, each declared in its stage; --config reads it from JSON."""
+"""ReconstructConfig: one frozen dataclass per stage, each declared in its stage; presets, and --config from JSON."""
 
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -9,6 +9,7 @@ from r2c2r_core.documents import read_json
 from r2c2r_core.export.stage import ExportConfig
 from r2c2r_core.generate.stage import GenerateConfig
 from r2c2r_core.ingest.stage import IngestConfig
+from r2c2r_core.presets import PRESETS
 from r2c2r_core.schema.settings import tuned_numbers, with_settings
 from r2c2r_core.segment.stage import SegmentConfig
 from r2c2r_core.synthesize.stage import SynthesizeConfig
@@ -52,9 +53,12 @@ class ReconstructConfig:
         return {f"{room}.{module}": values for room, params in own.items() for module, values in params.items()}
 
 
-def read_config(path: Path) -> ReconstructConfig:
-    """Settings from JSON `{"stage": {"setting": value}}`; absent settings keep their defaults; raises InputError."""
-    return config_from(read_json(path, hint='expected {"stage": {"setting": value}}'), str(path))
+def read_config(path: Path | None, preset: str = "default") -> ReconstructConfig:
+    """Settings of a preset, changed by a JSON file `{"stage": {"setting": value}}`; raises InputError."""
+    chosen = config_from(PRESETS[preset], f"preset {preset}")
+    if path is None:
+        return chosen
+    return with_settings(chosen, read_json(path, hint='expected {"stage": {"setting": value}}'), str(path))
 
 
 def config_from(document: Any, where: str) -> ReconstructConfig:

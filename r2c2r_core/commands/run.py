@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from r2c2r_core.commands.options import Parsers, add_command, add_reading, add_strict, existing, seed, whole, with_reading
 from r2c2r_core.errors import CaptureError, InputError
+from r2c2r_core.presets import PRESETS
 from r2c2r_core.terminal import show_progress, table, verdict
 from r2c2r_core.texts import shown
 
@@ -28,11 +29,12 @@ def add(parsers: Parsers) -> None:
     added.add_argument("-o", "--output", type=Path, required=True, metavar="BUNDLE.zip", help="bundle to write")
     added.add_argument("--workdir", type=Path, help="where stages are kept (default: beside the bundle)")
     added.add_argument("--overrides", type=Path, help="overrides.json: what a person corrected")
+    presets = "settings to start from: default, fast (a first look) or paper (the paper's own choices)"
+    added.add_argument("--preset", choices=PRESETS, default="default", help=presets)
     added.add_argument("--config", type=Path, help="JSON file of settings; `r2c2r schema config` describes it")
     add_reading(added)
     for seam in ("segmenter", "generator", "matcher"):
         added.add_argument(f"--{seam}", help="name of a backend; `r2c2r doctor` lists them")
-    added.add_argument("--fixtures", help="what makes carcasses: boards (default), or scene-synthesizer, the paper's")
     added.add_argument("--seed", type=seed, default=0, help="of what generators draw at random (default: %(default)s)")
     added.add_argument(
         "--workers", type=whole(0, 64), default=0, help="objects computed side by side; 0: as cores and memory allow"
@@ -43,9 +45,9 @@ def add(parsers: Parsers) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Headless reconstruction: recording and prompts in, certified bundle out."""
-    from r2c2r_core.config import ReconstructConfig, read_config
+    from r2c2r_core.config import read_config
 
-    settings = read_config(options.config) if options.config else ReconstructConfig()
+    settings = read_config(options.config, options.preset)
     passed = write_bundle(
         existing(options.capture),
         options.prompts,
@@ -54,7 +56,6 @@ def run(options: argparse.Namespace) -> int:
         overrides=options.overrides,
         config=replace(settings, ingest=with_reading(settings.ingest, options)),
         tools=_given(options, "segmenter", "generator", "matcher"),
-        fixtures=options.fixtures,
         seed=options.seed,
         workers=options.workers,
         masks=options.masks,
@@ -72,7 +73,6 @@ def write_bundle(
     overrides: Path | None = None,
     config: "ReconstructConfig | None" = None,
     tools: Mapping[str, str] = MappingProxyType({}),
-    fixtures: str | None = None,
     seed: int = 0,
     workers: int = 0,
     masks: Path | None = None,
@@ -80,9 +80,7 @@ def write_bundle(
 ) -> bool:
     """Reconstruct, print a summary, and copy the bundle to `destination`; returns whether it is certified and complete.
 
-    With `strict` its likeness must have passed too.
-
-    `tools` are names of backends by seam: segmenter, generator, matcher; `fixtures` overrides the configuration's.
+    With `strict` its likeness must have passed too. `tools` are names of backends by seam: segmenter, generator, matcher.
     """
     from r2c2r_core.config import ReconstructConfig
     from r2c2r_core.disk import explained_io
@@ -97,7 +95,7 @@ def write_bundle(
         source=capture,
         prompts=read_prompts(prompts),
         overrides=read_overrides(overrides) if overrides else NO_OVERRIDES,
-        config=_with_fixtures(config or ReconstructConfig(), fixtures),
+        config=config or ReconstructConfig(),
         tools=Tools(**tools),
         seed=seed,
     )
@@ -141,10 +139,6 @@ def _warn(capture: Path, doubts: "Doubts") -> None:
 
 def _given(options: argparse.Namespace, *names: str) -> dict[str, str]:
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-
-
-def _with_fixtures(config: "ReconstructConfig", name: str | None) -> "ReconstructConfig":
-    return config if name is None else replace(config, synthesize=replace(config.synthesize, fixtures=name))
 
 
 def _write_masks(reconstruction: Any, folder: Path) -> None:

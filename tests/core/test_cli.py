@@ -100,10 +100,23 @@ def test_a_missing_recording_is_named(tmp_path: Path, prompts: Path) -> None:
 
 
 def test_unknown_fixtures_are_refused_before_anything_is_read(tmp_path: Path, prompts: Path) -> None:
+    scan, config = tmp_path / "scan.r3d", tmp_path / "config.json"
+    scan.write_bytes(b"not read")
+    config.write_text('{"synthesize": {"fixtures": "flatpack"}}')
+    _, said = r2c2r("run", scan, "--prompts", prompts, "-o", tmp_path / "b.zip", "--config", config, code=2)
+    assert one_line(said).strip() == "r2c2r: unknown fixtures 'flatpack'; choose one of: boards, scene-synthesizer"
+
+
+def test_the_papers_preset_names_the_extra_it_lacks_before_anything_is_read(
+    tmp_path: Path, prompts: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "scene_synthesizer", None)
     scan = tmp_path / "scan.r3d"
     scan.write_bytes(b"not read")
-    _, said = r2c2r("run", scan, "--prompts", prompts, "-o", tmp_path / "b.zip", "--fixtures", "flatpack", code=2)
-    assert one_line(said).strip() == "r2c2r: unknown fixtures 'flatpack'; choose one of: boards, scene-synthesizer"
+    _, said = r2c2r("run", scan, "--prompts", prompts, "-o", tmp_path / "b.zip", "--preset", "paper", code=1)
+    licence, error = said.splitlines()
+    assert "fixtures scene-synthesizer" in licence
+    assert error.endswith("missing scene_synthesizer; pip install 'r2c2r[scene-synthesizer]'")
 
 
 def _tiny(folder: Path, depth_factor: float = 1.0) -> Path:

@@ -13,11 +13,12 @@ from pydantic import BaseModel
 from app import schemas
 from r2c2r_core.codec import decode_noun, encode_noun
 from r2c2r_core.commands.schema import NAMES, document_of, schema_text
-from r2c2r_core.config import ReconstructConfig, config_from
+from r2c2r_core.config import ReconstructConfig, config_from, read_config
 from r2c2r_core.errors import InputError
 from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.model.motion import Inside, JointMotion, State
+from r2c2r_core.presets import PRESETS
 from r2c2r_core.schema.manifest import Manifest, ManifestMotion
 from r2c2r_core.schema.prompts import PromptsFile
 from tests.core.export.kitchen import kitchen, reconstruction
@@ -56,6 +57,22 @@ def test_everything_that_can_be_written_is_documented(name: str) -> None:
 def test_the_defaults_are_within_their_own_bounds() -> None:
     written = json.loads(json.dumps(asdict(ReconstructConfig())))
     assert config_from(written, "config.json") == ReconstructConfig()
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_sets_what_differs_from_the_defaults(name: str) -> None:
+    chosen, usual = asdict(read_config(None, name)), asdict(ReconstructConfig())
+    changed = {stage: {key for key in chosen[stage] if chosen[stage][key] != usual[stage][key]} for stage in chosen}
+    assert {stage: keys for stage, keys in changed.items() if keys} == {
+        stage: set(keys) for stage, keys in PRESETS[name].items()
+    }
+
+
+def test_a_file_of_settings_changes_a_preset(tmp_path: Path) -> None:
+    path = tmp_path / "config.json"
+    path.write_text('{"generate": {"count": 3}}', encoding="utf-8")
+    config = read_config(path, "paper")
+    assert (config.generate.count, config.generate.rule, config.warp.method) == (3, "mean", "paper")
 
 
 def test_what_is_set_is_set_and_the_rest_stays() -> None:
