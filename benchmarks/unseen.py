@@ -1,6 +1,6 @@
 """Kitchens that nobody here drew: how many objects come out usable, one random click an object.
 
-    python benchmarks/unseen.py FOLDER... [--workdir DIR] [--json benchmarks/unseen.json] [--seed N]
+    python benchmarks/unseen.py FOLDER... [--workdir DIR] [--json benchmarks/unseen.json] [--seed N] [--preset NAME]
 
 A FOLDER holds capture.r3d or scan.r3d, truth.json and masks/NNNNNN.png (number of the object in truth.json + 1), as
 second_styles.py, franka.py and replicacad.py write them, or is a sample of `r2c2r sample`. Clicks are random ones of
@@ -38,12 +38,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--workdir", type=Path, help="kept afterwards")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--seed", type=int, default=0, help="of the clicks")
+    parser.add_argument("--preset", default="default", help="settings of `r2c2r run`")
     options = parser.parse_args(arguments)
     rows: dict[str, dict[str, Any]] = {}
     with tempfile.TemporaryDirectory(prefix="r2c2r-unseen-") as scratch:
         for folder in options.folders:
             print(f"{folder.name} …", file=sys.stderr, flush=True)
-            rows[folder.name] = run_folder(folder, (options.workdir or Path(scratch)) / folder.name, options.seed)
+            work = (options.workdir or Path(scratch)) / folder.name
+            rows[folder.name] = run_folder(folder, work, options.seed, options.preset)
             if options.json:
                 before = json.loads(options.json.read_text(encoding="utf-8")) if options.json.exists() else {}
                 options.json.write_text(json.dumps(before | rows, indent=1) + "\n", encoding="utf-8")
@@ -51,12 +53,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def run_folder(folder: Path, work: Path, seed: int) -> dict[str, Any]:
+def run_folder(folder: Path, work: Path, seed: int, preset: str) -> dict[str, Any]:
     """One kitchen from random clicks to its figures; `work`/masks are compared with the true ones."""
     prompts, clicks = random_clicks(folder, np.random.default_rng(seed)), work.parent / f"{work.name}.prompts.json"
     clicks.parent.mkdir(parents=True, exist_ok=True)
     write_prompts(prompts, clicks)
-    outcome = whole_way(recording_in(folder), clicks, folder / "truth.json", work)
+    outcome = whole_way(recording_in(folder), clicks, folder / "truth.json", work, preset=preset)
     found = {} if outcome.evaluation is None else {item["name"]: item for item in outcome.evaluation["objects"]}
     overlaps = clicked_overlaps(folder, prompts, work / "masks", {name: item["matched"] for name, item in found.items()})
     truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))["objects"]
@@ -96,6 +98,7 @@ def row_of(outcome: Outcome, truth: Sequence[dict[str, Any]], overlaps: dict[str
         "wrong_flagged": f"{len(named.intersection(wrong))} of {len(wrong)}",
         "right_flagged": f"{len(named.intersection(usable))} of {len(usable)}",
         "cpu_minutes": round(outcome.cost.cpu_s / 60, 1),
+        "seconds": round(outcome.cost.wall_s),
         "wrong": {name: _failing(errors[name], joints.get(name, True)) for name in wrong},
     }
 
@@ -134,15 +137,16 @@ def _value(metrics: dict[str, Any], name: str) -> float | None:
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """As Markdown; w, d and h are width, depth and height in percent."""
-    heads = ("kitchen", "usable", "median %", "worst %", "joints", "masks", "certified", "wrong told", "right told", "wrong")
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    heads = ("kitchen", "usable", "median %", "worst %", "joints", "masks", "certified", "seconds", "wrong told", "right told")
+    lines = [f"| {' | '.join(heads)} | wrong |", "|---" * (len(heads) + 1) + "|"]
     for name, row in rows.items():
         wrong = ", ".join(f"{key} ({what})" for key, what in row["wrong"].items())
         masks = ", ".join(f"{kind}s {share}" for kind, share in row["mask_iou"].items())
         share = f"{row['usable']} of {row['objects']}"
         certified = "yes" if row["certified"] else "no"
         named = (row.get("wrong_flagged", "–"), row.get("right_flagged", "–"))
-        figures = (share, row["median_percent"], row["worst_percent"], row["joints_right"], masks, certified, *named, wrong)
+        sides, seconds = (row["median_percent"], row["worst_percent"]), row.get("seconds", "–")
+        figures = (share, *sides, row["joints_right"], masks, certified, seconds, *named, wrong)
         lines.append(f"| {name} | {' | '.join(str(figure) for figure in figures)} |")
     return "\n".join(lines)
 

@@ -26,7 +26,9 @@ class Outcome:
     present: frozenset[str] = frozenset()  # objects of the bundle
 
 
-def whole_way(recording: Path, prompts: Path, truth: Path, work: Path, *, anew: bool = True) -> Outcome:
+def whole_way(
+    recording: Path, prompts: Path, truth: Path, work: Path, *, anew: bool = True, preset: str = "default"
+) -> Outcome:
     """Run the commands; `work` keeps bundle.zip, run.log, certificate.json and evaluation.json.
 
     With `anew` it is emptied before; else stages whose inputs and code did not change are read from it.
@@ -36,7 +38,7 @@ def whole_way(recording: Path, prompts: Path, truth: Path, work: Path, *, anew: 
     work.mkdir(parents=True, exist_ok=True)
     bundle, masks, answer = work / "bundle.zip", work / "masks", work / "evaluation.json"
     bundle.unlink(missing_ok=True)
-    run = [*CLI, "run", str(recording), "--prompts", str(prompts), "-o", str(bundle)]
+    run = [*CLI, "run", str(recording), "--prompts", str(prompts), "-o", str(bundle), "--preset", preset]
     cost = run_measured([*run, "--workdir", str(work / "work"), "--masks", str(masks)], cwd=REPOSITORY, log=work / "run.log")
     if not bundle.exists():
         print(f"{work.name}: no bundle (exit {cost.exit_code}); see {work / 'run.log'}", file=sys.stderr)

@@ -108,7 +108,7 @@ def test_what_is_missing_is_wrong_in_every_mean(monkeypatch: pytest.MonkeyPatch)
         certified=True,
         doubted={"bottle_0"},
         present={"cabinet_0", "bottle_0"},
-        cost=SimpleNamespace(cpu_s=60.0),
+        cost=SimpleNamespace(cpu_s=60.0, wall_s=45.0),
     )
     row = row_of(outcome, truth, {"cabinet_0": 0.9, "bottle_0": 0.8, "cabinet_1": 0.0})
     assert (row["objects"], row["usable"]) == (3, 1)
