@@ -7,11 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import GenerationFailed
-from r2c2r_core.generate.evidence import Evidence, View, masked_points
+from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hypothesis import Hypothesis
-from r2c2r_core.generate.rear_edge import rear_edge
 from r2c2r_core.generate.relief import NO_RELIEF, BoxPart, Relief, handle_parts, measure_relief
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.variation import Variation
@@ -26,8 +25,6 @@ from r2c2r_core.tuning import param, tuned
 HandleStyle = Literal["bar", "block", "none"]
 
 _TOLD: dict[DepthSource, str] = {
-    "seen": "as its sides show",
-    "points": "as far as its points reach",
     "box": "as its box was measured",
     "wall": "to the wall behind it",
     "worktop": "as the worktop on it",
@@ -41,11 +38,6 @@ class Params:
     """Tuned parameters of box-shaped furniture: when depth and faces count as measured."""
 
     front_zone_m: float = param(0.03, "m", "Distance behind the outer face within which mesh faces belong to the front")
-    least_face_points: int = param(200, "count", "Minimum number of depth points for a face to count as measured")
-    most_hidden: float = param(
-        0.6, "share", "Fraction of the category's usual depth below which visible sides count as seen in part only"
-    )
-    looked_at: float = param(0.3, "cosine", "Minimum cosine of the viewing angle for a view to measure a face")
     wall_spread: float = param(
         0.2, "ratio", "Fraction of the sampled depth variation that is applied to a box that ends at a wall"
     )
@@ -73,20 +65,19 @@ def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
     return _depths_and_handles(depths, front, shape)
 
 
-def appliance_hypotheses(evidence: Evidence, everything: Variation) -> tuple[Hypothesis, ...]:
-    """An appliance's box with its visible faces refined, at each candidate depth; frame `object`."""
+def appliance_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
+    """An appliance's box at each candidate depth, with its handle and without; frame `object`."""
     track, box = evidence.track, evidence.track.box
     if box is None:
         raise GenerationFailed(f"{track.name}: no box was measured", hint="add a click on a frame that shows it whole")
     front = _local_front(track.front, box)
-    corners = cache(partial(_measured_box, evidence, box))
+    half = np.asarray(box.dimensions_m, dtype=np.float64) / 2
     relief = cache(partial(measure_relief, front)) if front is not None else None
-    depths, seen_m = _appliance_depths(evidence, box, *corners(everything))
+    depths = _appliance_depths(evidence, box)
 
     def shape(behind: DepthBehind, handle: HandleStyle, variation: Variation) -> Shape:
-        low, high = (corner.copy() for corner in corners(variation))
-        depth = max(behind.depth_m * _scale(behind, variation), seen_m)
-        high[1] = low[1] + depth
+        depth = behind.depth_m * _scale(behind, variation)
+        low, high = -half, half * [1.0, 0.0, 1.0] + [0.0, depth - half[1], 0.0]
         found = relief(variation) if relief is not None else NO_RELIEF
         at = box.world_from_object.inverse.apply(front.centre) if front is not None else low
         made = _box_with_relief(BoxPart(low, high), box.world_from_object, at, found, handle)
@@ -142,59 +133,13 @@ def _scale(behind: DepthBehind, variation: Variation) -> float:
     return 1.0 + spread.get(behind.source, 0.0) * (variation.depth_scale - 1.0)
 
 
-def _appliance_depths(evidence: Evidence, box: ThingBox, low: Vector3, high: Vector3) -> tuple[tuple[DepthBehind, ...], float]:
-    """Candidate depths, measured where the sides were seen and otherwise assumed, and the minimum depth that was observed."""
-    category = category_of(evidence.track.category)
-    width, thought, height = (float(v) for v in box.dimensions_m)
-    end = rear_edge(low, high, evidence.pool, box.world_from_object)
-    measured = end - float(low[1])
-    place = box.world_from_object @ Rigid3(np.eye(3), np.array([0.0, float(low[1]), 0.0]))
+def _appliance_depths(evidence: Evidence, box: ThingBox) -> tuple[DepthBehind, ...]:
+    """Candidate depths: the observed one, and those assumed behind the front."""
+    width, depth, height = (float(side) for side in box.dimensions_m)
+    place = box.world_from_object @ Rigid3(np.eye(3), np.array([0.0, -depth / 2, 0.0]))
     front = Rectangle3(world_from_front=place, width_m=width, height_m=height)
-    assumed = depths_behind(evidence.capture, front, category)
-    if measured > tuned(Params).most_hidden * category.depth.usual and _side_seen(box, evidence.pool):
-        return distinct([DepthBehind(measured, "seen"), DepthBehind(thought, "box"), *assumed]), 0.0
-    reached = DepthBehind(measured, "points")
-    return distinct([b if b.depth_m >= measured else reached for b in assumed]), measured
-
-
-def _measured_box(evidence: Evidence, box: ThingBox, variation: Variation) -> tuple[Vector3, Vector3]:
-    """Corners of the box in its own frame, each face that cameras observe moved to the median of its points."""
-    params = tuned(Params)
-    half = np.asarray(box.dimensions_m, dtype=np.float64) / 2
-    low, high = -half, half.copy()
-    for axis in range(3):
-        for sign, corner in ((-1.0, low), (1.0, high)):
-            found = [_face_points(v, box, half, axis, sign, variation.erosion_px) for v in variation.views]
-            points = np.concatenate(found)
-            if len(points) >= params.least_face_points:
-                limit = 0.04 * 2 * half[axis]
-                corner[axis] += float(np.clip(np.median(points) - corner[axis], -limit, limit))
-    if evidence.track.front is not None:
-        low[1] = float(box.world_from_object.inverse.apply(evidence.track.front.centre)[1])
-    return low, high
-
-
-def _face_points(view: View, box: ThingBox, half: Vector3, axis: int, sign: float, erosion_px: float) -> np.ndarray:
-    """Coordinates along `axis` of the view's points on one face; only views that face it contribute."""
-    eye = box.world_from_object.inverse.apply(view.eye_world)
-    towards = eye - np.where(np.arange(3) == axis, sign * half, 0.0)
-    if sign * towards[axis] < tuned(Params).looked_at * np.linalg.norm(towards):
-        return np.zeros(0)
-    points: Points = box.world_from_object.inverse.apply(masked_points(view, erosion_px))
-    near = np.abs(points[:, axis] - sign * half[axis]) < max(0.03, 0.06 * half[axis])
-    others = [k for k in range(3) if k != axis]
-    within = (np.abs(points[:, others]) < 0.85 * half[others]).all(axis=1)
-    return np.asarray(points[near & within, axis])
-
-
-def _side_seen(box: ThingBox, views: tuple[View, ...]) -> bool:
-    """Whether a camera sees the left, right or top face, which show the depth."""
-    half = np.asarray(box.dimensions_m) / 2
-    eyes = box.world_from_object.inverse.apply(np.array([v.eye_world for v in views]))
-    outside = np.abs(eyes[:, [0, 2]]) - half[[0, 2]]
-    distance = np.linalg.norm(eyes, axis=1, keepdims=True)
-    seen = np.column_stack([outside[:, :1], np.sign(eyes[:, 2:]) * outside[:, 1:]]) > 0.2 * distance
-    return bool(seen.any())
+    observed = [DepthBehind(depth, "box")] if box.depth_seen else []
+    return distinct([*observed, *depths_behind(evidence.capture, front, category_of(evidence.track.category))])
 
 
 def _local_front(front: FrontPanel | None, box: ThingBox) -> FrontPanel | None:

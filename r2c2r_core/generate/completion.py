@@ -148,7 +148,7 @@ def _hypotheses_of(evidence: Evidence, everything: Variation) -> tuple[Hypothesi
     if track.kind == "front" and track.front is not None:
         return front_hypotheses(evidence)
     if track.kind == "appliance" and track.box is not None:
-        return appliance_hypotheses(evidence, everything)
+        return appliance_hypotheses(evidence)
     return thing_hypotheses(evidence, everything)
 
 

@@ -18,7 +18,7 @@ from r2c2r_core.model.capture import Capture, Wall
 from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.tuning import param, tuned
 
-DepthSource = Literal["seen", "points", "box", "wall", "worktop", "category", "catalogue"]
+DepthSource = Literal["box", "wall", "worktop", "category", "catalogue"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

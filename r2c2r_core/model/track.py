@@ -52,6 +52,7 @@ class ThingBox:
     world_from_object: Rigid3
     dimensions_m: Vector3  # width, depth, height
     support_z_m: float  # world height of its support
+    depth_seen: bool = False  # whether an appliance's depth was observed, not assumed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,6 +17,7 @@ from r2c2r_core.geometry.free_boxes import powell_box, smallest_box
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.kitchen.category import Category, Size
 from r2c2r_core.kitchen.depth import FrontDepth, believable, front_depth
+from r2c2r_core.kitchen.depth import Params as DepthParams
 from r2c2r_core.kitchen.fronts import front_y
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
@@ -135,7 +136,7 @@ def measure_object(
         sources[1] = _depth_source(capture, asset, low, high, rotation, warnings)
     else:
         low, high, sources[1] = _believable_depth(capture, track, spec, low, high, rotation)
-        if track.box is not None and sources[1] == "inferred" and _face_seen(capture, low, high, rotation):
+        if sources[1] == "inferred" and _is_seen_depth(track, float(high[1] - low[1])):
             sources[1] = "measured"
     if track.kind == "appliance" and _foot_hidden(capture, low):
         sources[2] = "inferred"
@@ -278,6 +279,12 @@ def _depth_source(
     if not seen:
         warnings.append(f"no frame shows how deep it is: {depth:.2f} m is inferred")
     return "measured" if seen else "inferred"
+
+
+def _is_seen_depth(track: MaskTrack, depth_m: float) -> bool:
+    """Whether a depth is the one that was observed with the object's box."""
+    box = track.box
+    return box is not None and box.depth_seen and abs(depth_m - float(box.dimensions_m[1])) < tuned(DepthParams).alike_m
 
 
 def _face_seen(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarray) -> bool:

@@ -132,13 +132,14 @@ def appliance_mask(front: Front, scene: Scene, frame: Frame) -> tuple[Mask, floa
     return mask, share
 
 
-def appliance_box(front: Front) -> ThingBox:
+def appliance_box(front: Front, *, depth_seen: bool) -> ThingBox:
     """Box in the world: the front rectangle extruded by its depth."""
     face = front.rectangle.at(Rigid3(np.eye(3), np.array([0.0, front.depth_m / 2, 0.0])))
     return ThingBox(
         world_from_object=face.world_from_front,
         dimensions_m=np.array([face.width_m, front.depth_m, face.height_m]),
         support_z_m=float(face.centre[2] - face.height_m / 2),
+        depth_seen=depth_seen,
     )
 
 

@@ -31,10 +31,7 @@ class Params:
         source="errors of fused depth are correlated over about 3 cm",
     )
     least_share: float = param(0.07, "share", "Minimum observed fraction of a face for it to be measured")
-    gap_m: float = param(0.01, "m", "Excess of a hole in a side over the patch size, above which the side ends there", gt=0)
-    least_reach_m: float = param(
-        0.15, "m", "Minimum depth at which a side may end: sides that end earlier are dark and have holes in their depth"
-    )
+    gap_m: float = param(0.01, "m", "Minimum distance from the end of depth on the front to the end of the search", gt=0)
 
 
 class Patches(NamedTuple):
@@ -43,7 +40,6 @@ class Patches(NamedTuple):
     points: Points
     axis: np.ndarray  # (n,) coordinate across the face: 0, 1 or 2
     face: np.ndarray  # (n,) parameter of the box that this coordinate measures
-    reach_m: float | None  # distance behind the front to which the sides and the top were observed without a gap
     ends: dict[int, float]  # by LEFT and RIGHT: end of depth on the front, if within the search region
 
 
@@ -76,12 +72,10 @@ def patches_on(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Patch
         if areas[on].sum() > params.least_share * size and on.any()
     }
     count = [len(patches) for patches in found.values()]
-    ends = [end for face, on in found.items() if face != FRONT and (end := _end(on[:, 1])) > params.least_reach_m]
     return Patches(
         np.concatenate([np.zeros((0, 3)), *found.values()]),
         np.repeat([axes[face] for face in found], count).astype(int),
         np.repeat(list(found), count).astype(int),
-        max(ends, default=None),
         _front_ends(points[on_front], box),
     )
 
@@ -118,11 +112,3 @@ def _patches(points: Points, areas: np.ndarray, patch_m: float) -> Points:
     weight = np.bincount(patch, areas)
     taken = np.bincount(patch) > 0
     return np.stack([np.bincount(patch, areas * points[:, k])[taken] for k in range(3)], axis=1) / weight[taken, None]
-
-
-def _end(depths: np.ndarray) -> float:
-    """Position of the first gap in the depths along a face, or their end."""
-    params = tuned(Params)
-    ordered = np.sort(depths)
-    gaps = np.flatnonzero(np.diff(ordered) > params.patch_m + params.gap_m)
-    return float(ordered[gaps[0] if len(gaps) else -1]) + params.patch_m / 2

@@ -34,6 +34,7 @@ class FoundAppliance:
     front: Front
     scene: Scene
     category: Category
+    depth_seen: bool  # whether its depth was observed, not assumed
     kind: Kind = "appliance"
     warnings: tuple[str, ...] = ()
     _leaves: FilmedLeaves = field(init=False, repr=False)
@@ -61,4 +62,4 @@ class FoundAppliance:
 
     def box(self) -> ThingBox | None:
         """Box of the front extruded backwards."""
-        return appliance_box(self.front)
+        return appliance_box(self.front, depth_seen=self.depth_seen)

@@ -9,6 +9,7 @@ from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.inputs import DrawnFront, ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.find import appliance_front
+from r2c2r_core.segment.appliances.fit import fit_box
 from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.clicked_dark import dark_beyond, dark_place
@@ -79,13 +80,14 @@ def _without_depth(scene: Scene, clicks: list[PromptPoint]) -> str:
 
 
 def find_drawn(prepared: PreparedCapture, prompt: ObjectPrompt, drawn: DrawnFront, category: Category) -> Found:
-    """Front as a person drew it, without cutting. Raises ObjectNotSeen where no frame sees it."""
+    """Front as a person drew it, and the fitted depth of an appliance. Raises ObjectNotSeen where no frame sees it."""
     scene = prepared.scene
     front = drawn_front(drawn, scene, prepared.config)
     behind = depth_behind(front, scene.capture.room, category)
     front = replace(front, depth_m=behind.depth_m)
     if category.kind == "appliance":
-        return FoundAppliance(front, scene, category, warnings=() if behind.wall_m else (_assumed_depth(front, prompt),))
+        fitted = fit_box(front, scene, category, behind.wall_m)
+        return _found_appliance(replace(front, depth_m=fitted.front.depth_m), scene, prompt, category, fitted.depth_seen)
     return FoundDrawn(replace(front, sides=seen_sides(front, scene)), scene, category)
 
 
@@ -153,11 +155,12 @@ def _appliance(
     front, seen = appliance_front(prepared, prompt, category, negatives, others, glimpse=glimpse) or (None, False)
     if front is None:
         return None
-    return FoundAppliance(front, prepared.scene, category, warnings=() if seen else (_assumed_depth(front, prompt),))
+    return _found_appliance(front, prepared.scene, prompt, category, seen)
 
 
-def _assumed_depth(front: Front, prompt: ObjectPrompt) -> str:
-    return f"its depth was not seen: {front.depth_m:.2f} m is assumed, as for a {prompt.category}"
+def _found_appliance(front: Front, scene: Scene, prompt: ObjectPrompt, category: Category, depth_seen: bool) -> FoundAppliance:
+    assumed = f"its depth was not seen: {front.depth_m:.2f} m is assumed, as for a {prompt.category}"
+    return FoundAppliance(front, scene, category, depth_seen, warnings=() if depth_seen else (assumed,))
 
 
 def _thing(

@@ -86,11 +86,11 @@ def appliance_scene(seed=0):
         handle=handle,
         confidence=0.9,
     )
-    # the segmenter's box is a centimetre off where cameras can tell
     thing = ThingBox(
         world_from_object=Rigid3(np.eye(3), np.array([0.0, 0.17, 1.04])),
-        dimensions_m=np.array([0.47, 0.34, 0.285]),
+        dimensions_m=np.array([0.46, 0.34, 0.28]),
         support_z_m=0.9,
+        depth_seen=True,
     )
     return capture, track("microwave_1", "microwave", "appliance", masks, front=panel, box=thing)
 
@@ -196,7 +196,7 @@ def front_shape(evidence, variation):
 
 
 def appliance_shape(evidence, variation):
-    return appliance_hypotheses(evidence, whole_pool(evidence))[0].shape(variation)
+    return appliance_hypotheses(evidence)[0].shape(variation)
 
 
 def best_thing(evidence, variation=None):

@@ -70,18 +70,5 @@ def test_depth_on_the_front_ends_to_the_left_and_right_unless_it_goes_on() -> No
     assert found[LEFT] == pytest.approx(-0.24, abs=CELL_M)
 
 
-def test_a_side_ends_at_its_first_gap_not_at_the_wall_behind() -> None:
-    side = sheet(0, 0.25, (0.0, 0.30), (-0.14, 0.14), 1)
-    beyond = sheet(0, 0.25, (0.42, 0.45), (-0.14, 0.14), 1)
-    assert patches_on(DEEP, scene_of(side, beyond), HERE).reach_m == pytest.approx(0.31, abs=0.03)
-
-
-def test_a_dark_side_with_holes_says_nothing_of_where_it_ends() -> None:
-    pieces = [sheet(0, 0.25, span, (-0.14, 0.14), 1) for span in ((0.03, 0.08), (0.37, 0.42))]
-    found = patches_on(DEEP, scene_of(*pieces), HERE)
-    assert found.reach_m is None
-    assert len(found.points)
-
-
 def test_a_face_of_which_depth_saw_next_to_nothing_is_left_out() -> None:
     assert not len(patches_on(DEEP, scene_of(sheet(0, 0.25, (0.1, 0.13), (0.0, 0.03), 1)), HERE).points)

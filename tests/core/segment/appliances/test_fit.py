@@ -9,12 +9,13 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.segment.appliances import fit
 from r2c2r_core.segment.appliances.edges import BACK, BOTTOM, FRONT, LEFT, RIGHT, TOP, YAW, Photo
 from r2c2r_core.segment.appliances.faces import Patches
-from r2c2r_core.segment.appliances.fit import Evidence, Params, Solution, covariance_of, solve
+from r2c2r_core.segment.appliances.fit import Evidence, Params, Solution, covariance_of, refine_rear, solve
 from r2c2r_core.tuning import tuned
 from tests.core.segment.appliances.drawn import BACK_M, EYES, LEFT_M, LINE_Z, RIGHT_M, TOP_M, TRUE, WALL_Y, photo
 
 KIND = category_of("microwave")
-NOTHING = Patches(np.zeros((0, 3)), np.zeros(0, int), np.zeros(0, int), None, {})
+NOTHING = Patches(np.zeros((0, 3)), np.zeros(0, int), np.zeros(0, int), {})
+FRONT_POSE = Rigid3(np.eye(3), np.zeros(3))
 PIXEL_M = 0.0035  # at 1.5 m a pixel is 2 mm, and edges are drawn to half a pixel
 
 
@@ -26,7 +27,7 @@ def solved(
     support_m: float | None = None,
 ) -> Solution:
     evidence = Evidence(start, KIND, patches, WALL_Y, support_m, 0.0085)
-    return solve(evidence, photos, world_from_front or Rigid3(np.eye(3), np.zeros(3)))
+    return solve(evidence, photos, world_from_front or FRONT_POSE)
 
 
 def test_top_and_back_are_found_from_a_line_of_the_front_and_the_depth_of_the_wall() -> None:
@@ -89,6 +90,15 @@ def test_a_box_stands_on_the_support_near_its_lower_edge(off_m: float) -> None:
     assert solved(start, [], support_m=float(TRUE[BOTTOM])).box[BOTTOM] == pytest.approx(TRUE[BOTTOM], abs=0.008)
 
 
+@pytest.mark.parametrize("back_m", [0.30, 0.42])
+def test_a_box_ends_where_depth_begins_to_pass_its_sides(back_m: float) -> None:
+    evidence = Evidence(TRUE, KIND, NOTHING, WALL_Y, None, 0.0085, np.array([[0.355, 0.365]]))
+    start = TRUE.copy()
+    start[BACK] = back_m
+    found = refine_rear(evidence, [photo(eye, 200, side_grey=200, tiles=False) for eye in EYES], FRONT_POSE, start)
+    assert found.box[BACK] == pytest.approx(BACK_M, abs=0.006)
+
+
 def test_a_box_that_hangs_keeps_its_lower_edge() -> None:
     hanging = solved(TRUE, [], support_m=float(TRUE[BOTTOM]) - 0.5)
     assert hanging.box[BOTTOM] == pytest.approx(TRUE[BOTTOM], abs=0.003)
@@ -96,13 +106,13 @@ def test_a_box_that_hangs_keeps_its_lower_edge() -> None:
 
 @pytest.mark.parametrize("short_m", [0.02, 0.045])
 def test_depth_beyond_a_line_of_the_front_leads_to_its_edge(short_m: float) -> None:
-    start, seen = TRUE.copy(), Patches(*NOTHING[:4], {RIGHT: RIGHT_M - 0.01})
+    start, seen = TRUE.copy(), Patches(*NOTHING[:3], {RIGHT: RIGHT_M - 0.01})
     start[RIGHT] = RIGHT_M - short_m
     assert solved(start, [photo(eye) for eye in EYES], patches=seen).box[RIGHT] == pytest.approx(RIGHT_M, abs=PIXEL_M)
 
 
 def test_a_front_without_depth_beside_its_edge_keeps_it() -> None:
-    dark = Patches(*NOTHING[:4], {LEFT: LEFT_M + 0.3})
+    dark = Patches(*NOTHING[:3], {LEFT: LEFT_M + 0.3})
     assert solved(TRUE, [photo(eye) for eye in EYES], patches=dark).box[LEFT] == pytest.approx(LEFT_M, abs=PIXEL_M)
 
 
@@ -115,9 +125,7 @@ def test_a_side_in_depth_tells_how_a_body_is_turned_whose_front_is_mostly_glass(
     points = np.concatenate([keys, side])
     points[:40, 1] += rng.normal(0, 0.003, 40)
     points[40:, 0] += rng.normal(0, 0.003, 100)
-    patches = Patches(
-        points @ rotation_about_z(turn).T, np.repeat([1, 0], [40, 100]), np.repeat([FRONT, RIGHT], [40, 100]), None, {}
-    )
+    patches = Patches(points @ rotation_about_z(turn).T, np.repeat([1, 0], [40, 100]), np.repeat([FRONT, RIGHT], [40, 100]), {})
     found = solved(TRUE, [], patches=patches)
     assert np.degrees(found.box[YAW]) == pytest.approx(turn_deg, abs=0.6)  # drawn a little to the plane that was found
     assert found.box[RIGHT] == pytest.approx(0.25, abs=0.004)
@@ -149,7 +157,7 @@ def test_more_depth_of_a_side_means_less_spread() -> None:
 
 
 def on_the_right(points: Points) -> Patches:
-    return Patches(points, np.zeros(len(points), int), np.full(len(points), RIGHT), None, {})
+    return Patches(points, np.zeros(len(points), int), np.full(len(points), RIGHT), {})
 
 
 def grid(x_m: tuple[float, float], z_m: tuple[float, float]) -> Points:

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2c2r_core.arrays import Vector3
-from r2c2r_core.generate.evidence import View
 from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.category import Size
+from r2c2r_core.model.capture import Frame
+from r2c2r_core.segment.appliances.edges import BOTTOM, FRONT, LEFT, RIGHT, TOP
+from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
 
@@ -22,64 +24,65 @@ class Params:
     """Tuned parameters of rear-edge detection."""
 
     flattest: float = param(0.08, "cosine", "Minimum cosine between a ray and the face's normal for the ray to count")
-    widest_m: float = param(0.08, "m", "Maximum distance of the edge from its initial estimate")
+    beyond_m: float = param(0.08, "m", "Distance past the greatest possible depth up to which rays count")
     before_m: float = param(0.05, "m", "Distance in front of the face beyond which a point belongs to an occluder")
     bin_m: float = param(0.01, "m", "Width of the bins along the face", gt=0)
     least: int = param(6, "count", "Minimum number of pixels per bin, and of a frame on either part of a face", ge=1)
     least_bins: int = param(8, "count", "Minimum number of bins with data")
-    sure: float = param(0.7, "share", "Fraction of the depth up to which the face is known to exist")
     least_gap_m: float = param(0.015, "m", "Minimum gap between the rear edge and the surface behind it")
     clearer: float = param(0.5, "ratio", "Maximum misfit relative to that of a face without an end")
 
 
-def rear_edge(low: Vector3, high: Vector3, views: Sequence[View], world_from_local: Rigid3) -> float:
-    """Y of the rear edge of the box `low`..`high` (local frame): `high[1]`, clipped to the interval that depth allows."""
+def rear_edge(
+    box: np.ndarray, depth: Size, farthest_m: float, frames: Sequence[Frame], scene: Scene, world_from_front: Rigid3
+) -> np.ndarray:
+    """Intervals (n, 2) of y (m, frame of the front) in which the top, left and right faces of a box end, where depth shows it.
+
+    `box` gives the faces; a face exists up to the category's minimum `depth` and ends within `farthest_m`.
+    """
     params = tuned(Params)
-    thought = float(high[1])
-    bounds = []
-    for axis, side in ((2, 1.0), (0, -1.0), (0, 1.0)):
+    ends = []
+    for face, other in ((TOP, (LEFT, RIGHT)), (LEFT, (BOTTOM, TOP)), (RIGHT, (BOTTOM, TOP))):
         crossings, behind = [np.zeros(0)], [np.zeros(0)]
-        for view in views:
-            y, gap = _continued(low, high, view, world_from_local, axis, side, params.widest_m)
-            known = y < low[1] + params.sure * (high[1] - low[1])
+        for frame in frames:
+            y, gap = _continued(box, face, box[list(other)], frame, scene, world_from_front)
+            within = (y > 0.3 * depth.low) & (y < farthest_m + params.beyond_m)
+            y, gap = y[within], gap[within]
+            known = y < depth.low
             if known.sum() < params.least or np.count_nonzero(~known) < params.least:
                 continue
             crossings.append(y)
             behind.append(gap - np.median(gap[known]))  # the frame's own pose error
-        found = _change_point(np.concatenate(crossings), np.concatenate(behind), thought, params.widest_m)
+        found = _change_point(np.concatenate(crossings), np.concatenate(behind))
         if found is not None:
-            bounds.append(found)
-    if not bounds:
-        return thought
-    last, first = np.mean(bounds, axis=0)
-    return float(np.clip(thought, last, first))
+            ends.append(found)
+    return np.array(ends).reshape(-1, 2)
 
 
 def _continued(
-    low: Vector3, high: Vector3, view: View, world_from_local: Rigid3, axis: int, side: float, reach_m: float
+    box: np.ndarray, face: int, other: np.ndarray, frame: Frame, scene: Scene, world_from_front: Rigid3
 ) -> tuple[np.ndarray, np.ndarray]:
     """Crossing (y) of each pixel's ray with a face's plane, and the distance along y from there to the measured surface."""
     params = tuned(Params)
-    eye = world_from_local.inverse.apply(view.eye_world)
-    face = high[axis] if side > 0 else low[axis]
-    if side * (eye[axis] - face) <= 0.05:
+    axis, side = (2, 1.0) if face == TOP else (0, 1.0 if face == RIGHT else -1.0)
+    front_from_camera = world_from_front.inverse @ frame.world_from_camera
+    eye = front_from_camera.translation
+    if side * (eye[axis] - box[face]) <= 0.05:
         return np.zeros(0), np.zeros(0)
-    valid = view.depth_m > 0
-    hit = (world_from_local.inverse @ view.world_from_camera).apply(depth_points(view.depth_m, view.depth_camera)[valid])
+    depth_m = scene.depth(frame.index)
+    hit = front_from_camera.apply(depth_points(depth_m, frame.depth_camera)[depth_m > 0])
     ray = hit - eye
     steep = side * ray[:, axis] < -params.flattest * np.linalg.norm(ray, axis=1)
-    share = (face - eye[axis]) / np.where(steep, ray[:, axis], -1.0 * side)
+    share = (box[face] - eye[axis]) / np.where(steep, ray[:, axis], -1.0 * side)
     crossing = eye + share[:, None] * ray
-    other = 2 - axis
-    margin = 0.1 * (high[other] - low[other])
-    inside = steep & (crossing[:, other] > low[other] + margin) & (crossing[:, other] < high[other] - margin)
-    inside &= (crossing[:, 1] > low[1] + 0.3 * (high[1] - low[1])) & (crossing[:, 1] < high[1] + reach_m)
+    margin = 0.1 * (other[1] - other[0])
+    inside = steep & (crossing[:, 2 - axis] > other[0] + margin) & (crossing[:, 2 - axis] < other[1] - margin)
     gap = (hit - crossing)[:, 1]
-    inside &= (gap > -params.before_m) & (ray[:, 1] > 0)
+    inside &= (crossing[:, 1] > box[FRONT]) & (gap > -params.before_m) & (ray[:, 1] > 0)
     return crossing[inside, 1], gap[inside]
 
 
-def _change_point(crossing: np.ndarray, behind: np.ndarray, thought: float, reach_m: float) -> tuple[float, float] | None:
+def _change_point(crossing: np.ndarray, behind: np.ndarray) -> tuple[float, float] | None:
     """The last y on the face and the first y on the wall; None where no edge shows.
 
     Bins of y are split by least absolute deviations. Between the two lie the pixels that a phone drops at an edge.
@@ -95,6 +98,6 @@ def _change_point(crossing: np.ndarray, behind: np.ndarray, thought: float, reac
     misfits = [np.abs(gap[:k]).sum() + np.abs(gap[k:] + y[k:] - wall).sum() for k, wall in enumerate(walls, 1)]
     best = int(np.argmin(misfits)) + 1
     to_the_wall = walls[best - 1] - y[best] < params.least_gap_m  # the face ends where the wall begins
-    if to_the_wall or misfits[best - 1] > params.clearer * np.abs(gap).sum() or abs(y[best] - thought) > reach_m:
+    if to_the_wall or misfits[best - 1] > params.clearer * np.abs(gap).sum():
         return None
     return float(y[best - 1]), float(y[best] - params.bin_m / 2)

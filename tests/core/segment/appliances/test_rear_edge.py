@@ -1,0 +1,43 @@
+"""Where the faces of a rendered appliance end, from the depth pixels past them."""
+
+import numpy as np
+import pytest
+
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.segment.appliances.rear_edge import _change_point, rear_edge
+from r2c2r_core.segment.scene import Scene, prepare_scene
+from tests.core.generate.scenes import appliance_scene
+
+BOX = np.array([0.0, -0.23, 0.23, 0.0, 0.34, -0.14, 0.14])
+FRONT = Rigid3(np.eye(3), np.array([0.0, 0.0, 1.04]))
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return prepare_scene(appliance_scene()[0], tmp_path_factory.mktemp("cache"))
+
+
+def ends(scene: Scene, box: np.ndarray = BOX) -> np.ndarray:
+    return rear_edge(box, category_of("microwave").depth, 0.60, scene.frames, scene, FRONT)
+
+
+def test_an_appliance_ends_where_the_wall_shows_past_its_sides(scene: Scene) -> None:
+    found = ends(scene)
+    assert len(found)
+    assert found.mean(axis=1) == pytest.approx(0.34, abs=0.015)
+
+
+def test_sides_that_no_frame_looks_past_have_no_end(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    blind = {frame.index: np.zeros_like(scene.depth(frame.index)) for frame in scene.frames}
+    monkeypatch.setattr(Scene, "depth", lambda _, frame: blind[frame])
+    assert not len(ends(scene))
+
+
+@pytest.mark.parametrize(("wall_m", "ends"), [(0.30, False), (0.36, True)])
+def test_a_face_that_ends_at_the_wall_has_no_rear_edge_before_it(wall_m: float, ends: bool) -> None:
+    """A refrigerator stands against the wall: rays beyond its side meet the wall where that begins."""
+    y = np.arange(-0.2, 0.40, 0.001)
+    noise = np.random.default_rng(0).normal(0, 0.002, len(y))
+    found = _change_point(y, np.where(y < 0.30, 0.0, wall_m - y) + noise)
+    assert (found == pytest.approx((0.295, 0.300), abs=0.011)) if ends else found is None
