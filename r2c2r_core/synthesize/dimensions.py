@@ -134,10 +134,10 @@ def measure_object(
         low, high = _with_box(low, high, track, rotation)
     if spec.opens == "rigid":
         sources[1] = _depth_source(capture, asset, low, high, rotation, warnings)
+    elif (observed_m := _observed_depth(track, float(high[1] - low[1]))) is not None:
+        high, sources[1] = np.array([high[0], low[1] + observed_m, high[2]]), "measured"
     else:
         low, high, sources[1] = _believable_depth(capture, track, spec, low, high, rotation)
-        if sources[1] == "inferred" and _is_seen_depth(track, float(high[1] - low[1])):
-            sources[1] = "measured"
     if track.kind == "appliance" and _foot_hidden(capture, low):
         sources[2] = "inferred"
     if handle is None and spec.opens not in ("rigid", "fixed"):
@@ -281,10 +281,12 @@ def _depth_source(
     return "measured" if seen else "inferred"
 
 
-def _is_seen_depth(track: MaskTrack, depth_m: float) -> bool:
-    """Whether a depth is the one that was observed with the object's box."""
-    box = track.box
-    return box is not None and box.depth_seen and abs(depth_m - float(box.dimensions_m[1])) < tuned(DepthParams).alike_m
+def _observed_depth(track: MaskTrack, depth_m: float) -> float | None:
+    """Depth that was observed with the object's box, where the placed mesh has that depth up to the error of its scale."""
+    if track.box is None or not track.box.depth_seen:
+        return None
+    observed_m = float(track.box.dimensions_m[1])
+    return observed_m if abs(depth_m - observed_m) < tuned(DepthParams).alike_m else None
 
 
 def _face_seen(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarray) -> bool:

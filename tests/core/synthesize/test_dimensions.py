@@ -142,3 +142,13 @@ def test_the_height_of_an_appliance_that_ends_at_the_floor_is_inferred(bottom_m:
     assert found.sources[2] == said
     np.testing.assert_allclose(found.dimensions_m[2], 1.6, atol=0.01)
     assert measure(Unit("c", "cabinet", (0.0, 0.0, 0.36), (0.6, 0.58, 0.7))).sources[2] == "measured"  # a door's edge is seen
+
+
+@pytest.mark.parametrize(("scale", "depth_m", "source"), [(1.01, 0.60, "measured"), (1.10, 0.63, "inferred")])
+def test_an_observed_depth_replaces_that_of_a_mesh_of_nearly_this_depth(scale: float, depth_m: float, source: str) -> None:
+    unit = Unit("a", "refrigerator", (0, 0, 0.9), (0.6, 0.60, 1.8), kind="appliance")
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0), stretch=(1.0, scale, 1.0))
+    track = replace(track, box=replace(track.box, depth_seen=True))
+    found = measure_object(capture(), track, placement, asset, category_of("refrigerator"), ObjectOverride())
+    assert found.dimensions_m[1] == pytest.approx(depth_m, abs=1e-3)
+    assert found.sources[1] == source
