@@ -1,0 +1,52 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { contradictionsOn } from "../../static/js/lib/contradictions.js";
+
+/** A mask of these columns, 10 rows high, of a picture of 100 x 20. */
+const columns = (object, left, right, clicks = []) => ({
+  object,
+  name: `door_${object}`,
+  mask: {
+    width: 100,
+    height: 20,
+    left,
+    top: 5,
+    box_width: right - left,
+    box_height: 10,
+    bits: "",
+  },
+  pixels: new Uint8Array((right - left) * 10).fill(1),
+  clicks,
+});
+
+test("masks that share no more than a border contradict nothing", () => {
+  assert.deepEqual(contradictionsOn([columns(1, 0, 51), columns(2, 50, 100), columns(3, 80, 80)]), []);
+});
+
+test("masks that share much of the smaller are said of both objects, with what mends it", () => {
+  const some = contradictionsOn([columns(1, 0, 50), columns(2, 40, 90)]);
+  assert.deepEqual(
+    some.map(({ object, text }) => [object, text.split(":")[0]]),
+    [
+      [1, "Shares 20 % with door_2 here"],
+      [2, "Shares 20 % with door_1 here"],
+    ],
+  );
+  const most = contradictionsOn([columns(1, 0, 50), columns(2, 20, 50)]);
+  assert.match(most[0].text, /^On the same thing as door_2 \(100 % shared\): merge or delete one/);
+  assert.deepEqual(
+    most.map(({ mergesWith }) => mergesWith),
+    [
+      { object: 2, name: "door_2" },
+      { object: 1, name: "door_1" },
+    ],
+  );
+});
+
+test("a mask that leaves out a click on it or takes in one off it says so", () => {
+  const click = (x, label) => ({ x, y: 10.5, label });
+  assert.deepEqual(contradictionsOn([columns(1, 0, 50, [click(20.5, 1), click(50.5, 1), click(70.5, 0)])]), []);
+  assert.match(contradictionsOn([columns(1, 0, 50, [click(60.5, 1)])])[0].text, /lies outside its mask/);
+  assert.match(contradictionsOn([columns(1, 0, 50, [click(20.5, 1), click(30.5, 0)])])[0].text, /lies inside its mask/);
+});

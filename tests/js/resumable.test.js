@@ -1,0 +1,49 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js";
+
+const file = new Blob([new Uint8Array(2 * PIECE + 10)]);
+
+/** A server that keeps half of a piece and then cannot be reached, so often. */
+function faultyServer(failures) {
+  const kept = { bytes: 0, failures };
+  return {
+    kept,
+    send: async (offset, piece) => {
+      assert.equal(offset, kept.bytes);
+      if (kept.failures-- > 0) {
+        kept.bytes += piece.size >> 1;
+        throw new Error("lost");
+      }
+      return (kept.bytes += piece.size);
+    },
+    ask: async () => kept.bytes,
+    mayPass: (error) => error.message === "lost",
+    onProgress: () => {},
+    wait: async () => {},
+  };
+}
+
+test("an upload goes on where the server's copy ends, however often the connection is lost", async () => {
+  for (const failures of [0, 1, 5]) {
+    const server = faultyServer(failures);
+    await sendRest(file, 0, server);
+    assert.equal(server.kept.bytes, file.size);
+  }
+});
+
+test("an upload that is refused is given up", async () => {
+  const refusing = {
+    ...faultyServer(0),
+    send: async () => Promise.reject(new Error("too large")),
+  };
+  await assert.rejects(sendRest(file, 0, refusing), /too large/);
+});
+
+test("only the same file goes on with a stopped upload", () => {
+  const stopped = { file_name: "a.r3d", size: 9, modified: 1.5, offset: 3 };
+  assert.equal(stoppedUpload({ name: "a.r3d", size: 9, lastModified: 1500 }, [stopped]), stopped);
+  for (const other of [{ name: "b.r3d" }, { size: 8 }, { lastModified: 1501 }])
+    assert.equal(stoppedUpload({ name: "a.r3d", size: 9, lastModified: 1500, ...other }, [stopped]), undefined);
+});
