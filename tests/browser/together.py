@@ -37,7 +37,8 @@ class Server:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.kill()
+        assert self.process is not None
+        self.process.end()  # it ends its workers: those of a killed server would go on
 
     @property
     def address(self) -> str:
