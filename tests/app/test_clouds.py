@@ -50,7 +50,7 @@ def test_the_placed_mesh_is_drawn_for_the_camera_of_a_photo(reviewed: Reviewed, 
     answer = web.client.get(address)
     image = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_UNCHANGED)
     assert image is not None
-    assert image.shape[1] == 1920
+    assert image.shape[1] == 1920  # as wide as the photos of phones
     assert image.shape[2] == 4
     assert image[0, 0, 3] == 0  # nothing where the mesh is not
     assert "immutable" in answer.headers["cache-control"]

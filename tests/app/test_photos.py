@@ -115,7 +115,6 @@ def test_what_something_covers_in_the_photo_is_drawn_faintly(reviewed: Reviewed)
         picture = web.client.get(f"/media/{project}/overlay/{drawer}/3.png?of=fitted&look=ghost&v={wall_m}").content
         image = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_UNCHANGED)
         assert image is not None
-        assert image.shape[1] == 1920  # as wide as the photos of phones
         return int(image[..., 3].max())
 
     assert alpha(5.0) == 255
