@@ -1,12 +1,13 @@
 """Two clicks on one thing are said beside both objects as soon as their masks are there, and no more once that is mended."""
 
+import re
 from pathlib import Path
 
 from playwright.sync_api import expect
 
 from tests.browser.looks import picture
 from tests.browser.serving import NewContext
-from tests.browser.test_together import click_frame, rows, sample
+from tests.browser.test_together import click_frame, pick, rows, sample
 from tests.browser.together import Server, signed_in
 
 
@@ -35,6 +36,27 @@ def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(new_conte
     expect(said).to_have_count(0)
     expect(rows(page).last).to_contain_text("2 clicks")
     expect(page.get_by_role("button", name="drawer_2", exact=True)).to_have_attribute("aria-pressed", "true")
+
+
+def test_a_click_that_finds_no_mask_in_its_frame_is_said_until_it_is_removed(new_context: NewContext, server: Server) -> None:
+    context = new_context()
+    page = signed_in(context, server, "ann")
+    project = sample(page)
+    page.goto(f"{project}/annotate?frame=3")
+    page.get_by_role("button", name="New object").click()
+    click_frame(page, 100, 40)
+    expect(rows(page)).to_have_count(3)
+    page.goto(f"{project}/annotate?frame=7")
+    pick(page, "drawer_2")
+    expect(page.get_by_role("button", name="drawer_2", exact=True)).to_have_attribute("aria-pressed", "true")
+    said = rows(page).last.locator(".contradicted")
+    click_frame(page, 100, 116)
+    expect(rows(page).last).to_contain_text("2 clicks")
+    expect(said).to_have_text(re.compile("^A click on it found no mask in this frame"))
+    picture(page, "click-without-mask")
+    page.keyboard.press("Control+z")
+    expect(rows(page).last).to_contain_text("1 click")
+    expect(said).to_have_count(0)
 
 
 def test_a_thing_that_is_too_large_is_said_at_the_click_with_what_mends_it(new_context: NewContext, tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { contradictionsOn } from "../../static/js/lib/contradictions.js";
+import { contradictionsOn, unseenOn } from "../../static/js/lib/contradictions.js";
 
 /** A mask of these columns, 10 rows high, of a picture of 100 x 20. */
 const columns = (object, left, right, clicks = []) => ({
@@ -49,4 +49,16 @@ test("a mask that leaves out a click on it or takes in one off it says so", () =
   assert.deepEqual(contradictionsOn([columns(1, 0, 50, [click(20.5, 1), click(50.5, 1), click(70.5, 0)])]), []);
   assert.match(contradictionsOn([columns(1, 0, 50, [click(60.5, 1)])])[0].text, /lies outside its mask/);
   assert.match(contradictionsOn([columns(1, 0, 50, [click(20.5, 1), click(30.5, 0)])])[0].text, /lies inside its mask/);
+});
+
+test("a click on a frame where the object has no mask is said once its masks are found, unless a person set the frame", () => {
+  const point = { frame: 4, label: 1 };
+  const object = (more = {}) => ({ id: 1, segment: "done", points: [point], frames: [], ...more });
+  const said = (more, frame = 4, seen = false) => unseenOn([object(more)], frame, () => seen).map(({ text }) => text);
+  assert.match(said()[0], /found no mask in this frame: remove the click/);
+  assert.deepEqual(said({}, 4, true), []);
+  assert.deepEqual(said({}, 5), []);
+  assert.deepEqual(said({ segment: "running" }), []);
+  assert.deepEqual(said({ points: [{ ...point, label: 0 }] }), []);
+  assert.deepEqual(said({ frames: [{ frame: 4, mask: null }] }), []);
 });

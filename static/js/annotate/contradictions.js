@@ -3,7 +3,7 @@
  * Says "change" when that is another than before.
  */
 
-import { contradictionsOn, shownOn } from "../lib/contradictions.js";
+import { contradictionsOn, shownOn, unseenOn } from "../lib/contradictions.js";
 
 /** @typedef {import("./scene-objects.js").SceneObjects} SceneObjects */
 /** @typedef {import("./masks.js").Masks} Masks */
@@ -50,14 +50,16 @@ export class Contradictions extends EventTarget {
 
   /** @param {FrameInfo} frame */
   async #look(frame) {
-    const masks = this.#objects.sorted.flatMap((object) => {
+    const objects = this.#objects.sorted;
+    const masks = objects.flatMap((object) => {
       const mask = this.#masks.on(object.id, frame.index)?.mask;
       return mask ? [{ object, mask }] : [];
     });
     const look = ++this.#looks;
     const shown = await shownOn(masks, frame);
     if (look !== this.#looks) return; // a newer one is under way
-    const said = contradictionsOn(shown);
+    const unseen = unseenOn(objects, frame.index, (object) => this.#masks.lane(object).has(frame.index));
+    const said = [...contradictionsOn(shown), ...unseen];
     if (JSON.stringify(said) === JSON.stringify(this.#said)) return;
     this.#said = said;
     this.dispatchEvent(new Event("change"));

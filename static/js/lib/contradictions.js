@@ -42,6 +42,26 @@ export function contradictionsOn(shown) {
 }
 
 /**
+ * Objects that were clicked on a frame and have no mask there, though all their masks are found.
+ * @param {import("../api-types").SceneObject[]} objects
+ * @param {number} frame
+ * @param {(object: number) => boolean} isSeen whether it has a mask on the frame
+ * @returns {Said[]}
+ */
+export function unseenOn(objects, frame, isSeen) {
+  return objects
+    .filter(({ id, segment, points, frames }) => {
+      const clicked = points.some((point) => point.frame === frame && point.label === 1);
+      const corrected = frames.some((said) => said.frame === frame); // a person said what is visible there
+      return segment === "done" && clicked && !corrected && !isSeen(id);
+    })
+    .map(({ id }) => ({
+      object: id,
+      text: "A click on it found no mask in this frame: remove the click, or click where the scan has depth",
+    }));
+}
+
+/**
  * @param {Shown} first
  * @param {Shown} second
  * @returns {Said[]}

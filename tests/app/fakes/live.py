@@ -1,7 +1,8 @@
 """A live segmenter whose masks are rectangles around the click: `live.py WORKDIR --width N --segmenter NAME`.
 
 A negative first click fails; a click at x >= 150 is computed slowly, so that it can be superseded; one at x >= 156 gets one
-frame and no further until it is superseded or stopped. Two drawers and a bottle are proposed, one plane is drawn.
+frame and no further until it is superseded or stopped; one at y >= 114 finds no mask in its frame. Two drawers and a bottle
+are proposed, one plane is drawn.
 """
 
 import json
@@ -133,7 +134,10 @@ def main() -> None:
                 error={"kind": "PromptError", "message": "nothing there", "hint": "click on it"},
             )
             continue
+        missed = {point["frame"] for point in prompt["points"] if point["y"] >= 114}
         for frame in FRAMES:
+            if frame in missed:
+                continue
             say(object=number, key=key, frame=frame, confidence=0.9, area=0.005, mask=rectangle(point["x"], point["y"]))
             time.sleep(0.3 if point["x"] >= 150 else 0)
             if superseded(commands, number, wait=point["x"] >= 156):
