@@ -39,7 +39,7 @@ class SceneItem(Shape):
 
 
 class LeftOut(Shape):
-    """An object made from the scan that the user does not want."""
+    """An object made from the scan that the user does not want, or that the last run did not make."""
 
     object: int
     name: str
@@ -58,6 +58,7 @@ class SceneSummary(Shape):
 
     items: list[SceneItem]
     left_out: list[LeftOut]
+    unused: list[LeftOut]  # corrected, not clicked, and not in the scene
     failures: dict[str, str]  # object name -> why it is missing
     warnings: list[str]
     stages: list[StageInfo]

@@ -42,12 +42,15 @@ def summary(context: Context, project_id: str) -> schemas.SceneSummary:
     taken = Workspace(files.work).seconds()
     described = manifest(files.bundles / bundle.path) if bundle else {}
     failures = described.get("failures") if isinstance(described.get("failures"), dict) else {}
+    corrected = [(item, entry) for item in mine_by_name.values() if (entry := _said(item, said))]
+    there = {entry["name"] for entry in scene["objects"]}
     return schemas.SceneSummary(
         items=[_item(entry, item := mine_by_name.get(entry["name"]), files, _said(item, said)) for entry in scene["objects"]],
-        left_out=[
-            schemas.LeftOut(object=item.id or 0, name=item.name)
-            for item in mine_by_name.values()
-            if said.get(item.id or 0, {}).get("left_out")
+        left_out=[_left_out(item) for item, entry in corrected if entry.get("left_out")],
+        unused=[
+            _left_out(item)
+            for item, entry in corrected
+            if not entry.get("left_out") and not item.masks_key and item.result_name not in there
         ],
         failures={str(name): str(line) for name, line in (failures or {}).items()},
         warnings=scene["warnings"],
@@ -86,6 +89,10 @@ def _scene_facts(scene: ArticulatedScene) -> dict[str, Any]:
 
 def _mask_count(track: MaskTrack) -> int:
     return len(track.masks)
+
+
+def _left_out(item: SceneObject) -> schemas.LeftOut:
+    return schemas.LeftOut(object=item.id or 0, name=item.name)
 
 
 def _said(item: SceneObject | None, said: Mapping[int, dict[str, Any]]) -> dict[str, Any]:

@@ -616,7 +616,7 @@ export interface Leaf {
   opening: Opening | null;
 }
 
-/** An object made from the scan that the user does not want. */
+/** An object made from the scan that the user does not want, or that the last run did not make. */
 export interface LeftOut {
   object: number;
   name: string;
@@ -1274,6 +1274,7 @@ export interface SceneObject {
 export interface SceneSummary {
   items: SceneItem[];
   left_out: LeftOut[];
+  unused: LeftOut[];
   failures: Record<string, string>;
   warnings: string[];
   stages: StageInfo[];

@@ -371,6 +371,12 @@ def test_what_nobody_clicked_is_corrected_by_its_name_left_out_and_brought_back(
     assert web.get(f"/api/projects/{project}/scene")["left_out"] == []
     (counter,) = [o for o in web.get(f"/api/projects/{project}/objects") if o["name"] == "counter_1"]
     assert web.get(f"/api/projects/{project}/objects/{counter['id']}/override")["dimensions_m"] == [3.0, 0.6, 0.04]
+    assert web.get(f"/api/projects/{project}/scene")["unused"] == []
+    Workspace(work).save("warp", "scene", made, {"key": "k3", "seconds": 1.0})  # a run that found no counter
+    told = web.get(f"/api/projects/{project}/scene")
+    assert [(item["object"], item["name"]) for item in told["unused"]] == [(counter["id"], "counter_1")]
+    web.patch(f"/api/projects/{project}/objects/{counter['id']}/override", {"left_out": True, "rerun": False})
+    assert web.get(f"/api/projects/{project}/scene")["unused"] == []  # as was wished
     web.patch(f"/api/projects/{project}/scene/absent/override", {"left_out": True}, 404)
     web.patch(f"/api/projects/{project}/objects/{counter['id']}/override", {"built_as": "frobnicator", "rerun": False}, 422)
 

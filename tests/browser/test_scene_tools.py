@@ -140,7 +140,7 @@ def test_what_geometry_can_show_is_shown_before_the_run_and_older_results_are_ma
 def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    finished(page, server)
+    project = finished(page, server)
     made = page.locator(".review nav section", has_text="Made from the scan")
     made.get_by_role("button", name="counter_1", exact=True).click()
     panel = page.locator(".review > aside")
@@ -153,6 +153,13 @@ def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(new_con
     expect(made.get_by_role("button", name="Bring back counter_1")).to_be_visible()
     made.get_by_role("button", name="Bring back counter_1").click()
     expect(made.get_by_role("button", name="counter_1", exact=True)).to_be_visible()
+
+    finish(server.data / "projects" / project.split("/p/")[1] / "work")  # a run that finds no worktop
+    page.reload()
+    expect(made).to_contain_text("counter_1: corrected, but the last run did not make it. Click on it, or delete it.")
+    picture(page, "not-made")
+    made.get_by_role("link", name="counter_1").click()
+    expect(page.get_by_role("button", name="Delete counter_1")).to_be_visible()
 
 
 def test_how_it_opens_is_changed_in_review_and_holds_for_all_of_a_category_of_ones_own(

@@ -32,6 +32,8 @@ export class ReviewObjects extends EventTarget {
   hidden = new Set();
   /** @type {import("../api-types").SceneSummary["left_out"]} */
   leftOut = [];
+  /** Corrected, but not made by the last run. @type {import("../api-types").SceneSummary["unused"]} */
+  unused = [];
   /** @type {CandidateGroup[]} */
   groups = [];
   /** @type {SceneItem[]} */
@@ -62,6 +64,7 @@ export class ReviewObjects extends EventTarget {
         this.groups = groups.map((group) => this.#asSaid(group));
         this.items = scene?.items ?? [];
         this.leftOut = scene?.left_out ?? [];
+        this.unused = scene?.unused ?? [];
         if (!this.made.some(({ run_name }) => run_name === this.madeName)) this.madeName = "";
         this.certificate = certificate;
         this.risks = this.#weighed();

@@ -21,13 +21,13 @@ export function eye(objects, { name, run_name }) {
 }
 
 /**
- * Worktops, plinths and whatever else a run made from the scan, and what was left out of them.
+ * What a run made from the scan, such as worktops, what was left out of it, and what it did not make though it was corrected.
  * @param {ReviewObjects} objects
  * @param {(item: { name: string, run_name: string }) => void} bringBack
  */
 export function madeList(objects, bringBack) {
-  const { made, leftOut } = objects;
-  if (!made.length && !leftOut.length) return "";
+  const { made, leftOut, unused } = objects;
+  if (!made.length && !leftOut.length && !unused.length) return "";
   const rows = made.map((item) => {
     const chosen = item.run_name === objects.madeName;
     const button = h("button", { type: "button", "aria-pressed": String(chosen), title: item.name });
@@ -42,5 +42,14 @@ export function madeList(objects, bringBack) {
     back.addEventListener("click", () => bringBack({ name: item.name, run_name: item.name }));
     return h("li", { class: "with-eye" }, h("span", { class: "name left-out" }, item.name), back);
   });
-  return h("section", {}, h("h2", {}, "Made from the scan"), h("ul", {}, ...rows, ...gone));
+  const missing = unused.map(({ object, name }) => {
+    const link = h("a", { href: `/p/${objects.project}/annotate?object=${object}` }, name);
+    return h(
+      "p",
+      { class: "muted" },
+      link,
+      ": corrected, but the last run did not make it. Click on it, or delete it.",
+    );
+  });
+  return h("section", {}, h("h2", {}, "Made from the scan"), h("ul", {}, ...rows, ...gone), ...missing);
 }
