@@ -12,15 +12,15 @@ def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "backup", backup)
     add_data_folder(added)
-    wanted = "a new FILE.db for the database alone, else a new folder for it and the projects' files"
+    wanted = "a new FILE.db for the database alone, or a new folder for the database and the projects' files"
     added.add_argument("-o", dest="target", type=Path, required=True, metavar="OUT", help=wanted)
 
 
 def backup(options: argparse.Namespace) -> int:
-    """A copy of the data folder, also while it is served."""
+    """Back up the data folder, also while it is served."""
     with show_progress() as progress:
         moved = web_module("backups").backup(options.folder, options.target, progress=progress.for_stage("backup"))
-    print(f"{options.target}: {described(moved)}; the database is sound")
+    print(f"{options.target}: {described(moved)}; the database is intact")
     return 0
 
 

@@ -13,25 +13,25 @@ def add(parsers: Parsers) -> None:
     added = add_command(parsers, "check", check)
     added.add_argument("bundle", type=Path, help="bundle, zipped or as a folder")
     added.add_argument(
-        "--gripper", action="store_true", help="let a friction gripper open every joint and move what stands free"
+        "--gripper", action="store_true", help="let a friction gripper open every joint and move every free object"
     )
     added.add_argument(
         "--arm",
         action="store_true",
-        help="let a Franka Panda open every joint within its reach, and say where it stands for it",
+        help="let a Franka Panda open every joint within its reach, and print its base positions",
     )
     added.add_argument(
         "--films",
         type=Path,
         metavar="DIR",
-        help="with --gripper or --arm: a film and a sheet of pictures of each go there, the arm's and its map into its arm/",
+        help="with --gripper or --arm: folder for a film and a contact sheet of each trial (the arm's, with a map, in DIR/arm)",
     )
     add_strict(added)
     add_json(added)
 
 
 def check(options: argparse.Namespace) -> int:
-    """Lint and simulation certificate of a bundle; with --gripper or --arm, whether a robot opens what is in it."""
+    """Check a bundle: lint and simulation certificate; with --gripper or --arm, also whether a robot can open its joints."""
     from r2c2r_core.export.stage import (
         arm_to_json,
         certificate_to_json,
@@ -42,7 +42,7 @@ def check(options: argparse.Namespace) -> int:
     )
 
     if options.films and not (options.gripper or options.arm):
-        raise InputError("--films: there is nothing to film without --gripper or --arm", hint="give one of them too")
+        raise InputError("--films: there is nothing to film without --gripper or --arm", hint="add --gripper or --arm")
     bundle, films = existing(options.bundle), options.films
     with show_progress() as progress:
         certificate = check_bundle(bundle, progress=progress.for_stage("check"))

@@ -14,10 +14,10 @@ def add(parsers: Parsers) -> None:
 
 
 def check_data(options: argparse.Namespace) -> int:
-    """Whether the database is sound and agrees with the files, both ways; also while it is served."""
+    """Check that the database is intact and that it and the files agree; also while it is served."""
     with show_progress() as progress:
         found = web_module("data_check").check_data(options.folder, progress=progress.for_stage("check-data"))
     if options.json:
         write_json(options.json, {"version": 1, "findings": [finding.to_json() for finding in found]})
-    print(table(("what", "where", "detail"), [(f.what, f.where, f.detail) for f in found]) if found else "all is well")
+    print(table(("what", "where", "detail"), [(f.what, f.where, f.detail) for f in found]) if found else "no problems found")
     return 1 if found else 0

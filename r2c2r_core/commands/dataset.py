@@ -16,7 +16,7 @@ def add(parsers: Parsers) -> None:
 
 
 def dataset(options: argparse.Namespace) -> int:
-    """A finished work folder as a dataset: labelled frames, candidate meshes, matched points, aligned meshes (paper §3)."""
+    """Write a finished work folder as a dataset: labelled frames, candidate meshes, matches, aligned meshes (paper §3)."""
     from r2c2r_core.dataset.stage import LabelledObject, StoredFrames, write_dataset
     from r2c2r_core.disk import explained_io
     from r2c2r_core.ingest.store import depth_path, rgb_path
@@ -28,7 +28,7 @@ def dataset(options: argparse.Namespace) -> int:
     work = Workspace(workdir)
     capture = work.load_latest("ingest", "scene")
     if capture is None:
-        raise InputError(f"{workdir}: no recording was read here", hint="run r2c2r run with this --workdir first")
+        raise InputError(f"{workdir}: it holds no recording", hint="first use r2c2r run with this --workdir")
     objects = [
         LabelledObject(track, work.load_latest("generate", name), work.load_latest("align", name))
         for name in work.names("segment")

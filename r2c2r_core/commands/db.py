@@ -13,19 +13,19 @@ def add(parsers: Parsers) -> None:
     """The command and what it can do."""
     actions = add_command(parsers, "db", db).add_subparsers(required=True, dest="what", metavar="move|backup|restore|check")
     move = actions.add_parser("move")
-    move.add_argument("source", metavar="FROM", help="FILE.db, or the address of a Postgres")
+    move.add_argument("source", metavar="FROM", help="FILE.db, or the address of a PostgreSQL database")
     move.add_argument("target", metavar="TO", help=_PLACE)
     backup = actions.add_parser("backup")
     add_data_folder(backup)
-    backup.add_argument("-o", dest="target", type=Path, required=True, metavar="OUT.db", help="a new file")
+    backup.add_argument("-o", dest="target", type=Path, required=True, metavar="OUT.db", help="new file to write")
     restore = actions.add_parser("restore")
-    restore.add_argument("source", type=Path, metavar="BACKUP.db", help="what `r2c2r db backup` wrote")
+    restore.add_argument("source", type=Path, metavar="BACKUP.db", help="file written by `r2c2r db backup`")
     add_data_folder(restore)
     add_data_folder(actions.add_parser("check"))
 
 
 def db(options: argparse.Namespace) -> int:
-    """The rows, in a file or a Postgres (R2C2R_DATABASE): move them, back them up, restore them, check them."""
+    """Move, back up, restore or check the database, a file or PostgreSQL (R2C2R_DATABASE)."""
     rows = web_module("db.moving")
     with show_progress() as shown:
         progress = shown.for_stage("db")

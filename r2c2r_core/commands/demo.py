@@ -19,7 +19,7 @@ def add(parsers: Parsers) -> None:
 
 
 def demo(options: argparse.Namespace) -> int:
-    """Sample kitchen, pipeline, certified bundle, and the app opened on it."""
+    """Render a sample kitchen, reconstruct it into a certified bundle, and open it in the web app."""
     app = web_module("serve")
     app.require_database(options.data)
     folder: Path = options.data / "demo"

@@ -14,7 +14,7 @@ def add(parsers: Parsers) -> None:
 
 
 def doctor(options: argparse.Namespace) -> int:
-    """Backends, extras, weights, GPU, ports, free disk."""
+    """Examine this machine: backends, extras, weights, GPU, ports, free disk."""
     from r2c2r_core.doctor import examine_machine
 
     findings = examine_machine(options.data)

@@ -14,16 +14,16 @@ if TYPE_CHECKING:
 def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "evaluate", evaluate)
-    added.add_argument("bundle", type=Path, help="a bundle (zip or folder), or a dataset's folder")
+    added.add_argument("bundle", type=Path, help="bundle (zip or folder), or the folder of a dataset")
     against = added.add_mutually_exclusive_group(required=True)
-    against.add_argument("--truth", type=Path, help="the truth.json of the recording")
-    against.add_argument("--benchmark", nargs=2, metavar=("NAME", "DIR"), help="a data set's own truth: arti4d SEQUENCE")
-    added.add_argument("--masks", type=Path, help="the folder that run --masks wrote")
+    against.add_argument("--truth", type=Path, help="truth.json of the recording")
+    against.add_argument("--benchmark", nargs=2, metavar=("NAME", "DIR"), help="truth of a public data set: arti4d SEQUENCE")
+    added.add_argument("--masks", type=Path, help="folder written by r2c2r run --masks")
     add_json(added)
 
 
 def evaluate(options: argparse.Namespace) -> int:
-    """The metric set against truth: of a bundle, or of a dataset that `r2c2r dataset` wrote (its masks and aligned meshes)."""
+    """Measure a bundle, or the masks and aligned meshes of a dataset by `r2c2r dataset`, against ground truth."""
     from r2c2r_core.evaluate.dataset import evaluate_dataset, is_dataset
     from r2c2r_core.evaluate.stage import evaluate_bundle
 
@@ -44,5 +44,5 @@ def _against(bundle: Path, name: str, folder: str) -> "Evaluation":
     from r2c2r_core.evaluate.arti4d import evaluate_arti4d
 
     if name != "arti4d":
-        raise InputError(f"--benchmark {name}: no such benchmark", hint="known: arti4d")
+        raise InputError(f"--benchmark {name}: unknown benchmark", hint="choose arti4d")
     return evaluate_arti4d(bundle, existing(Path(folder)))

@@ -15,14 +15,14 @@ def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "info", info)
     added.add_argument("capture", type=Path, help="recording: a file, a folder or a zip")
-    added.add_argument("--overrides", type=Path, help="what a person said about the room: up, floor, manhattan_yaw, walls")
-    added.add_argument("--picture", type=Path, metavar="FILE.png", help="the fused scan and the camera's path, drawn")
+    added.add_argument("--overrides", type=Path, help="corrections of the room: up, floor, manhattan_yaw, walls")
+    added.add_argument("--picture", type=Path, metavar="FILE.png", help="picture of the fused scan and the camera's path")
     add_reading(added)
     add_json(added)
 
 
 def info(options: argparse.Namespace) -> int:
-    """The capture doctor."""
+    """Examine a recording: what is wrong with it, the likely cause and the remedy."""
     from r2c2r_core.ingest.doctor import draw_scan, examine, refusal_to_json
     from r2c2r_core.ingest.readers.table import open_recording
     from r2c2r_core.ingest.stage import IngestConfig, read_capture

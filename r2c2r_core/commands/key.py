@@ -11,6 +11,6 @@ def add(parsers: Parsers) -> None:
 
 
 def key(options: argparse.Namespace) -> int:
-    """Another address for the running app: each printed address signs one browser in."""
+    """Print another sign-in address of the running app: each address signs in one browser."""
     print(web_module("serve").new_address(options.data))
     return 0

@@ -47,21 +47,21 @@ def add_data_folder(parser: argparse.ArgumentParser) -> None:
 
 def add_json(parser: argparse.ArgumentParser) -> None:
     """Add --json: a file for the findings as JSON."""
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON too")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the findings as JSON")
 
 
 def add_strict(parser: argparse.ArgumentParser) -> None:
     """Add --strict: also fail on doubtful likeness to the recording."""
-    parser.add_argument("--strict", action="store_true", help="exit 1 also where the likeness is doubtful or failed")
+    parser.add_argument("--strict", action="store_true", help="exit 1 also if the likeness is doubtful or failed")
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
     """Add --depth-scale and --register-depth: remedies for faults reported by `r2c2r info`."""
     parser.add_argument(
-        "--depth-scale", type=factor, metavar="FACTOR", help="multiply the recorded depth, such as 0.1 (`r2c2r info` names it)"
+        "--depth-scale", type=factor, metavar="FACTOR", help="factor on recorded depth, such as 0.1 (`r2c2r info` reports it)"
     )
     parser.add_argument(
-        "--register-depth", action="store_true", help="move depth onto the colour images, by the fit that `r2c2r info` names"
+        "--register-depth", action="store_true", help="register depth to the colour images by the fit of `r2c2r info`"
     )
 
 
@@ -117,7 +117,7 @@ def existing(path: Path) -> Path:
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}", hint="check the path") from error
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # reading a pipe would block
-        raise InputError(f"{path}: {kind_of_file(mode)}", hint="give a file or a folder")
+        raise InputError(f"{path}: {kind_of_file(mode)}, expected a file or a folder", hint="check the path")
     return path
 
 

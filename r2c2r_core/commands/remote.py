@@ -24,43 +24,43 @@ def add(parsers: Parsers) -> None:
             "--server",
             default=os.environ.get("R2C2R_SERVER"),
             metavar="ADDRESS",
-            help="default: R2C2R_SERVER of the environment",
+            help="address of the server (default: the environment variable R2C2R_SERVER)",
         )
     added["upload"].add_argument("capture", type=Path, help="recording: a file, a folder or a zip")
-    added["upload"].add_argument("--name", help="of the project (default: the file's)")
+    added["upload"].add_argument("--name", help="name of the project (default: the file's)")
     for what in ("click", "run", "wait", "download", "export"):
-        added[what].add_argument("project", help="its id, as upload and list print it")
-    added["click"].add_argument("prompts", type=Path, metavar="PROMPTS.json", help="what is clicked, by name and category")
+        added[what].add_argument("project", help="id of the project, as printed by upload and list")
+    added["click"].add_argument("prompts", type=Path, metavar="PROMPTS.json", help="clicks, names and categories of objects")
     for seam in _SEAMS:
-        added["run"].add_argument(f"--{seam}", help="name of a backend of the server")
-    added["run"].add_argument("--seed", type=seed, default=0, help="of what generators draw at random (default: %(default)s)")
+        added["run"].add_argument(f"--{seam}", help=f"{seam} backend of the server")
+    added["run"].add_argument("--seed", type=seed, default=0, help="random seed of generators (default: %(default)s)")
     added["download"].add_argument("-o", "--output", type=Path, required=True, metavar="BUNDLE.zip", help="file to write")
     added["export"].add_argument("-o", "--output", type=Path, required=True, metavar="PROJECT.zip", help="file to write")
-    added["export"].add_argument("--recording", action="store_true", help="with its recording")
-    added["download"].add_argument("--version", type=whole(1, 2**31 - 1), help="default: the newest")
+    added["export"].add_argument("--recording", action="store_true", help="include the recording")
+    added["download"].add_argument("--version", type=whole(1, 2**31 - 1), help="version of the bundle (default: the newest)")
 
 
 def remote(options: argparse.Namespace) -> int:
-    """Another machine's server, with the token in R2C2R_TOKEN: list, upload, click, run, wait, download, export."""
+    """Use a server on another machine with the token in R2C2R_TOKEN: list, upload, click, run, wait, download, export."""
     from r2c2r_core.client import Server
 
     token = os.environ.get("R2C2R_TOKEN", "")
     if not options.server:
-        raise InputError("no server is named", hint="--server https://kitchens.example, or R2C2R_SERVER")
+        raise InputError("no server given", hint="use --server https://kitchens.example, or set R2C2R_SERVER")
     if not token:  # an argument would be visible to all users of the machine
-        raise InputError("R2C2R_TOKEN is not set", hint="r2c2r token add NAME prints a token, on the server's machine")
+        raise InputError("R2C2R_TOKEN is not set", hint="create a token on the server's machine: r2c2r token add NAME")
     _ACTIONS[options.what](Server(options.server, token), options)
     return 0
 
 
 def _list(server: "Server", options: argparse.Namespace) -> None:
-    """The projects you may see."""
+    """List the projects you may see."""
     rows = [(each["id"], each["name"], each["status"], each["review_state"]) for each in server.projects()]
     print(table(("project", "name", "status", "review"), rows))
 
 
 def _upload(server: "Server", options: argparse.Namespace) -> None:
-    """Send a recording or a project's file and print its project's id; sent again after a break, it goes on."""
+    """Upload a recording or an exported project and print the project's id; an interrupted upload is resumed."""
     with show_progress() as progress:
         print(server.upload(existing(options.capture), options.name, progress))
 
@@ -71,32 +71,32 @@ def _click(server: "Server", options: argparse.Namespace) -> None:
 
     prompts = read_json(options.prompts, hint="see docs/schemas/prompts.json")
     if not isinstance(prompts, dict):
-        raise InputError(f"{options.prompts}: no prompts.json", hint="see docs/schemas/prompts.json")
+        raise InputError(f"{options.prompts}: expected a JSON object", hint="see docs/schemas/prompts.json")
     for item in server.click(options.project, prompts):
         print(f"{item['name']}: {item['category']}")
 
 
 def _run(server: "Server", options: argparse.Namespace) -> None:
-    """Begin a run and print its job's number."""
+    """Start a run and print the number of its job."""
     tools = {seam: getattr(options, seam) for seam in _SEAMS if getattr(options, seam) is not None}
     print(server.run(options.project, seed=options.seed, **tools))
 
 
 def _wait(server: "Server", options: argparse.Namespace) -> None:
-    """Wait until the project's newest job is done; exit 1 with the reason when it is not."""
+    """Wait for the project's newest job; exit 1 with the reason if it fails."""
     with show_progress() as progress:
         server.wait(options.project, progress)
 
 
 def _download(server: "Server", options: argparse.Namespace) -> None:
-    """Write the newest bundle, or a version of it."""
+    """Download the newest bundle, or another version of it."""
     with show_progress() as progress:
         version = server.download(options.project, options.output, options.version, progress)
     print(f"{options.output}: version {version}")
 
 
 def _export(server: "Server", options: argparse.Namespace) -> None:
-    """Write a project as one file, which upload takes to another server."""
+    """Download a project as one file, which can be uploaded to another server."""
     with show_progress() as progress:
         server.export(options.project, options.output, recording=options.recording, progress=progress)
     print(options.output)

@@ -11,13 +11,13 @@ from r2c2r_core.terminal import show_progress
 def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "restore", restore)
-    added.add_argument("source", type=Path, metavar="BACKUP", help="what `r2c2r backup` wrote, or any copy of r2c2r.db")
+    added.add_argument("source", type=Path, metavar="BACKUP", help="backup written by `r2c2r backup`, or any copy of r2c2r.db")
     add_data_folder(added)
 
 
 def restore(options: argparse.Namespace) -> int:
-    """A backup into a data folder that is not served; what is there stays, the older database in backups/."""
+    """Restore a backup into a data folder that is not being served; existing files stay, the old database in backups/."""
     with show_progress() as progress:
         moved = web_module("backups").restore(options.source, options.folder, progress=progress.for_stage("restore"))
-    print(f"{options.folder}: {described(moved)} put in place")
+    print(f"{options.folder}: restored {described(moved)}")
     return 0

@@ -25,26 +25,26 @@ def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "run", run)
     added.add_argument("capture", type=Path, help="recording: a file, a folder or a zip")
-    added.add_argument("--prompts", type=Path, required=True, help="prompts.json: what was clicked, by name and category")
+    added.add_argument("--prompts", type=Path, required=True, help="prompts.json: clicks, names and categories of objects")
     added.add_argument("-o", "--output", type=Path, required=True, metavar="BUNDLE.zip", help="bundle to write")
-    added.add_argument("--workdir", type=Path, help="where stages are kept (default: beside the bundle)")
-    added.add_argument("--overrides", type=Path, help="overrides.json: what a person corrected")
+    added.add_argument("--workdir", type=Path, help="folder of stage results (default: beside the bundle)")
+    added.add_argument("--overrides", type=Path, help="overrides.json: corrections made by a person")
     presets = "settings to start from: default, fast (a first look) or paper (the paper's own choices)"
     added.add_argument("--preset", choices=PRESETS, default="default", help=presets)
     added.add_argument("--config", type=Path, help="JSON file of settings; `r2c2r schema config` describes it")
     add_reading(added)
     for seam in ("segmenter", "generator", "matcher"):
         added.add_argument(f"--{seam}", help="name of a backend; `r2c2r doctor` lists them")
-    added.add_argument("--seed", type=seed, default=0, help="of what generators draw at random (default: %(default)s)")
+    added.add_argument("--seed", type=seed, default=0, help="random seed of generators (default: %(default)s)")
     added.add_argument(
-        "--workers", type=whole(0, 64), default=0, help="objects computed side by side; 0: as cores and memory allow"
+        "--workers", type=whole(0, 64), default=0, help="objects computed in parallel; 0: as many as cores and memory allow"
     )
-    added.add_argument("--masks", type=Path, help="write DIR/<object>/<frame:06d>.png")
+    added.add_argument("--masks", type=Path, metavar="DIR", help="also write masks as DIR/<object>/<frame:06d>.png")
     add_strict(added)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Headless reconstruction: recording and prompts in, certified bundle out."""
+    """Reconstruct a recording with prompts into a certified bundle, without the app."""
     from r2c2r_core.config import read_config
 
     settings = read_config(options.config, options.preset)
@@ -90,7 +90,7 @@ def write_bundle(
     from r2c2r_core.workspace import Workspace
 
     if destination.suffix != ".zip":
-        raise InputError(f"{destination}: not a .zip", hint="name the bundle, such as -o kitchen.zip")
+        raise InputError(f"{destination}: not a .zip", hint="give the bundle a name that ends in .zip, such as -o kitchen.zip")
     request = Request(
         source=capture,
         prompts=read_prompts(prompts),
@@ -116,7 +116,7 @@ def write_bundle(
     if masks:
         _write_masks(outcome.reconstruction, masks)
     if not outcome.computed:
-        print("nothing changed: every stage was reused")
+        print("nothing changed: all stages were reused")
     print(_summary(outcome.reconstruction))
     print(", ".join(f"{stage} {taken:.1f} s" for stage, taken in outcome.seconds.items()))
     for line in outcome.reconstruction.scene.warnings:
@@ -133,8 +133,8 @@ def _warn(capture: Path, doubts: "Doubts") -> None:
     first, *others = doubts.reasons
     if doubts.hopeless:
         raise CaptureError(f"{capture}: {first}", hint="see `r2c2r info`")
-    more = f" (and {len(others)} more: `r2c2r info` names them)" if others else ""
-    print(shown(f"r2c2r: {capture} is unusable: {first}{more}; going on all the same"), file=sys.stderr)
+    more = f" (and {len(others)} more: `r2c2r info` lists them)" if others else ""
+    print(shown(f"r2c2r: {capture} is unusable: {first}{more}; the run continues"), file=sys.stderr)
 
 
 def _given(options: argparse.Namespace, *names: str) -> dict[str, str]:

@@ -14,20 +14,20 @@ def add(parsers: Parsers) -> None:
     added = add_command(parsers, "sample", sample)
     added.add_argument("out", type=Path, help="folder to write: scan.r3d, truth.json, prompts.json")
     added.add_argument(
-        "--seed", type=seed, default=0, help="of the kitchen; equal seeds give equal recordings (default: %(default)s)"
+        "--seed", type=seed, default=0, help="random seed; equal seeds give equal recordings (default: %(default)s)"
     )
-    added.add_argument("--opened", action="store_true", help="fronts are opened and closed while it is filmed")
+    added.add_argument("--opened", action="store_true", help="open and close fronts while filming")
     add_size(added)
     added.formatter_class = argparse.RawDescriptionHelpFormatter
-    added.add_argument("--style", choices=STYLES, metavar="NAME", help="how fronts are made, as listed below")
-    added.add_argument("--palette", choices=PALETTES, metavar="NAME", help="their colours, as listed below")
-    added.add_argument("--layout", choices=LAYOUTS, metavar="NAME", help="where its units stand, as listed below")
+    added.add_argument("--style", choices=STYLES, metavar="NAME", help="style of the fronts, as listed below")
+    added.add_argument("--palette", choices=PALETTES, metavar="NAME", help="colours of the fronts, as listed below")
+    added.add_argument("--layout", choices=LAYOUTS, metavar="NAME", help="arrangement of the units, as listed below")
     added.epilog = "\n\n".join(
         (
             _listed("styles", STYLES),
             _listed("palettes", PALETTES),
             _listed("layouts", LAYOUTS),
-            "With none of them, a seed gives the kitchen it always gave: slabs, or frames round a sunk panel.",
+            "Without these options the seed also chooses the style: slab fronts, or frames round a sunk panel.",
         )
     )
 
@@ -38,12 +38,12 @@ def _listed(title: str, names: Mapping[str, str]) -> str:
 
 def add_size(parser: argparse.ArgumentParser) -> None:
     """Add options for the length and the image size of the recording."""
-    parser.add_argument("--frames", type=whole(1, 10_000), default=180, help="of the recording (default: %(default)s)")
-    parser.add_argument("--size", type=size, default=(960, 720), metavar="WxH", help="of its pictures in px (default: 960x720)")
+    parser.add_argument("--frames", type=whole(1, 10_000), default=180, help="number of frames (default: %(default)s)")
+    parser.add_argument("--size", type=size, default=(960, 720), metavar="WxH", help="image size in px (default: 960x720)")
 
 
 def sample(options: argparse.Namespace) -> int:
-    """Write a synthetic kitchen recording with exact truth."""
+    """Write a recording of a synthetic kitchen with exact ground truth."""
     choice = Choice(style=options.style, palette=options.palette, layout=options.layout)
     write_recording(
         options.out, seed=options.seed, frames=options.frames, size=options.size, opened=options.opened, choice=choice

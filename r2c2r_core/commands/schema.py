@@ -18,7 +18,7 @@ def add(parsers: Parsers) -> None:
 
 
 def schema(options: argparse.Namespace) -> int:
-    """JSON Schema of a file that is written for r2c2r, or by it."""
+    """Print the JSON Schema of a file that r2c2r reads or writes."""
     print(schema_text(options.document), end="")
     return 0
 

@@ -11,18 +11,18 @@ def add(parsers: Parsers) -> None:
     added = add_command(parsers, "serve", serve)
     add_address(added)
     add_data(added)
-    added.add_argument("--jobs", type=whole(0, 64), default=1, help="heavy jobs at a time (default: 1; 0: see r2c2r work)")
+    added.add_argument("--jobs", type=whole(0, 64), default=1, help="heavy jobs at a time; 0: see r2c2r work (default: 1)")
     added.add_argument(
-        "--workers", type=whole(0, 64), default=0, help="objects of a job side by side; 0: as cores and memory allow"
+        "--workers", type=whole(0, 64), default=0, help="parallel objects of a job; 0: as many as cores and memory allow"
     )
-    added.add_argument("--max-upload", type=whole(1, 1024), default=16, metavar="GB", help="default: %(default)s")
-    quota = "what one person may have at a time: jobs, uploads, upload_gb, samples, projects"
+    added.add_argument("--max-upload", type=whole(1, 1024), default=16, metavar="GB", help="per upload (default: %(default)s)")
+    quota = "limit per person; NAME is jobs, uploads, upload_gb, samples or projects"
     added.add_argument("--quota", action="append", default=[], metavar="NAME=N", help=quota)
-    added.add_argument("--adopt", action="store_true", help="make projects of folders that the database does not know")
-    folder = "recordings may be imported by path from this folder too, beside the home folder"
+    added.add_argument("--adopt", action="store_true", help="add projects for folders that are not in the database")
+    folder = "another folder, beside the home folder, from which recordings may be imported by path"
     added.add_argument("--import-from", type=Path, action="append", default=[], metavar="DIR", help=folder)
-    added.add_argument("--name", action="append", default=[], metavar="HOST", help="another name people reach it by")
-    trust = "believe what the proxy at this address says of who asks, and whether by TLS (X-Forwarded-For, X-Forwarded-Proto)"
+    added.add_argument("--name", action="append", default=[], metavar="HOST", help="another host name of this server")
+    trust = "trust X-Forwarded-For and X-Forwarded-Proto (client address, user, TLS) from the proxy at this address or network"
     added.add_argument("--behind-proxy", action="append", default=[], metavar="ADDRESS", help=trust)
 
 
@@ -33,7 +33,7 @@ def add_address(parser: argparse.ArgumentParser) -> None:
 
 
 def serve(options: argparse.Namespace) -> int:
-    """The web app."""
+    """Serve the web app."""
     limits = {"heavy_jobs": options.jobs, "workers": options.workers, "max_upload_bytes": options.max_upload * 2**30}
     limits["quotas"] = web_module("settings").quotas_from(options.quota)
     app = web_module("serve")

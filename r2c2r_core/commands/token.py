@@ -17,15 +17,15 @@ def add(parsers: Parsers) -> None:
         action = actions.add_parser(what)
         add_data(action)
         if what == "add":
-            action.add_argument("name", help="what it is for")
-            action.add_argument("--scope", default="annotator", help=f"{_SCOPES} (default: %(default)s)")
-            action.add_argument("--account", metavar="NAME", help="whom it acts for (default: whoever starts the server)")
+            action.add_argument("name", help="name of the token, such as its purpose")
+            action.add_argument("--scope", default="annotator", help=f"permissions: {_SCOPES} (default: %(default)s)")
+            action.add_argument("--account", metavar="NAME", help="account it acts for (default: whoever starts the server)")
         if what == "revoke":
-            action.add_argument("number", type=whole(0, 2**63 - 1), help="of the token, as `list` shows it")
+            action.add_argument("number", type=whole(0, 2**63 - 1), help="number of the token, as `list` shows it")
 
 
 def token(options: argparse.Namespace) -> int:
-    """Tokens with which programs use a server: add, list, revoke."""
+    """Manage the API tokens of programs: add, list, revoke."""
     users, data = web_module("users"), options.data
     if options.what == "add":
         print(users.add_token(data, options.account, options.name, options.scope))

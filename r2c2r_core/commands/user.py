@@ -19,7 +19,7 @@ def add(parsers: Parsers) -> None:
         action = actions.add_parser(what)
         add_data(action)
         if what != "list":
-            action.add_argument("name", help="of the account")
+            action.add_argument("name", help="name of the account")
         if what == "add":
             action.add_argument("--role", default="annotator", help=f"{_ROLES} (default: %(default)s)")
         if what == "role":
@@ -27,7 +27,7 @@ def add(parsers: Parsers) -> None:
 
 
 def user(options: argparse.Namespace) -> int:
-    """Accounts of the people who may sign in: add, list, role, password, remove."""
+    """Manage the accounts of people who may sign in: add, list, role, password, remove."""
     users, data = web_module("users"), options.data
     if options.what == "list":
         print(table(("name", "role"), users.everyone(data)))
@@ -47,6 +47,6 @@ def _password() -> str:
     if not sys.stdin.isatty():
         return sys.stdin.readline().rstrip("\n")
     password = getpass.getpass("password: ")
-    if getpass.getpass("once more: ") != password:
+    if getpass.getpass("password again: ") != password:
         raise InputError("the two passwords differ", hint="try again")
     return password

@@ -11,15 +11,15 @@ def add(parsers: Parsers) -> None:
     """The command and its options."""
     added = add_command(parsers, "vary", vary)
     added.add_argument("bundle", type=Path, help="bundle, zipped or as a folder")
-    added.add_argument("-n", type=whole(1, 100_000), default=100, metavar="N", help="how many (default: %(default)s)")
+    added.add_argument("-n", type=whole(1, 100_000), default=100, metavar="N", help="number of variants (default: %(default)s)")
     added.add_argument(
-        "--seed", type=seed, default=0, help="of the draws; equal seeds give equal variants (default: %(default)s)"
+        "--seed", type=seed, default=0, help="random seed; equal seeds give equal variants (default: %(default)s)"
     )
-    added.add_argument("-o", type=Path, required=True, metavar="DIR", help="a new folder")
+    added.add_argument("-o", type=Path, required=True, metavar="DIR", help="folder to write; it must not exist")
 
 
 def vary(options: argparse.Namespace) -> int:
-    """Certified variants of a bundle for training: sizes, masses, frictions, surfaces, things moved, doors ajar."""
+    """Make certified variants of a bundle for training: other sizes, masses, frictions, surfaces, positions, doors ajar."""
     from r2c2r_core.variants.stage import make_variants
 
     with show_progress() as progress:
@@ -27,6 +27,6 @@ def vary(options: argparse.Namespace) -> int:
     rejected = ", ".join(f"{count} ({why})" for why, count in made.rejected.items())
     failed = [name for name, passed in made.certified.items() if not passed]
     looked_at = len(made.certified)
-    print(f"{len(made.names)} variants in {made.folder}, draws rejected: {rejected or 'none'}")
-    print(f"certificate of {looked_at} at random: {looked_at - len(failed)} passed {' '.join(failed)}".rstrip())
+    print(f"{len(made.names)} variants in {made.folder}, rejected draws: {rejected or 'none'}")
+    print(f"certificates of {looked_at} random variants: {looked_at - len(failed)} passed {' '.join(failed)}".rstrip())
     return 1 if failed else 0

@@ -102,7 +102,7 @@ def test_check_data_finds_what_is_missing_unknown_damaged_and_open(
 ) -> None:
     data, project = kept
     assert main(["check-data", str(data)]) == 0
-    assert "all is well" in capsys.readouterr().out
+    assert "no problems found" in capsys.readouterr().out
     folder = data / "projects" / project
     shutil.copy(folder / "bundles" / "v1.zip", folder / "bundles" / "v7.zip")
     (folder / "bundles" / "v1.zip").write_bytes(b"other")

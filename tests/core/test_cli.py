@@ -159,7 +159,7 @@ def test_an_unusable_recording_is_named_in_one_line_before_computing(
     main(["run", str(_tiny(tmp_path)), "--prompts", str(prompts), "-o", str(tmp_path / "b.zip")])
     lines = [line for line in said_before[0].splitlines() if "unusable" in line]
     assert len(lines) == 1
-    assert "--register-depth (and 1 more: `r2c2r info` names them); going on all the same" in lines[0]
+    assert "--register-depth (and 1 more: `r2c2r info` lists them); the run continues" in lines[0]
 
 
 def test_a_foreign_zip_is_named(tmp_path: Path, prompts: Path) -> None:
@@ -237,7 +237,7 @@ def test_a_fault_of_ours_is_one_line_and_its_traceback_on_demand(
     monkeypatch.setattr("r2c2r_core.export.stage.check_bundle", broken)
     assert main(["check", str(tmp_path)]) == 1
     said = one_line(capsys.readouterr().err)
-    assert "a fault of r2c2r (ZeroDivisionError: two lines); run again with --debug" in said
+    assert "internal error (ZeroDivisionError: two lines); run again with --debug" in said
     assert main(["--debug", "check", str(tmp_path)]) == 1
     assert "Traceback" in capsys.readouterr().err
 
@@ -255,7 +255,7 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[
     os.mkfifo(tmp_path / "pipe")
     for command in ("info", "check", "dataset"):
         assert main([command, str(tmp_path / "pipe"), *(["-o", "x"] if command == "dataset" else [])]) == 2
-        assert "a pipe; give a file or a folder" in one_line(capsys.readouterr().err)
+        assert "a pipe, expected a file or a folder" in one_line(capsys.readouterr().err)
 
 
 def test_sigterm_is_one_line_and_leaves_no_temporary_folder(tmp_path: Path) -> None:
@@ -280,7 +280,7 @@ def test_sigterm_is_one_line_and_leaves_no_temporary_folder(tmp_path: Path) -> N
         process.terminate()
         said = process.stderr.read()
         assert process.wait() == 143
-    assert said == "r2c2r: stopped; finished stages are kept, the same command goes on\n"
+    assert said == "r2c2r: stopped; finished stages are kept, run the same command to continue\n"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -76,4 +76,4 @@ def test_the_command_prints_the_table_and_says_what_is_missing(tmp_path: Path, c
     with pytest.raises(BundleError, match=r"scene_1\.json: no such file"):
         evaluate_arti4d(bundle, sequence)
     assert main(["evaluate", str(bundle), "--benchmark", "nobody", str(sequence)]) != 0
-    assert "known: arti4d" in capsys.readouterr().err
+    assert "choose arti4d" in capsys.readouterr().err

@@ -42,13 +42,13 @@ def test_check_says_where_an_arm_stands_and_what_it_opened(tmp_path: Path, capsy
 def test_films_without_a_gripper_are_wrong_usage(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(folder), "--films", str(tmp_path)]) == 2
     assert capsys.readouterr().err.strip() == (
-        "r2c2r: --films: there is nothing to film without --gripper or --arm; give one of them too"
+        "r2c2r: --films: there is nothing to film without --gripper or --arm; add --gripper or --arm"
     )
 
 
 def test_vary_says_what_it_made(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["vary", str(folder), "-n", "2", "-o", str(tmp_path / "v")]) == 0
-    assert "certificate of 2 at random: 2 passed" in capsys.readouterr().out
+    assert "certificates of 2 random variants: 2 passed" in capsys.readouterr().out
     assert {path.name for path in (tmp_path / "v").iterdir()} == {"base", "textures", "variants", "variants.json", "wall.jpg"}
     assert main(["vary", str(folder), "-n", "2", "-o", str(tmp_path / "v")]) == 2
     assert "is not empty" in capsys.readouterr().err
