@@ -159,7 +159,7 @@ def judged(case: Any, *, debug: bool = False) -> tuple[int, str, str]:
     said = failure or (words[1].strip().splitlines() or words[0].strip().splitlines() or [""])[-1]
     if debug:
         print(*words, sep="\n")
-    if failure or "Traceback" in words[1] or "a fault of r2c2r" in words[1] or "unexpected: " in words[0]:
+    if failure or "Traceback" in words[1] or "internal error (" in words[1] or "unexpected: " in words[0]:
         return code, "traceback", said[-400:]
     if code not in (0, 1, 2) or (case.run == "cli" and code == 2 and not _LINE.match(said)):
         return code, "not one line", said[-400:]

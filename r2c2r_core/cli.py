@@ -22,7 +22,7 @@ from r2c2r_core import __version__
 from r2c2r_core.errors import R2C2RError
 from r2c2r_core.texts import shown
 
-STOPPED = "r2c2r: stopped; finished stages are kept, the same command goes on"
+STOPPED = "r2c2r: stopped; finished stages are kept, run the same command to continue"
 
 
 class Terminated(BaseException):
@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.debug:
             traceback.print_exc()
         print(
-            f"r2c2r: out of memory ({error or 'no more to be had'}); close other programs, or use a shorter recording",
+            f"r2c2r: out of memory ({error or 'none left'}); close other programs, or use a shorter recording",
             file=sys.stderr,
         )
         return 1
@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.debug:
             traceback.print_exc()
         found = shown(" ".join(f"{type(error).__name__}: {error}".split()))[:300]
-        print(f"r2c2r: a fault of r2c2r ({found}); run again with --debug and report what it prints", file=sys.stderr)
+        print(f"r2c2r: internal error ({found}); run again with --debug and report its output", file=sys.stderr)
         return 1
 
 
@@ -148,13 +148,13 @@ def _way_out(number: int | None) -> str:
     if number == errno.ENAMETOOLONG:
         return "use a shorter name"
     if number in (errno.EACCES, errno.EPERM, errno.EROFS):
-        return "choose a file or folder that you may use"
+        return "choose a file or folder that you have access to"
     return "free some space or choose another folder"
 
 
 def build_parser() -> argparse.ArgumentParser:
     """The command-line parser, with all installed commands."""
-    parser = argparse.ArgumentParser(prog="r2c2r", description="One RGB-D scan of a kitchen in, a scene that opens out.")
+    parser = argparse.ArgumentParser(prog="r2c2r", description="From one RGB-D scan of a kitchen to an articulated scene.")
     parser.add_argument("--version", action="version", version=f"r2c2r {__version__}")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     parsers = parser.add_subparsers(required=True, metavar="COMMAND")

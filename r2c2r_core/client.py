@@ -58,9 +58,9 @@ class Server:
     def __init__(self, address: str, token: str) -> None:
         parts = urllib.parse.urlsplit(address)
         if parts.scheme not in ("http", "https") or not parts.hostname:
-            raise InputError(f"{address[:80]!r}: no address of a server", hint="such as https://kitchens.example")
+            raise InputError(f"{address[:80]!r}: not a server's address", hint="use one such as https://kitchens.example")
         if not token.isascii() or not token.isprintable() or not token:
-            raise InputError("the token is none", hint="r2c2r token add NAME prints one, on the server's machine")
+            raise InputError("not a valid token", hint="create one on the server's machine: r2c2r token add NAME")
         self.address = f"{parts.scheme}://{parts.netloc}"
         self._token = token
         self._opener = urllib.request.build_opener(_OwnHostOnly)
@@ -99,7 +99,7 @@ class Server:
         while True:
             jobs = self._json("GET", f"/api/jobs?{asked}")
             if not jobs:
-                raise InputError(f"{project}: no job", hint="r2c2r remote run PROJECT begins one")
+                raise InputError(f"{project}: no job", hint="start one: r2c2r remote run PROJECT")
             job: dict[str, Any] = jobs[0]
             if job["state"] == "done":
                 return job
@@ -217,7 +217,7 @@ def _decoded(content: bytes, path: str) -> Any:
     try:
         return json.loads(content)
     except ValueError as error:
-        raise EnvironmentProblem(f"{path}: the answer is not r2c2r's", hint="is r2c2r at this address?") from error
+        raise EnvironmentProblem(f"{path}: the response is not from r2c2r", hint="is r2c2r at this address?") from error
 
 
 def _all(answer: _Answer) -> bytes:

@@ -22,7 +22,7 @@ def explained_io(path: Path) -> Iterator[None]:
             hint = "free some space and run the same command again: finished stages are kept"
             raise EnvironmentProblem(f"{path}: the disk is full", hint=hint) from error
         where = error.filename or path
-        raise EnvironmentProblem(f"{where}: {error.strerror or error}", hint="choose a folder you may write to") from error
+        raise EnvironmentProblem(f"{where}: {error.strerror or error}", hint="choose a folder that you may write to") from error
 
 
 def resolved(path: Path) -> Path:
@@ -31,7 +31,7 @@ def resolved(path: Path) -> Path:
         found = path.expanduser().resolve()
         os.lstat(found)
     except (RuntimeError, ValueError) as error:
-        raise InputError(f"{str(path)[:_SHOWN]!r}: no path of a file ({error})", hint="check the path") from error
+        raise InputError(f"{str(path)[:_SHOWN]!r}: not a valid path ({error})", hint="check the path") from error
     except OSError as error:
         if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
             raise InputError(f"{str(path)[:_SHOWN]!r}: {error.strerror}", hint="check the path") from error

@@ -140,13 +140,13 @@ def _privacy(data_dir: Path) -> MachineFinding:
     """Finding on access of other users to the data folder."""
     mode = open_to_others(data_dir) if data_dir.exists() else None
     if mode:
-        return MachineFinding("data folder", "problem", f"others may use it ({mode}): chmod go= {data_dir}")
-    return MachineFinding("data folder", "ok", f"{data_dir} is for its owner alone")
+        return MachineFinding("data folder", "problem", f"other users have access ({mode}): chmod go= {data_dir}")
+    return MachineFinding("data folder", "ok", f"only its owner has access to {data_dir}")
 
 
 def _decoders() -> MachineFinding:
     """Finding on network isolation of the decoders of uploads."""
     if network_can_be_left():
-        return MachineFinding("decoders", "ok", "uploads are decoded without network")
-    detail = "uploads are decoded with the network in reach: this system lets no process leave it (unshare, Linux only)"
+        return MachineFinding("decoders", "ok", "uploads are decoded without network access")
+    detail = "uploads are decoded with network access: no process can be isolated on this system (unshare, Linux only)"
     return MachineFinding("decoders", "absent", detail)

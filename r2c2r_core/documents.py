@@ -37,13 +37,13 @@ def read_bounded(path: Path, failure: type[InputError] = InputError, *, hint: st
     except OSError as error:
         raise failure(f"{path}: cannot be read ({error.strerror})", hint=hint) from error
     except ValueError as error:  # a NUL in its name
-        raise failure(f"{str(path)!r}: no path of a file ({error})", hint=hint) from error
+        raise failure(f"{str(path)!r}: not a valid path ({error})", hint=hint) from error
     try:
         found = os.fstat(descriptor)
         if not stat.S_ISREG(found.st_mode):
-            raise failure(f"{path}: {kind_of_file(found.st_mode)}, a file expected", hint=hint)
+            raise failure(f"{path}: {kind_of_file(found.st_mode)}, expected a file", hint=hint)
         if found.st_size > MOST_BYTES:
-            raise failure(f"{path}: {found.st_size >> 20} MiB, at most {MOST_BYTES >> 20} MiB expected", hint=hint)
+            raise failure(f"{path}: {found.st_size >> 20} MiB, expected at most {MOST_BYTES >> 20} MiB", hint=hint)
         with os.fdopen(os.dup(descriptor), "rb") as stream:
             return stream.read(MOST_BYTES + 1)
     except OSError as error:
@@ -79,7 +79,7 @@ def parse_json(
     except UnicodeDecodeError as error:
         raise refuse(f"byte {error.start} is not UTF-8") from error
     except UnicodeEncodeError as error:
-        raise refuse("half of a surrogate pair, which is no character") from error
+        raise refuse("half of a surrogate pair, which is not a character") from error
     except json.JSONDecodeError as error:
         raise refuse(f"line {error.lineno}, column {error.colno}: {error.msg}") from error
     except _Refused as error:
@@ -120,12 +120,12 @@ def _whole(text: str) -> int:
 def _finite(text: str) -> float:
     number = float(text)
     if len(text) > _LONGEST_NUMBER or not math.isfinite(number):
-        raise _Refused(f"the number {text[:12]}{'…' if len(text) > 12 else ''}, beyond what a computer counts with")
+        raise _Refused(f"the number {text[:12]}{'…' if len(text) > 12 else ''}, too long or too large")
     return number
 
 
 def _no_constant(text: str) -> float:
-    raise _Refused(f"{text}, a number expected")
+    raise _Refused(f"{text}, expected a number")
 
 
 def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -133,7 +133,7 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) < len(pairs):
         seen: set[str] = set()
         twice = next(key for key, _ in pairs if key in seen or seen.add(key))  # type: ignore[func-returns-value]
-        raise _Refused(f"the key '{twice[:40]}' stands twice in one object")
+        raise _Refused(f"the key '{twice[:40]}' appears twice in one object")
     return found
 
 

@@ -50,7 +50,7 @@ def failure_line(stage: str, name: str, error: Exception) -> str:
     """The failure as one line for the user."""
     if isinstance(error, R2C2RError):
         return f"{stage}: {error}"
-    return f"{stage}: {name}: {_in_words(error)}; see the log, or leave it out"
+    return f"{stage}: {name}: {_in_words(error)}; see the log, or remove the object"
 
 
 def _in_words(error: Exception) -> str:

@@ -276,8 +276,8 @@ def _stored(place: _Place) -> Any:
     found = Workspace(place.root).find(place.stage, place.name, place.key)
     if found is None:
         raise EnvironmentProblem(
-            f"{place.root}: what {place.stage} made of {place.name} is gone",
-            hint="leave the folder alone while a run is at work",
+            f"{place.root}: the result of {place.stage} for {place.name} is missing",
+            hint="do not change the folder during a run",
         )
     return found[0]
 

@@ -43,8 +43,8 @@ def free_memory(share: float) -> int:
 def memory_met() -> EnvironmentProblem:
     """The error of a worker that reached its memory limit."""
     most = resource.getrlimit(resource.RLIMIT_DATA)[0]
-    amount = "than there is" if most == resource.RLIM_INFINITY else f"than the {most / 1e9:.1f} GB that it may use"
-    hint = f"correct what is oversized, keep fewer frames (ingest.most_frames), or allow more with {MEMORY_VARIABLE}"
+    amount = "than is available" if most == resource.RLIM_INFINITY else f"than its limit of {most / 1e9:.1f} GB"
+    hint = f"correct oversized inputs, keep fewer frames (ingest.most_frames), or raise the limit with {MEMORY_VARIABLE}"
     return EnvironmentProblem(f"it needs more memory {amount}", hint=hint)
 
 

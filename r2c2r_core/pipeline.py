@@ -112,9 +112,9 @@ def reconstruct(
 
 def _require_objects(request: Request, stage: Stage, names: Collection[str]) -> None:
     if stage not in OBJECT_STAGES:
-        raise InputError(f"{stage}: it does not go object by object", hint=f"one of {', '.join(OBJECT_STAGES)}")
+        raise InputError(f"{stage}: it is not computed per object", hint=f"choose one of {', '.join(OBJECT_STAGES)}")
     if unknown := sorted(set(names) - {prompt.name for prompt in request.prompts.objects}):
-        raise InputError(f"{unknown[0]}: no such object in the prompts", hint="name objects as the prompts do")
+        raise InputError(f"{unknown[0]}: no such object in the prompts", hint="use names from the prompts")
 
 
 def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:

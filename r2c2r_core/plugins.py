@@ -85,7 +85,7 @@ def _load(group: Group, entry: EntryPoint) -> Plugin:
 def _of_kind(plugin: Plugin, kind: type) -> Plugin:
     if plugin.fault or isinstance(plugin.value, kind):
         return plugin
-    return replace(plugin, fault=f"a {type(plugin.value).__name__} is found, a {kind.__name__} is expected", value=None)
+    return replace(plugin, fault=f"found a {type(plugin.value).__name__}, expected a {kind.__name__}", value=None)
 
 
 def _package(entry: EntryPoint) -> str:

@@ -129,7 +129,7 @@ class _Worker:
             self.channel.close()
             code = self._process.wait()
             ended = f"its process ended ({signal.Signals(-code).name if code < 0 else code})"
-            return "lost", WorkerLost(f"{ended}, which too little memory may do; try --workers 1"), ""
+            return "lost", WorkerLost(f"{ended}, perhaps for lack of memory; try --workers 1"), ""
         return answer
 
     def end(self) -> None:

@@ -86,7 +86,7 @@ class Registry(Generic[T]):
             return False, f"{error.message.partition(': ')[2]}: {error.hint}"
         server = self.get(name).server
         if server and not os.environ.get(server):
-            return False, f"no server named: set {server}"
+            return False, f"no server configured: set {server}"
         return True, "ready"
 
     def require(self, name: str, weights: str = "") -> Path | None:
@@ -135,10 +135,10 @@ class Registry(Generic[T]):
         asked = sorted(getattr(self.protocol, "__abstractmethods__", ()))
         lacking = [method for method in asked if not _is_written(getattr(found, method, None))]
         if found is None or lacking:
-            fault = "there is none" if found is None else f"it has no {' and no '.join(lacking)}"
+            fault = "not found" if found is None else f"it has no {' and no '.join(lacking)}"
             raise BackendUnavailable(
                 f"{self.seam} '{name}' is not available: {target}: {fault}",
-                hint=f"a class with the methods of {self.protocol.__module__}.{self.protocol.__name__} is expected",
+                hint=f"expected a class with the methods of {self.protocol.__module__}.{self.protocol.__name__}",
             )
         return cast(Callable[..., T], found)
 
@@ -172,8 +172,8 @@ def _is_model(folder: Path, holds: tuple[str, ...]) -> bool:
 
 
 def _how_to_get(weights: Weights, named: str, setting: str) -> str:
-    where = f"name a folder or hub id in {weights.variable} or {setting}"
+    where = f"set {weights.variable} or {setting} to a folder or hub id"
     if Path(named).expanduser().is_absolute() or named.startswith("."):
-        return f"a folder with {' and '.join(weights.holds)} is expected; {where}"
+        return f"expected a folder with {' and '.join(weights.holds)}; {where}"
     first = f"accept the licence at https://huggingface.co/{named} and log in (hf auth login), " if weights.gated else ""
     return f"{first}hf download {named}; or {where}"

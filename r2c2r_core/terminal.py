@@ -91,7 +91,7 @@ def _grips(title: str, grips: Sequence[Grip]) -> list[str]:
         for grip in grips
     ]
     return [
-        table((title, "how", "done", "grip N", "open %", "slip mm", "force N"), rows) if rows else "nothing to hold",
+        table((title, "how", "done", "grip N", "open %", "slip mm", "force N"), rows) if rows else "nothing to grasp",
         "",
         *(f"{grip.name}: {grip.why} (the {grip.blame})" for grip in grips if grip.why),
     ]

@@ -20,10 +20,10 @@ DEVICE = re.compile("(?i:con|prn|aux|nul|com[0-9]|lpt[0-9])")
 def name_fault(text: str) -> str:
     """Reason why an object's name is invalid in some format or file system, as a phrase after "it"; empty if it is valid."""
     if DEVICE.fullmatch(text):
-        return "is a device of Windows, which unpacks no folder of that name"
+        return "is a device name on Windows, which cannot unpack a folder of that name"
     if text[:1].isdecimal():
         return "begins with a digit: USD and Isaac's importers refuse it"
-    return "" if IDENTIFIER.fullmatch(text) else "holds more than letters, digits and underscores: simulators accept no more"
+    return "" if IDENTIFIER.fullmatch(text) else "contains characters that simulators refuse: use letters, digits and _"
 
 
 def identifier(text: str) -> str:

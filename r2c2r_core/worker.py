@@ -36,9 +36,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="r2c2r_core.worker", description=__doc__)
     parser.add_argument("workdir", type=Path)
     parser.add_argument("--until", choices=STAGES, default="export")
-    parser.add_argument("--request", type=Path, help="what to compute; WORKDIR/request.json unless given")
-    parser.add_argument("--workers", type=int, default=0, help="processes side by side; 0: as cores and memory allow")
-    parser.add_argument("--only", nargs="*", metavar="NAME", help="objects of the stage, computed beside others elsewhere")
+    parser.add_argument("--request", type=Path, help="file of the request (default: WORKDIR/request.json)")
+    parser.add_argument("--workers", type=int, default=0, help="parallel processes; 0: as many as cores and memory allow")
+    parser.add_argument("--only", nargs="*", metavar="NAME", help="compute only these objects of the stage")
     options = parser.parse_args(arguments)
     stopped: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))

@@ -156,7 +156,7 @@ class Workspace:
                     fcntl.lockf(shares, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _byte_of(part))
             except OSError as error:
                 raise EnvironmentProblem(
-                    f"{self.root}: another run is at work here", hint="wait for it, or choose another --workdir"
+                    f"{self.root}: another run is using this folder", hint="wait for it, or choose another --workdir"
                 ) from error
             yield
 

@@ -219,7 +219,7 @@ def test_a_backend_that_lacks_a_method_is_refused_with_a_line_that_says_which(
     with pytest.raises(BackendUnavailable) as caught:
         table.load("oracle")
     said = f"{table.seam} 'oracle' is not available: delphi:Oracle: it has no {method}"
-    assert str(caught.value) == f"{said}; a class with the methods of {protocol} is expected"
+    assert str(caught.value) == f"{said}; expected a class with the methods of {protocol}"
 
 
 def test_a_backend_whose_class_is_gone_or_unfinished_is_refused(install: Install) -> None:
@@ -232,7 +232,7 @@ def test_a_backend_whose_class_is_gone_or_unfinished_is_refused(install: Install
     install("dodona", "r2c2r.generators", "oracle = dodona:LINE", BACKEND.replace("class Oracle", "class Oak"))
     (Path(sys.modules["delphi"].__file__ or "")).write_text("")
     del sys.modules["delphi"]
-    with pytest.raises(BackendUnavailable, match="delphi:Oracle: there is none; "):
+    with pytest.raises(BackendUnavailable, match="delphi:Oracle: not found; "):
         GENERATORS.load("oracle")
 
 
@@ -265,7 +265,7 @@ def test_an_output_format_of_another_package_is_written_checked_and_described(in
     [
         ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
         ("1 / 0", "ZeroDivisionError: division by zero"),
-        ("READER = 'a reader'", "a str is found, a Reader is expected"),
+        ("READER = 'a reader'", "found a str, expected a Reader"),
         ("OTHER = 1", "AttributeError"),
     ],
 )

@@ -222,11 +222,11 @@ def test_another_thing_at_the_address_is_said(stub: tuple[Server, type[Stub]]) -
     handler.answers = [says(404, b"<html>nginx"), says(200, b"<html>hello")]
     with pytest.raises(Refused, match="404"):
         server.projects()
-    with pytest.raises(EnvironmentProblem, match="not r2c2r's"):
+    with pytest.raises(EnvironmentProblem, match="not from r2c2r"):
         server.projects()
 
 
 @pytest.mark.parametrize("address", ["kitchens.example", "ftp://kitchens.example", "http://", "file:///etc/passwd"])
 def test_what_is_no_address_is_refused(address: str) -> None:
-    with pytest.raises(InputError, match="no address of a server"):
+    with pytest.raises(InputError, match="not a server's address"):
         Server(address, "r2c2r_x")

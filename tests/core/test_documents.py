@@ -26,7 +26,7 @@ def parse(content: bytes, *, lenient: bool = False) -> object:
         (b"[0." + b"1" * 5000 + b"]", "the number 0.1"),
         (b"[NaN]", "NaN"),
         (b"[-Infinity]", "-Infinity"),
-        (b'{"a": 1, "b": 2, "a": 3}', "the key 'a' stands twice"),
+        (b'{"a": 1, "b": 2, "a": 3}', "the key 'a' appears twice"),
         (rb'["\ud800"]', "surrogate"),
         (b'["\xff"]', "byte 2 is not UTF-8"),
         (b"", "line 1, column 1"),
@@ -68,7 +68,7 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     done = threading.Event()
 
     def read() -> None:
-        with pytest.raises(InputError, match="a pipe, a file expected"):
+        with pytest.raises(InputError, match="a pipe, expected a file"):
             read_json(pipe, hint=HINT)
         done.set()
 
@@ -76,14 +76,14 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     assert done.wait(PATIENCE_S)
 
 
-@pytest.mark.parametrize(("name", "says"), [(".", "a folder, a file expected"), ("a", "no such file"), ("n" * 300, "too long")])
+@pytest.mark.parametrize(("name", "says"), [(".", "a folder, expected a file"), ("a", "no such file"), ("n" * 300, "too long")])
 def test_what_is_no_file_is_said(tmp_path: Path, name: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         read_json(tmp_path / name, hint=HINT)
 
 
 def test_devices_are_refused() -> None:
-    with pytest.raises(InputError, match="a device, a file expected"):
+    with pytest.raises(InputError, match="a device, expected a file"):
         read_json(Path("/dev/zero"), hint=HINT)
 
 

@@ -169,7 +169,7 @@ def at_once(root: Path, *wanted: str) -> list[bool]:
     command = [sys.executable, "-c", HOLDS, str(root), *wanted]
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
     assert len(told) == len(wanted)
-    assert all(line == "held" or "another run is at work" in line for line in told)
+    assert all(line == "held" or "another run is using this folder" in line for line in told)
     return [line == "held" for line in told]
 
 

@@ -36,7 +36,7 @@ def test_memory_beyond_the_limit_is_one_line_with_the_next_step(monkeypatch: pyt
     monkeypatch.setenv("R2C2R_WORKER_HOURS", "1.5")
     done = subprocess.run([sys.executable, "-c", LIMITED], capture_output=True, text=True, check=True)
     said, cpu_s = json.loads(done.stdout)
-    assert said.startswith("it needs more memory than the 2.0 GB that it may use; ")
+    assert said.startswith("it needs more memory than its limit of 2.0 GB; ")
     assert "R2C2R_WORKER_MEMORY_GB" in said
     assert cpu_s == 5400
 

@@ -249,7 +249,7 @@ def test_objects_that_several_runs_computed_are_stored_as_one_run_stores_them(tw
 
 
 @pytest.mark.parametrize(
-    ("until", "only", "said"), [("warp", [], "object by object"), ("align", ["door_9"], "door_9: no such object")]
+    ("until", "only", "said"), [("warp", [], "not computed per object"), ("align", ["door_9"], "door_9: no such object")]
 )
 def test_a_run_of_some_objects_that_is_none_is_one_line(until, only, said, tmp_path):
     with pytest.raises(InputError, match=said):

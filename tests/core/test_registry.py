@@ -58,8 +58,8 @@ def test_missing_weights_name_the_command_that_brings_them() -> None:
     ready, reason = TABLE.available("dreamer")
     assert not ready
     assert reason == (
-        "no weights at someone/dreams: hf download someone/dreams; or name a folder or hub id in TEST_DREAMS_WEIGHTS "
-        "or segment.weights"
+        "no weights at someone/dreams: hf download someone/dreams; or set TEST_DREAMS_WEIGHTS or "
+        "segment.weights to a folder or hub id"
     )
     assert "accept the licence at https://huggingface.co/someone/gated" in TABLE.available("gated")[1]
 
@@ -97,7 +97,7 @@ def test_half_a_download_is_no_model(tmp_path: Path, empty_hub: Path) -> None:
     assert find_weights(str(folder)) is None
     ready, reason = TABLE.available("dreamer", str(folder))
     assert not ready
-    assert "a folder with config.json and *.safetensors is expected" in reason
+    assert "expected a folder with config.json and *.safetensors" in reason
 
 
 def test_unknown_names_list_the_choices() -> None:

@@ -177,7 +177,7 @@ def test_an_address_without_a_protocol_is_refused_before_any_work(url):
 
 def test_without_a_server_it_is_not_offered_as_ready(monkeypatch):
     monkeypatch.delenv("R2C2R_GENERATOR_URL", raising=False)
-    assert GENERATORS.available("remote") == (False, "no server named: set R2C2R_GENERATOR_URL")
+    assert GENERATORS.available("remote") == (False, "no server configured: set R2C2R_GENERATOR_URL")
     monkeypatch.setenv("R2C2R_GENERATOR_URL", "http://gpu:9000/v1/mesh")
     assert GENERATORS.available("remote") == (True, "ready")
     assert GenerateConfig().url == "http://gpu:9000/v1/mesh"

@@ -140,7 +140,9 @@ def test_a_name_that_begins_with_a_digit_is_refused_with_one_that_would_do(boxes
     assert "item_2_door_cabinet_1" in caught.value.hint
 
 
-@pytest.mark.parametrize(("names", "words"), [(("Con",), "device of Windows"), (("door_1", "Door_1"), "two objects named")])
+@pytest.mark.parametrize(
+    ("names", "words"), [(("Con",), "device name on Windows"), (("door_1", "Door_1"), "two objects named")]
+)
 def test_names_that_a_file_system_takes_for_another_are_refused(
     boxes: tuple[Capture, Truth], names: tuple[str, ...], words: str
 ) -> None:
