@@ -51,7 +51,7 @@ def read_axes(sequence: Path, world_from_capture: Rigid3) -> tuple[JointRecord, 
         return tuple(_axis(name, entry, world_from_capture) for name, entry in document.items())
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise BundleError(
-            f"{path}: an object lacks or misstates {error}", hint="expected {object: {position, axis}}"
+            f"{path}: an object is incomplete or invalid ({error})", hint="expected {object: {position, axis}}"
         ) from error
 
 
@@ -98,7 +98,7 @@ def _row(true: JointRecord, found: _Found | None) -> ObjectRow:
     pivot = 1000 * line_distance(true.origin, true.axis, joint.origin, joint.axis) if hinged else None
     theirs = line_point(true.origin, true.axis, joint.origin) if hinged else None
     measured = float(joint.motion is not None)
-    note = "" if hinged else "only of hinges"
+    note = "" if hinged else "hinges only"
     metrics = (
         Metric(name="axis", value=axis_deg(true, joint), unit="deg", better="lower", tolerance=0.3),
         Metric(name="pivot", value=pivot, unit="mm", better="lower", tolerance=3.0, note=note),

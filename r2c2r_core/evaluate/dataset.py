@@ -60,13 +60,13 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     except (KeyError, TypeError, AttributeError) as error:
         raise BundleError(f"{path}: not a dataset's manifest ({error})", hint="write it with r2c2r dataset") from error
     if version != _VERSION:
-        raise BundleError(f"{path}: version {version}, {_VERSION} expected", hint="write it again with r2c2r dataset")
+        raise BundleError(f"{path}: version {version}, expected {_VERSION}", hint="write it again with r2c2r dataset")
     for name, sha256 in files.items():
         member = folder / name
         if not is_below(member, folder):
             raise BundleError(f"{path}: '{name}' lies outside the dataset")
         if not member.is_file():
-            raise BundleError(f"{member}: missing, though the manifest names it", hint="copy the dataset again")
+            raise BundleError(f"{member}: missing, but listed in the manifest", hint="copy the dataset again")
         with member.open("rb") as handle:
             if hashlib.file_digest(handle, "sha256").hexdigest() != sha256:
                 raise BundleError(f"{member}: its checksum differs from the manifest's", hint="copy the dataset again")

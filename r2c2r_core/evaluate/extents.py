@@ -19,8 +19,8 @@ def extent_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...
     return (
         *single,
         _percent("extents", float(errors.mean())),  # eq. 20
-        _percent("extents_observed", _mean(errors[observed]), "no axis was seen from end to end"),
-        _percent("extents_unobserved", _mean(errors[~observed]), "every axis was seen"),
+        _percent("extents_observed", _mean(errors[observed]), "no axis was observed in full"),
+        _percent("extents_unobserved", _mean(errors[~observed]), "every axis was observed"),
     )
 
 

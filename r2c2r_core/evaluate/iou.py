@@ -72,7 +72,7 @@ def read_mask(file: Path, *, like: Mask | None = None) -> Mask:
     if width * height > _MOST_PIXELS or (like is not None and (height, width) != like.shape):
         expected = f"at most {_MOST_PIXELS} pixels" if like is None else f"{like.shape[1]}x{like.shape[0]}, as the truth has"
         raise BundleError(
-            f"{file}: {width}x{height} pixels, {expected}, expected",
+            f"{file}: {width}x{height} pixels, expected {expected}",
             hint="masks are compared at the resolution of the colour frames",
         )
     image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE)

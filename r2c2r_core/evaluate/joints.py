@@ -10,7 +10,7 @@ from r2c2r_core.model.report import Metric
 def joint_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:
     """The means over the object's joints; a missing or surplus joint counts as a wrong type."""
     if not truth.joints and not found.joints:
-        return _metrics([1.0], [], [], [], [], [], [], note="no joint, and none found")
+        return _metrics([1.0], [], [], [], [], [], [], note="no joint in truth or result")
     pairs = pair_joints(truth.joints, found.joints)
     surplus = max(len(found.joints) - len(truth.joints), 0)
     types = [float(b is not None and a.type == b.type) for a, b in pairs] + [0.0] * surplus

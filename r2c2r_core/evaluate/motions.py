@@ -39,7 +39,7 @@ def motion_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...
     scores = joint_scores(truth, found)
     false = false_motions(truth, found)
     shown, shown_open = sum(s.shown for s in scores), sum(s.open_shown for s in scores)
-    note = f"{shown} frames show it, {shown_open} of them open" if scores else "nothing was opened"
+    note = f"{shown} frames show it, {shown_open} of them open" if scores else "no front was opened"
     stops = [float(s.stop_right) for s in scores if s.stop_right is not None]
     depths = [abs(s.inner_depth_mm) for s in scores if s.inner_depth_mm is not None]
     limits = [float(s.limit_right) for s in scores]

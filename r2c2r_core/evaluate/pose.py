@@ -5,7 +5,7 @@ import numpy as np
 from r2c2r_core.evaluate.records import ObjectRecord
 from r2c2r_core.model.report import Metric
 
-_ROUND = "round about its vertical axis"
+_ROUND = "rotationally symmetric about its vertical axis"
 
 
 def pose_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...]:

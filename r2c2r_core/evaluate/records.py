@@ -81,7 +81,7 @@ def read_bundle(path: Path) -> BundleRecord:
         objects = tuple(_object(entry, Rigid3()) for entry in document["objects"])
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise BundleError(
-            f"{path}: manifest.json lacks or misstates {error}", hint="write the bundle again with r2c2r run"
+            f"{path}: manifest.json is incomplete or invalid ({error})", hint="write the bundle again with r2c2r run"
         ) from error
     return BundleRecord(objects=objects, world_from_capture=world_from_capture)
 
@@ -92,7 +92,7 @@ def read_truth(path: Path, world_from_capture: Rigid3) -> tuple[ObjectRecord, ..
     try:
         return tuple(_object(entry, world_from_capture) for entry in document["objects"])
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
-        raise BundleError(f"{path}: an object lacks or misstates {error}", hint=_TRUTH) from error
+        raise BundleError(f"{path}: an object is incomplete or invalid ({error})", hint=_TRUTH) from error
 
 
 def _manifest_bytes(path: Path) -> bytes:
@@ -105,7 +105,7 @@ def _manifest_bytes(path: Path) -> bytes:
                 raise BundleError(f"{path}: no manifest.json inside", hint="give a bundle written by r2c2r run")
             if bundle.getinfo(names[0]).file_size > MOST_BYTES:
                 raise BundleError(
-                    f"{path}: manifest.json of more than {MOST_BYTES >> 20} MiB", hint="write it again with r2c2r run"
+                    f"{path}: manifest.json is larger than {MOST_BYTES >> 20} MiB", hint="write it again with r2c2r run"
                 )
             return bundle.read(names[0])
     except (zipfile.BadZipFile, zipfile.LargeZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:

@@ -33,7 +33,7 @@ def _scan_metric(found: ObjectRecord, name: str, key: str, unit: str, better: Li
         unit=unit,
         better=better,
         tolerance=1.0 if unit == "mm" else 0.03,
-        note="" if value is not None else "the bundle does not say",
+        note="" if value is not None else "not reported by the bundle",
     )
 
 

@@ -68,7 +68,7 @@ class Evaluation:
         if missing:
             lines.append(f"not in the bundle: {', '.join(missing)}")
         if self.surplus:
-            lines.append(f"in the bundle, without truth: {', '.join(self.surplus)}")
+            lines.append(f"in the bundle, without ground truth: {', '.join(self.surplus)}")
         return "\n".join(lines)
 
 

@@ -16,7 +16,7 @@ def least_change(equal: np.ndarray, equal_to: np.ndarray, at_least: np.ndarray, 
     lengths = np.linalg.norm(rows, axis=1)
     used = lengths > 1e-12
     if (needed[~used] > 1e-9).any():
-        raise ValueError("a bound that nothing can meet")
+        raise ValueError("a bound that no solution can satisfy")
     rows, needed = rows[used] / lengths[used, None], needed[used] / lengths[used]  # distances of planes
     if not (needed > 0).any():
         return shortest

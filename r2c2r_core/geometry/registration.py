@@ -27,7 +27,7 @@ def umeyama(source: Points, target: Points, *, scale: float | None = None) -> Si
     scale. Raises DegenerateFitError when the points do not determine a rotation.
     """
     if len(source) < 3:
-        raise DegenerateFitError(f"{len(source)} correspondences, 3 needed")
+        raise DegenerateFitError(f"{len(source)} correspondences, expected at least 3")
     source_mean, target_mean = source.mean(axis=0), target.mean(axis=0)
     p, q = source - source_mean, target - target_mean
     spread = float((p**2).sum(axis=1).mean())

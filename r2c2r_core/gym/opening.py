@@ -42,14 +42,14 @@ class OpenEnv(RobotEnv):
         """Reset to a scene with this joint and those in its way closed; all others as in the scene."""
         rig = self.begin(seed, options)
         if self.joint not in joints_of(rig.model):
-            raise BundleError(f"joint {self.joint}: there is none", hint=f"there are {', '.join(joints_of(rig.model))}")
+            raise BundleError(f"joint {self.joint}: no such joint", hint=f"choose one of: {', '.join(joints_of(rig.model))}")
         travel = travel_of(rig, self.joint)
         rig.data.qpos[rig.model.joint(self.joint).qposadr[0]] = 0.0
         if travel is not None:
             close_in_the_way(rig, travel)
         way = None if travel is None else best_way(rig, travel)
         if travel is None or way is None:
-            raise BundleError(f"joint {self.joint}: nothing of it can be held or pushed", hint="r2c2r check --gripper says why")
+            raise BundleError(f"joint {self.joint}: it cannot be grasped or pushed", hint="r2c2r check --gripper says why")
         self.travel: Travel = travel
         self.way: Way = replace(way, presses=None)
         rig.data.qpos[travel.address] = way.opens.starts

@@ -45,7 +45,7 @@ class PickPlaceEnv(RobotEnv):
         things = {body_words(rig.model, body): body for body in things_of(rig.model)}
         body = next((b for name, b in things.items() if name == self.thing or name.startswith(f"{self.thing}_")), None)
         if body is None:
-            raise BundleError(f"thing {self.thing}: there is none", hint=f"there are {', '.join(things) or 'no free things'}")
+            raise BundleError(f"thing {self.thing}: no such object", hint=f"free objects: {', '.join(things) or 'none'}")
         pick = plan_pick(rig, body)
         if isinstance(pick, str):
             raise BundleError(f"thing {self.thing}: {pick}", hint="take another thing or variant")

@@ -55,7 +55,7 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         wanted = (options or {}).get("variant")
         number = int(self.np_random.integers(len(self.scenes)))
         if wanted is not None and wanted not in (scene.stem for scene in self.scenes):
-            raise BundleError(f"variant {wanted}: there is none", hint=f"there are {len(self.scenes)} scenes")
+            raise BundleError(f"variant {wanted}: no such variant", hint=f"there are {len(self.scenes)} scenes")
         scene = next(s for s in self.scenes if s.stem == wanted) if wanted is not None else self.scenes[number]
         if scene not in self._rigs:
             self._rigs = {scene: gripper_in(scene, None if self._drawn else without_visuals)}  # one at a time: they are large
@@ -148,7 +148,7 @@ def scenes_of(folder: Path) -> tuple[Path, ...]:
     if (folder / "scene.xml").is_file():
         return (folder / "scene.xml",)
     raise BundleError(
-        f"{folder}: neither scene.xml nor variants/ in it", hint="give an unpacked bundle, or what r2c2r vary wrote"
+        f"{folder}: neither scene.xml nor variants/ found", hint="give an unpacked bundle, or a folder written by r2c2r vary"
     )
 
 

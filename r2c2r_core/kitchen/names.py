@@ -95,7 +95,7 @@ def _named(text: str, lines: tuple[Category, ...]) -> Named:
     spoken = [name.replace("_", " ") for category in lines for name in category.names]
     close = difflib.get_close_matches(" ".join(words), spoken, n=_SUGGESTED, cutoff=_ALIKE)
     advice = f"; did you mean {' or '.join(close)}?" if close else ""
-    notice = f"{text!r} is not a known category: it is built as one rigid, free-standing object{advice}"
+    notice = f"{text!r} is not a known category: it is built as a rigid, free-standing object{advice}"
     return Named(table.whole["object"], notice)
 
 

@@ -53,7 +53,7 @@ def certify_with_arm(
     floor = free_floor(arm.model, arm.data, arm.own, handles)
     ways: dict[str, Way] = {}
     reached: dict[str, dict[Stand, Reach]] = {joint: {} for joint in joints}
-    for joint in progress.part(0.0, 0.5).each(list(travels), "where to stand"):
+    for joint in progress.part(0.0, 0.5).each(list(travels), "searching base positions"):
         if (found := _reached(arm, gripper, travels[joint], floor)) is not None:
             ways[joint], reached[joint] = found
     places = {stand: tuple(served) for stand, served in fewest_places(reached).items()}
@@ -113,5 +113,5 @@ def _from(
 
 
 def _out_of_reach(joint: str, board: bool) -> Grip:
-    why = "from no place on the floor does the arm come to every pose of its way" if board else "nothing to hold"
+    why = "no place on the floor lets the arm reach the whole motion" if board else "nothing to grasp"
     return Grip(kind="joint", name=joint, method=None, passed=False, why=why, blame="arm" if board else "scan")

@@ -9,14 +9,14 @@ NO_ARM = "none"
 ARMS: Registry[Any] = Registry(
     seam="arm",
     own=(
-        Backend(name=NO_ARM, target="", licence="", summary="no arm tries the joints"),
+        Backend(name=NO_ARM, target="", licence="", summary="no arm trials"),
         Backend(
             name="panda",
             target="r2c2r_core.robot.panda:panda_spec",
             extra="arm",
             needs=("pybullet_data",),
             licence="Apache-2.0 (its description, which pybullet's wheel ships)",
-            summary="a Franka Panda opens what it reaches; the floor plan shows where it stands (half a minute)",
+            summary="a Franka Panda opens every joint within reach; a floor plan shows its base positions (half a minute)",
         ),
     ),
 )

@@ -182,7 +182,7 @@ def _thing(rig: Rig, body: int, surfaces: Surfaces | None) -> tuple[Grip, Film |
         if put.done:
             break
     assert put is not None
-    verdict = None if put.done else Verdict(f"dropped or tipped: it ended {1000 * put.off_m:.0f} mm off its place", "gripper")
+    verdict = None if put.done else Verdict(f"dropped or tipped: it ended {1000 * put.off_m:.0f} mm from its goal", "gripper")
     grip = Grip(
         kind="thing",
         name=name,

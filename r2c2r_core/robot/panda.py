@@ -68,7 +68,7 @@ def panda_spec() -> Any:
 def _folder() -> Path:
     found = importlib.util.find_spec("pybullet_data")
     if found is None or found.origin is None:
-        raise BackendUnavailable("the arm: no package here has its description", hint="pip install 'r2c2r[arm]'")
+        raise BackendUnavailable("the arm: its description is not installed", hint="pip install 'r2c2r[arm]'")
     return Path(found.origin).parent / "franka_panda"
 
 

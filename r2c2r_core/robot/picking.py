@@ -58,16 +58,14 @@ def plan_pick(rig: Rig, body: int) -> Pick | str:
     """The first collision-free grasp and placement, or the reason why there is none."""
     shifts = list(_free_places(rig, body))
     if not shifts:
-        return "no free place 10 cm further on what it stands on"
+        return "no free place 10 cm further on its support"
     narrow = False
     for pick in _grasps(rig, body, shifts[0]):
         narrow = True
         for shift in shifts:
             if not _in_the_way(rig, placed := replace(pick, shift=shift)):
                 return placed
-    return (
-        "blocked: no way for the gripper to it" if narrow else f"wider than {1000 * (STROKE_M - 2 * MARGIN_M):.0f} mm all round"
-    )
+    return "blocked: no collision-free way" if narrow else f"wider than {1000 * (STROKE_M - 2 * MARGIN_M):.0f} mm all round"
 
 
 def pick_and_place(rig: Rig, pick: Pick, watch: Watch | None = None) -> Put:

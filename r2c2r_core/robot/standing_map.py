@@ -27,10 +27,10 @@ def standing_svg(floor: Floor, reached: dict[str, dict[Stand, Reach]], places: d
     listed = _listed(places, reached)
     metres = f"translate({-low[0] * _PX_PER_M:.1f} {high[1] * _PX_PER_M:.1f}) scale({_PX_PER_M:.0f} {-_PX_PER_M:.0f})"
     total_px = height + _LINE_PX * (len(listed) + 2.5)
-    words = f"{len(reached)} joints; of the floor's places the best serves {max(served.values(), default=0)}"
+    words = f"{len(reached)} joints; the best base position reaches {max(served.values(), default=0)}"
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {max(width, _LEAST_PX):.0f} {total_px:.0f}" role="img" '
-        f'font-family="sans-serif" font-size="13"><title>Where the arm may stand</title><desc>{words}</desc>',
+        f'font-family="sans-serif" font-size="13"><title>Base positions of the arm</title><desc>{words}</desc>',
         '<rect width="100%" height="100%" fill="#fff"/>',
         f'<g transform="{metres}">',
         *(_outline(polygon) for polygon in getattr(floor.furniture, "geoms", [floor.furniture])),
@@ -100,7 +100,7 @@ def _listed(places: dict[Stand, tuple[str, ...]], reached: dict[str, dict[Stand,
         for number, (stand, joints) in enumerate(places.items(), 1)
     ]
     missed = [joint for joint, stands in reached.items() if not stands]
-    lines += [f"from nowhere: {', '.join(missed)}"] if missed else []
+    lines += [f"out of reach: {', '.join(missed)}"] if missed else []
     return [row for line in lines for row in wrap(line, _WRAPPED, subsequent_indent="   ")]
 
 

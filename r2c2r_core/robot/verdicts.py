@@ -28,7 +28,7 @@ class Verdict(NamedTuple):
 def unholdable(travel: Travel | None) -> Verdict:
     """Verdict on a joint without a feasible grasp."""
     if travel is None or travel.part.bar is None:
-        return Verdict("nothing of it is a board that a finger could hold or push: its colliders are meshes", "scan")
+        return Verdict("no flat board to grasp or push: its colliders are meshes", "scan")
     across, _, upright = 1000 * travel.part.bar.size
     size = f"{across:.0f} mm wide and {upright:.0f} mm high"
     return Verdict(f"handle too thick: {size}, the gripper opens {1000 * STROKE_M:.0f} mm", "scan")
@@ -39,25 +39,25 @@ def verdict_on(model: Any, travel: Travel, way: Way, measured: Measured) -> Verd
     if measured.opened >= OPEN_SHARE and measured.closed <= CLOSED_SHARE:
         return None
     done = (
-        f"opens {100 * measured.opened:.0f} % of the way"
+        f"opens {100 * measured.opened:.0f} % of its travel"
         if measured.opened < OPEN_SHARE
-        else f"opens, but {100 * measured.closed:.0f} % of the way is left when it is closed"
+        else f"opens, but {100 * measured.closed:.0f} % of its travel is left after closing"
     )
     obstacle = _obstacle(travel, way, measured)
     if obstacle == travel.part.body:
         stands = 1000 * travel.part.protrusion_m
         return Verdict(
-            f"handle too close to the front: it stands out {stands:.0f} mm, the fingers meet the front; {done}", "scan"
+            f"handle too close to the front: it protrudes {stands:.0f} mm, the fingers hit the front; {done}", "scan"
         )
     if obstacle is not None:
         name = body_words(model, obstacle)
         blame: Blame = "scan" if obstacle == 0 else "world"
-        return Verdict(f"blocked by {name}: the gripper meets it; {done}", blame)
+        return Verdict(f"blocked by {name}: the gripper collides with it; {done}", blame)
     if not measured.reach_m <= _REACHED_M:
         return Verdict(f"not reached: the fingers close {1000 * measured.reach_m:.0f} mm beside the handle; {done}", "gripper")
     if measured.held < _HELD or measured.slip_m > _SLIPPED_M:
-        return Verdict(f"slipped: the pads went {1000 * measured.slip_m:.0f} mm along the handle; {done}", "gripper")
-    return Verdict(f"joint too stiff, or its part meets another: {measured.force_n:.0f} N of the gripper; {done}", "scan")
+        return Verdict(f"slipped: the pads slid {1000 * measured.slip_m:.0f} mm along the handle; {done}", "gripper")
+    return Verdict(f"joint too stiff, or its part hits another: the gripper applied {measured.force_n:.0f} N; {done}", "scan")
 
 
 def _obstacle(travel: Travel, way: Way, measured: Measured) -> int | None:

@@ -56,15 +56,15 @@ def unfit(model: Any, start: Mapping[str, float]) -> str | None:
     scratch, free = mujoco.MjData(model), free_bodies(model)
     for touch in touches(model, start, scratch):
         if touch.depth_m > ALLOWED_PENETRATION_M and not _resting(touch.bodies, free, touch.depth_m):
-            return "a thing meets something" if set(touch.bodies) & free else "parts overlap at the start"
+            return "an object collides with something" if set(touch.bodies) & free else "parts overlap at the start"
     if not all(_stands(model, scratch, body) for body in free):
-        return "a thing hangs over an edge"
+        return "an object hangs over an edge"
     for name in joint_names(model):
         movers, upper = movers_of(model, name), float(model.joint(name).range[1])
         for position in np.linspace(0.0, upper, _POSITIONS):
             for touch in touches(model, {name: float(position)}, scratch):
                 if touch.depth_m > ALLOWED_PENETRATION_M and movers & set(touch.bodies) and not free & set(touch.bodies):
-                    return "a joint runs into something"
+                    return "a joint collides with something"
     return None
 
 

@@ -110,7 +110,7 @@ def _copied(bundle: Path, folder: Path) -> Base:
     with opened_bundle(bundle) as opened:
         unsafe = [found for found in lint(opened) if found.rule in UNSAFE]
         if unsafe:
-            raise BundleError(f"{bundle}: {unsafe[0].message}", hint="a bundle that names files outside itself is not varied")
+            raise BundleError(f"{bundle}: {unsafe[0].message}", hint="give a bundle that refers to no files outside itself")
         shutil.copytree(opened, folder, ignore=lambda within, _: NOT_VARIED if Path(within) == opened else ())
     return base_of(folder)
 
@@ -130,7 +130,7 @@ def _fit_variant(base: Base, seed: int, index: int) -> tuple[Variation, ET.Eleme
             return variation, root, reasons
         reasons.append(why)
     said = ", ".join(f"{count} times {why}" for why, count in Counter(reasons).most_common())
-    raise StageError(f"variant {index}: none of {_ATTEMPTS} draws is fit ({said})", hint="check the bundle: r2c2r check")
+    raise StageError(f"variant {index}: none of {_ATTEMPTS} draws is valid ({said})", hint="check the bundle: r2c2r check")
 
 
 def _passes(scene: Path) -> bool:

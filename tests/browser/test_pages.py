@@ -42,7 +42,7 @@ VARIANTS = {
     "sha256": "ab" * 32,
     "size": 3,
     "created": 1.0,
-    "rejected": {"a thing meets something": 1},
+    "rejected": {"an object collides with something": 1},
     "checked": 2,
     "failed": ["00001"],
 }

@@ -24,6 +24,6 @@ folder.mkdir(parents=True, exist_ok=True)
 (folder / "variants.zip").write_bytes(b"PK" + bundle.read_bytes())
 (folder / "wall.jpg").write_bytes(b"jpg")
 facts = {"count": int(sys.argv[4]), "seed": int(sys.argv[6]), "sha256": "ab" * 32, "size": 3, "created": time.time()}
-found = {"rejected": {"a thing meets something": 2}, "checked": 2, "failed": []}
+found = {"rejected": {"an object collides with something": 2}, "checked": 2, "failed": []}
 (folder / "facts.json").write_text(json.dumps(facts | found))
 sys.stdout.write(json.dumps({"done": "vary"}) + "\n")

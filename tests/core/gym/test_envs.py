@@ -104,7 +104,7 @@ def test_an_episode_takes_the_variant_it_is_told(tmp_path: Path) -> None:
 
 
 def test_what_is_not_there_is_said(door: Path, tmp_path: Path) -> None:
-    with pytest.raises(BundleError, match="joint lid: there is none; there are front_joint"):
+    with pytest.raises(BundleError, match="joint lid: no such joint; choose one of: front_joint"):
         gymnasium.make("r2c2r/Open-v0", bundle=door, joint="lid").reset()
     (tmp_path / "empty").mkdir()
     with pytest.raises(BundleError, match=r"neither scene\.xml nor variants/"):

@@ -46,7 +46,7 @@ def test_a_thing_wider_than_the_stroke_is_left(tmp_path: Path) -> None:
 def test_a_thing_is_not_put_where_nothing_holds_it(tmp_path: Path) -> None:
     small = '<body name="table"><geom class="hard" type="box" size="0.05 0.05 0.02" pos="0 0 0.48"/></body>'
     (grip,) = certify_with_gripper(scene(tmp_path, table=small)).grips
-    assert (grip.passed, grip.why) == (False, "no free place 10 cm further on what it stands on")
+    assert (grip.passed, grip.why) == (False, "no free place 10 cm further on its support")
 
 
 def test_a_film_and_a_sheet_are_written(tmp_path: Path) -> None:

@@ -129,7 +129,7 @@ def test_a_bundle_whose_parts_overlap_has_no_variants(bundle: Path, tmp_path: Pa
     box = next(geom for geom in scene.iter("geom") if geom.get("name", "").startswith("drawer_1_drawer_col"))
     box.set("size", "0.6 0.6 0.6")
     scene.write(broken / "scene.xml")
-    with pytest.raises(StageError, match="none of 40 draws is fit"):
+    with pytest.raises(StageError, match="none of 40 draws is valid"):
         make_variants(broken, 1, 0, tmp_path / "none")
 
 
