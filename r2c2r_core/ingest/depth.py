@@ -114,7 +114,7 @@ def fill_for_display(depth_m: DepthMetres) -> DepthMetres:
 
     unknown = depth_m == 0
     if unknown.all():
-        raise CaptureError("a depth image without one known pixel cannot be filled", hint="choose another frame")
+        raise CaptureError("a depth image without a valid pixel cannot be filled", hint="choose another frame")
     rows, columns = distance_transform_edt(unknown, return_distances=False, return_indices=True)
     return np.asarray(depth_m[rows, columns])
 

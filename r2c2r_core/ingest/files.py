@@ -77,7 +77,7 @@ class FolderFiles:
             size = os.fstat(stream.fileno()).st_size
             if size > _MAX_MEMBER_BYTES:
                 raise CaptureError(
-                    f"{self.source / name}: {size >> 20} MiB, 256 MiB at most are expected", hint="is it an image?"
+                    f"{self.source / name}: {size >> 20} MiB, expected at most 256 MiB", hint="check that it is an image"
                 )
             return _fetched(stream.read(), str(self.source / name))
 
@@ -106,7 +106,7 @@ class FolderFiles:
     def _below(self, name: str) -> Path:
         path = self.source / name
         if not is_below(path, self.source):
-            raise CaptureError(f"{path}: is a link that leaves the recording's folder", hint="copy the file into the folder")
+            raise CaptureError(f"{path}: a link to a file outside the recording's folder", hint="copy the file into the folder")
         return path
 
 
@@ -166,7 +166,7 @@ class ZipFiles:
     def _refuse_hostile(self) -> None:
         members = self._zip.infolist()
         if len(members) > _MAX_MEMBERS:
-            raise self._hostile(f"{len(members)} members, at most {_MAX_MEMBERS} are expected")
+            raise self._hostile(f"{len(members)} members, expected at most {_MAX_MEMBERS}")
         for info in members:
             path = PurePosixPath(info.filename.replace("\\", "/"))
             if path.is_absolute() or ".." in path.parts or ":" in info.filename.split("/")[0]:
@@ -177,17 +177,15 @@ class ZipFiles:
                 raise self._hostile(f"member '{info.filename}' is encrypted")
             if info.compress_type not in _METHODS:
                 raise CaptureError(
-                    f"{self.source}: member '{info.filename}' is packed by method {info.compress_type} (Windows packs large "
-                    "folders by 9, Deflate64), which is not read",
+                    f"{self.source}: member '{info.filename}' is compressed by method {info.compress_type} (Windows packs "
+                    "large folders by 9, Deflate64), which is not read",
                     hint="pack the folder with 7-Zip as zip, method Deflate, or give the folder itself",
                 )
             if info.file_size > _MAX_MEMBER_BYTES and path.suffix.lower() not in _VIDEOS:
-                raise self._hostile(
-                    f"member '{info.filename}' unpacks to {info.file_size >> 20} MiB, 256 MiB at most are expected"
-                )
+                raise self._hostile(f"member '{info.filename}' unpacks to {info.file_size >> 20} MiB, expected at most 256 MiB")
         unpacked, packed = sum(i.file_size for i in members), sum(i.compress_size for i in members)
         if unpacked > _RATIO_MATTERS_BYTES and unpacked > _MAX_RATIO * max(packed, 1):
-            raise self._hostile(f"unpacks to {unpacked >> 20} MiB from {packed >> 10} KiB, a recording never packs that well")
+            raise self._hostile(f"unpacks to {unpacked >> 20} MiB from {packed >> 10} KiB, recordings never compress that well")
 
     def _damaged(self, name: str, problem: Exception) -> CaptureError:
         return CaptureError(
@@ -235,9 +233,7 @@ def top_folders(files: Files) -> tuple[str, ...]:
 def _fetched(content: bytes, where: str) -> bytes:
     """The content of a file; raises CaptureError where Git has only a pointer to it."""
     if content.startswith(_LFS_POINTER):
-        raise CaptureError(
-            f"{where}: a pointer of Git LFS, not the file itself", hint="run `git lfs pull` in the repository that it came from"
-        )
+        raise CaptureError(f"{where}: a pointer of Git LFS, not the file itself", hint="run `git lfs pull` in its repository")
     return content
 
 

@@ -42,7 +42,7 @@ _KINDS: tuple[tuple[Foreign, tuple[str, ...]], ...] = (
     ),
     (
         Foreign(
-            "ScanNet's packed stream",
+            "ScanNet's packed .sens stream",
             "unpack it with ScanNet's SensReader (color images, depth images, poses and intrinsics); bring that folder",
         ),
         (".sens",),
@@ -55,7 +55,7 @@ _KINDS: tuple[tuple[Foreign, tuple[str, ...]], ...] = (
         (".svo", ".svo2"),
     ),
     (
-        Foreign("an archive of another kind than zip", "unpack it and send the recording's folder as a zip"),
+        Foreign("an archive that is not a zip", "unpack it and send the recording's folder as a zip"),
         (".rar", ".7z", ".tar", ".gz", ".tgz", ".bz2", ".xz", ".zst"),
     ),
     (

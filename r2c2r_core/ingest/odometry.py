@@ -74,8 +74,8 @@ def estimate_poses(
     count = len(track.poses)
     if count < max(params.least_frames, params.least_share * len(frames)):
         raise CaptureError(
-            f"no poses in the recording, and only {count} of {len(frames)} frames could be tracked in one piece",
-            hint="record with tracking on, or move slower and keep textured things in view",
+            f"no poses in the recording, and only {count} of {len(frames)} frames could be tracked continuously",
+            hint="record with tracking on, or move more slowly and keep textured surfaces in view",
         )
     progress.at(0.75, "closing loops")
     found = _close_loops(track, rng)
@@ -90,7 +90,7 @@ def estimate_poses(
     notices = ["the recording has no poses; they were estimated from its images and depth"]
     if count < len(frames):
         first, last = posed[0].index, posed[-1].index
-        notices.append(f"tracking broke: only frames {first} to {last} are used, {count} of {len(frames)}")
+        notices.append(f"tracking was lost: only frames {first} to {last} are used, {count} of {len(frames)}")
     return SettledPoses(
         carried(posed, keyframes, moved), PoseEvidence(source="odometry", given_gap_m=None, gap_m=gap_m), tuple(notices)
     )

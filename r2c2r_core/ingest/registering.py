@@ -37,10 +37,10 @@ def register_depth(
     spread = frames[:: -(-len(frames) // _MEASURED)]
     found = measure_registration(spread, images, rng)
     if found is None:
-        return Registered(tuple(frames), "depth was not registered to the colour images: it shows too few edges to tell where")
+        return Registered(tuple(frames), "depth was not registered to the colour images: it has too few edges for a fit")
     if not found.wrong:
         return Registered(
-            tuple(frames), f"depth was left as it is: it lies on the colour images within {found.off_px:.1f} px of 640"
+            tuple(frames), f"depth was not changed: it is registered to the colour images within {found.off_px:.1f} px of 640"
         )
     registered = []
     for position, frame in enumerate(frames):
@@ -53,7 +53,7 @@ def register_depth(
         registered.append(changed)
     right_mm, down_mm = -found.shift_mm[0], -found.shift_mm[1]
     notice = (
-        f"depth was registered to the colour images, beside which it lay {found.off_px:.0f} px of 640: "
+        f"depth was registered to the colour images; it was {found.off_px:.0f} px of 640 off: "
         f"the colour camera has {found.focal_factor:.3f} x the focal length and lies {abs(right_mm):.0f} mm "
         f"{'right' if right_mm > 0 else 'left'} of the depth camera, "
         f"{abs(down_mm):.0f} mm {'below' if down_mm > 0 else 'above'}"

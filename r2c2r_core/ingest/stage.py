@@ -38,39 +38,39 @@ __all__ = ["IngestConfig", "level_scan", "open_images", "read_capture", "read_re
 class IngestConfig:
     """How a recording is read."""  # a LiDAR's handle of 2 x 20 cm stays; the outliers of the paper are mostly true surface
 
-    most_frames: int = setting(600, "frames kept of a longer recording, every n-th; numbers stay", ge=1, le=100_000)
-    near_m: float = setting(0.08, "least depth believed, in m: a phone's LiDAR starts at about 0.1", ge=0, le=100)
-    far_m: float = setting(8.0, "largest depth believed, in m: beyond, Kinect and LiDAR are off by decimetres", gt=0, le=100)
-    fused_frames: int = setting(120, "frames that the fused surface is made of", ge=1, le=10_000)
+    most_frames: int = setting(600, "maximum number of frames: of more, every n-th is kept", ge=1, le=100_000)
+    near_m: float = setting(0.08, "minimum depth used, in m: a phone's LiDAR starts at about 0.1", ge=0, le=100)
+    far_m: float = setting(8.0, "maximum depth used, in m: beyond, Kinect and LiDAR err by decimetres", gt=0, le=100)
+    fused_frames: int = setting(120, "maximum number of frames fused into the surface", ge=1, le=10_000)
     fused_far_m: float = setting(
-        4.0, "largest depth fused, in m: beyond, the bias of a Kinect or a phone bends the surface", gt=0, le=100
+        4.0, "maximum depth fused, in m: beyond, the bias of a Kinect or a phone bends the surface", gt=0, le=100
     )
-    finest_voxel_m: float = setting(0.01, "side of the fusion's voxels in a small room, in m", ge=0.002, le=1)
-    coarsest_voxel_m: float = setting(0.025, "side of the fusion's voxels in a large room, in m", ge=0.002, le=1)
-    smallest_part_m2: float = setting(0.004, "area below which a loose part of the surface is noise, in m²", ge=0, le=10)
+    finest_voxel_m: float = setting(0.01, "voxel size of the fusion in a small room, in m", ge=0.002, le=1)
+    coarsest_voxel_m: float = setting(0.025, "voxel size of the fusion in a large room, in m", ge=0.002, le=1)
+    smallest_part_m2: float = setting(0.004, "minimum area of a connected part of the surface, in m²", ge=0, le=10)
     outlier_neighbours: int = setting(
-        0, "neighbours by which statistical outliers are told (the paper's are 20); 0 keeps all", ge=0, le=1000
+        0, "neighbours of the statistical outlier filter (20 in the paper); 0 keeps all points", ge=0, le=1000
     )
-    most_bad_share: float = setting(0.2, "share of frames that may be unreadable before a recording is refused", ge=0, le=1)
+    most_bad_share: float = setting(0.2, "maximum fraction of unreadable frames before a recording is refused", ge=0, le=1)
     least_valid_share: float = setting(
-        0.2, "share of the median frame that depth of high confidence must leave to be used alone", ge=0, le=1
+        0.2, "minimum fraction of the median frame with high-confidence depth to use that depth alone", ge=0, le=1
     )
     depth_scale: float = setting(
         1.0,
-        "factor to metres that the recorded depth lacks: 0.1 where a tenth of a millimetre was read as one",
+        "factor on the recorded depth, which converts it to metres: 0.1 if 1/10000 m was read as 1/1000 m",
         gt=0,
         le=10_000,
     )
     scale: float = setting(
         1.0,
-        "factor on every length of the recording, depth and camera path alike, as a tape says",
+        "factor on all lengths of the recording, depth and camera path alike, such as from a tape measure",
         ge=0.2,
         le=5,
     )
     register_depth: bool = setting(
-        False, "whether depth that does not lie on the colour images is moved there, by the fit that `r2c2r info` names"
+        False, "whether depth is registered to the colour images, by the fit that `r2c2r info` reports"
     )
-    seed: int = setting(0, "seed of what is drawn at random", ge=0, lt=2**31)
+    seed: int = setting(0, "random seed", ge=0, lt=2**31)
     params: Changes = tuned_numbers("ingest")
 
 
@@ -205,7 +205,7 @@ def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confi
 
 
 def _scaled(scale: float) -> tuple[str, ...]:
-    return () if scale == 1.0 else (f"every length was multiplied by {scale:.4f}, as a person measured",)
+    return () if scale == 1.0 else (f"all lengths were multiplied by {scale:.4f}, as a person measured",)
 
 
 def _settle_poses(

@@ -126,7 +126,7 @@ def _from_file(planes: Sequence[Plane], file_up: Vector3, params: Params) -> Up:
     believed = off_deg <= params.few_planes_deg and level_m2 >= params.level_m2
     if off_deg <= params.least_correction_deg or not (believed or _many(planes, found[0], params)):
         return Up(file_up, "file", file_off_deg=off_deg)
-    notice = f"the recording's gravity was corrected by {off_deg:.1f} deg, as its level and upright planes agree"
+    notice = f"the recording's gravity was corrected by {off_deg:.1f} deg to fit its level and upright planes"
     source: Literal["file", "floor"] = "file" if off_deg <= params.few_planes_deg else "floor"
     return Up(found[0], source, (notice,), off_deg, corrected=True)
 
@@ -162,16 +162,16 @@ def _without_gravity(planes: Sequence[Plane], cameras: Sequence[Rigid3], params:
     found = [way for side in (1, 3) if (way := _way(planes, cameras, side)) is not None]  # a quarter turn to either side
     if stored is None and not found:
         up = _mean_side(cameras, 0)
-        return Up(up, "assumed", ("neither the recording nor its planes tell which way is up; check it",))
+        return Up(up, "assumed", ("neither the recording nor its planes show which way is up; check it",))
     chosen = stored if stored is not None else found[0]
     better = [way for way in found if way.clear_of(chosen, params, both=True)]
     if better:
         best = max(better, key=lambda way: way.seen_from_above_m2)
-        notice = "the recording does not know gravity, and its images lie on their side: up was taken from its planes and path"
+        notice = "the recording has no gravity, and its images lie on their side: up was estimated from its planes and path"
         return Up(best.up, "floor", (notice,), rival=chosen.up)
     rivals = [way for way in found if way is not chosen and not chosen.clear_of(way, params, both=False)]
-    head = ", and its images stand on their head" if _on_its_head(ends) else ""
-    notice = f"the recording does not know gravity{head}; up was taken from its level and upright planes"
+    head = ", and its images are upside down" if _on_its_head(ends) else ""
+    notice = f"the recording has no gravity{head}; up was estimated from its level and upright planes"
     rival = max(rivals, key=lambda way: way.seen_from_above_m2).up if rivals else None
     return Up(chosen.up, "floor", (notice,), rival=rival)
 

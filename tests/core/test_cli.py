@@ -136,7 +136,7 @@ def test_what_nothing_can_come_of_is_refused_with_its_mend_before_anything_is_co
     assert "--depth-scale 0.001" in last
     assert not list((work / "nouns").glob("segment/*"))
     _, said = r2c2r(*command, "--depth-scale", "0.001", code=1)  # read; the click on nothing then ends it
-    assert "another unit" not in said
+    assert "not in the unit" not in said
     assert "unusable" not in said
     _, said = r2c2r(*command, "--depth-scale", "none", code=2)
     assert "expected a positive number" in said

@@ -20,6 +20,6 @@ class Doubts(NamedTuple):
 
 def find_doubts(source: Path, capture: Capture, *, progress: Progress = SILENT) -> Doubts:
     """The doctor's remarks that make the recording unusable."""
-    progress.at(0.0, "looking the recording over")
+    progress.at(0.0, "examining the recording")
     unusable = [r for r in examine(capture, open_recording(source)).remarks if r.verdict == "unusable"]
     return Doubts(tuple(r.line for r in unusable), any(r.cause in _NOTHING_COMES_OF for r in unusable))

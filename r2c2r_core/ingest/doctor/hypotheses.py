@@ -152,7 +152,7 @@ def _conventions(shifted: Sequence[tuple[int, Poses]]) -> list[_Change]:
     for axes in (CAMERA_CV_FROM_GL, np.diag([-1.0, 1.0, -1.0])):  # the second: of images that stood upside down and were turned
         changes.append(_Change("camera_axes", _FLIPPED, _turned(axes)))
     for quarters in (1, 2, 3):
-        text = f"the images are turned by {90 * quarters} deg against their poses"
+        text = f"the images are rotated by {90 * quarters} deg relative to their poses"
         changes.append(_Change("image_rotated", text, _turned(rotation_about_z(quarters * np.pi / 2))))
     for places, poses in shifted:
         text = f"the images belong to the poses of the frames {abs(places)} {'later' if places > 0 else 'earlier'}"

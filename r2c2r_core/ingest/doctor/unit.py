@@ -15,9 +15,9 @@ from r2c2r_core.tuning import param, tuned
 _UNITS = {  # factor to metres: description
     0.001: "millimetres read as metres",
     0.01: "centimetres read as metres",
-    0.0125: "1/10000 m turned by three bits (as in APC) read as 1/1000 m",
+    0.0125: "1/10000 m, rotated by three bits (as in APC), read as 1/1000 m",
     0.1: "1/10000 m read as 1/1000 m",
-    0.125: "1/1000 m turned by three bits (as in SUN RGB-D), or 1/8000 m, read as 1/1000 m",
+    0.125: "1/1000 m, rotated by three bits (as in SUN RGB-D), or 1/8000 m, read as 1/1000 m",
     0.2: "1/5000 m read as 1/1000 m",
     0.25: "1/4000 m read as 1/1000 m",
     5.0: "1/1000 m read as 1/5000 m",

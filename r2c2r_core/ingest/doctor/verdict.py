@@ -11,7 +11,7 @@ from r2c2r_core.ingest.doctor.unit import Unit
 from r2c2r_core.tuning import param, tuned
 
 _FIRST = ("gravity_off",)  # heights, the floor and all upright directions depend on it
-_REGISTER = "read it with --register-depth, which moves the depth there by this fit"
+_REGISTER = "read it with --register-depth, which registers the depth by this fit"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,10 +146,10 @@ def _depth(figures: CaptureFigures, unit: Unit | None) -> list[Remark]:
     if figures.depth_coverage < params.depth[0]:
         recorded = figures.recorded_depth_m
         if recorded is not None and not plausible(recorded):
-            text = f"the recorded depth is {recorded:.4g} m in the median: another unit than the format's"
+            text = f"the median recorded depth is {recorded:.4g} m: not in the unit of the format"
             return [_remark("unusable", "depth_unit", text, _unit_advice(unit))]
         if low:
-            advice = "film by more light and from 0.5 to 3 m, or check the confidence files"
+            advice = "film in more light and from 0.5 to 3 m away, or check the confidence files"
             return [
                 _remark(
                     "unusable", "confidence", f"{low}, {figures.depth_coverage:.0%} of the median frame can be used", advice
@@ -170,17 +170,17 @@ def _gravity(figures: CaptureFigures) -> list[Remark]:
     if off is None or off <= tuned(Params).gravity_deg:
         return []
     if figures.up_corrected:
-        text = f"the recording's gravity is {off:.1f} deg off its level and upright planes; the planes' is taken"
+        text = f"the recording's gravity is {off:.1f} deg off its level and upright planes; the planes are used"
         verdict: Verdict = "good" if off <= tuned(Params).tilt_deg else "usable with care"
-        return [_remark(verdict, "gravity_off", text, "nothing is to be done if the scan stands upright; else set up by hand")]
-    text = f"the recording's gravity is {off:.1f} deg off its level and upright planes, which are too few to be believed"
+        return [_remark(verdict, "gravity_off", text, "no action is needed if the scan is upright; else set up by hand")]
+    text = f"the recording's gravity is {off:.1f} deg off its level and upright planes, which are too few to rely on"
     return [_remark("usable with care", "gravity_off", text, "film more of the floor and the walls, or set up by hand")]
 
 
 def _unit_advice(unit: Unit | None) -> str:
     if unit is None:
-        return "export it again, or give the factor to metres with --depth-scale"
-    sure = "the views agree if it is" if unit.measured else "it may be"
+        return "export it again, or give the factor that converts it to metres with --depth-scale"
+    sure = "the views agree for" if unit.measured else "it may be"
     return f"{sure} {unit.text}: read it with --depth-scale {unit.factor:g}"
 
 
@@ -189,14 +189,14 @@ def _conventions(
 ) -> list[Remark]:
     remarks = []
     if convention is not None:
-        gain = f"{convention.agreement_so:.0%} of neighbouring depth agrees then, {convention.agreement_given:.0%} as it is"
+        gain = f"{convention.agreement_so:.0%} of neighbours agree if corrected, {convention.agreement_given:.0%} as recorded"
         remarks.append(
             _remark("unusable", convention.cause, f"{convention.text}: {gain}", "export again, or correct the poses")
         )
     if registration is not None and registration.wrong:
         remarks.append(_unregistered(registration))
     if scale is not None:
-        gain = f"views disagree by {scale.error_so_mm:.0f} mm then, {scale.error_given_mm:.0f} mm as it is"
+        gain = f"views disagree by {scale.error_so_mm:.0f} mm if corrected, {scale.error_given_mm:.0f} mm as recorded"
         verdict: Verdict = "usable with care" if _may_be_drift(scale, figures) else "unusable"
         mend = f", such as --depth-scale {scale.factor:.3g}" if scale.cause == "depth_scale" and scale.factor else ""
         advice = f"correct the calibration or the unit of the depth{mend}"
@@ -209,9 +209,9 @@ def _unregistered(found: Registration) -> Remark:
     verdict: Verdict = "unusable" if found.off_px > tuned(Params).masks_px else "usable with care"
     if found.focal_only:
         text = f"the colour camera's focal length is off by {abs(1 / found.focal_factor - 1):.0%}"
-        gain = f": depth lies {found.off_px:.0f} px of 640 beside the picture"
+        gain = f": depth lies {found.off_px:.0f} px of 640 off the image"
         return _remark(verdict, "colour_focal_length", text + gain, f"correct the colour calibration, or {_REGISTER}")
-    text = f"the depth is not registered to the colour images: it lies {found.off_px:.0f} px of 640 beside them"
+    text = f"the depth is not registered to the colour images: it is {found.off_px:.0f} px of 640 off"
     fit = f" (fits with {found.focal_factor:.3f} x the focal length, {found.shift_mm[0]:.0f} and {found.shift_mm[1]:.0f} mm)"
     return _remark(verdict, "unregistered", text + fit, f"export registered depth, or {_REGISTER}")
 
@@ -225,7 +225,7 @@ def _recording(figures: CaptureFigures) -> list[Remark]:
     if figures.frames < params.frames[0]:
         remarks.append(_remark("unusable", "few_frames", few, "film for at least ten seconds"))
     elif figures.frames < params.frames[1]:
-        remarks.append(_remark("usable with care", "few_frames", few, "more views give better masks"))
+        remarks.append(_remark("usable with care", "few_frames", few, "film longer: more views give better masks"))
     return remarks
 
 
@@ -250,11 +250,11 @@ def _tracking(figures: CaptureFigures, *, explained: bool) -> list[Remark]:
         return [*remarks, _remark("usable with care", "no_overlap", text, advice)]
     limit = _noise_mm(figures)
     if error > limit and not explained:
-        text = f"neighbouring frames disagree by {error:.0f} mm, {limit:.0f} mm were expected"
+        text = f"neighbouring frames disagree by {error:.0f} mm, expected at most {limit:.0f} mm"
         verdict: Verdict = "unusable" if error > params.wrong * limit else "usable with care"
-        remarks.append(_remark(verdict, "disagreement", text, "poses, calibration or depth are wrong in a way not known here"))
+        remarks.append(_remark(verdict, "disagreement", text, "poses, calibration or depth are wrong; the cause is unknown"))
     if figures.drift_mm is not None and figures.drift_mm > params.drift_mm[0] and not explained:
-        text = f"the poses drift: what is filmed again lies {figures.drift_mm:.0f} mm from where it was"
+        text = f"the poses drift: revisited surfaces are {figures.drift_mm:.0f} mm apart"
         verdict = "unusable" if figures.drift_mm > params.drift_mm[1] else "usable with care"
         refined = "they were refined as far as the scan allows; " if figures.poses_source == "refined" else ""
         remarks.append(_remark(verdict, "drift", text, f"{refined}film more slowly, turn less at once, and avoid blank walls"))
@@ -283,20 +283,20 @@ def _room(figures: CaptureFigures) -> list[Remark]:
         text = f"only {figures.seen_from_three:.0%} of the surface is seen from three sides"
         remarks.append(_remark("usable with care", "one_sided", text, "walk around the objects"))
     if figures.up_source == "assumed":
-        text = "neither the recording nor its planes tell which way is up"
+        text = "neither the recording nor its planes show which way is up"
         remarks.append(_remark("usable with care", "up_unknown", text, "set it by hand"))
     if figures.up_rival is not None:
         up = ", ".join(f"{value:.3g}" for value in figures.up_rival)
-        text = "the recording does not know gravity, and its images may lie on their side: up is in doubt"
-        remarks.append(_remark("usable with care", "up_in_doubt", text, f"if the scan lies too, set up by hand to [{up}]"))
+        text = "the recording has no gravity, and its images may lie on their side: up is in doubt"
+        remarks.append(_remark("usable with care", "up_in_doubt", text, f"if the scan is tilted, set up by hand to [{up}]"))
     if not figures.floor_found:
         remarks.append(
-            _remark("usable with care", "no_floor", "no floor was found", "film some of it, or set its height by hand")
+            _remark("usable with care", "no_floor", "no floor was found", "film part of the floor, or set its height by hand")
         )
     remarks += _scale_by_furniture(figures)
     height = figures.camera_height_m
     if height is not None and not params.held_m[0] < height < params.held_m[1]:
-        text = f"the camera was held {height:.2f} m above what was taken for the floor"
+        text = f"the camera was held {height:.2f} m above the estimated floor"
         remarks.append(
             _remark("usable with care", "camera_height", text, "check the floor's height and the scale of the poses")
         )
@@ -311,9 +311,9 @@ def _scale_by_furniture(figures: CaptureFigures) -> list[Remark]:
         return []
     nearest = min(heights, key=lambda z: abs(z - params.worktop_m))
     off = nearest / params.worktop_m - 1.0
-    text = f"the level surface nearest to a worktop's height stands at {nearest:.2f} m; tables and worktops at 0.70 to 0.95 m"
+    text = f"the level surface nearest to a worktop's height is at {nearest:.2f} m; tables and worktops are at 0.70 to 0.95 m"
     size = f"if it is one, all lengths are about {abs(off):.0%} too {'large' if off > 0 else 'small'}"
-    return [_remark("good", "furniture_height", text, f"{size}: measure something that you know")]
+    return [_remark("good", "furniture_height", text, f"{size}: check against a known length")]
 
 
 def _remark(verdict: Verdict, cause: str, text: str, advice: str) -> Remark:

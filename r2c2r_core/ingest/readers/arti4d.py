@@ -54,7 +54,7 @@ def open_arti4d(files: Files) -> Recording:
     rgb_camera = _camera(files, "rgb/camera_info.txt", first_size(files, found.colour.values(), "colour image"))
     depth_camera = _camera(files, "depth/camera_info.txt", first_size(files, found.depth.values(), "depth image"))
     frames, left_out = joined_frames(files, found, lambda _: rgb_camera, lambda _: depth_camera)
-    turned = ("by its poses the camera hangs upside down: the images are taken for turned back by 180 deg",) if hangs else ()
+    turned = ("the poses show the camera upside down: its images are assumed to be turned back by 180 deg",) if hangs else ()
     return Recording(
         format="Arti4D",
         files=files,
@@ -118,7 +118,7 @@ def _transform(document: dict[str, Any], key: str, files: Files, name: str) -> R
         pose = None
     if pose is None:
         raise CaptureError(
-            f"{files.source}/{name}: {key} is no transform", hint="expected translation {x, y, z} and rotation {x, y, z, w}"
+            f"{files.source}/{name}: {key} is not a transform", hint="expected translation {x, y, z} and rotation {x, y, z, w}"
         )
     return pose
 

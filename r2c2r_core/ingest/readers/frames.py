@@ -31,7 +31,7 @@ def joined_frames(
     """
     notices = []
     if found.poses and not any(pose is not None for pose in found.poses.values()):
-        notices.append(f"none of {len(found.poses)} poses is finite and a rotation: they are left out, as if there were none")
+        notices.append(f"none of {len(found.poses)} poses is a finite rigid transform: all are left out")
         found = replace(found, poses={})
     poses = found.poses or dict.fromkeys(found.colour)
     shared = found.colour.keys() & found.depth.keys() & poses.keys()
@@ -55,8 +55,8 @@ def joined_frames(
     )
     if not frames:
         raise CaptureError(
-            f"{files.source}: none of the {len(shared)} frames with colour and depth has a pose that is finite and a rotation",
-            hint="take the pose files away to have the poses estimated",
+            f"{files.source}: none of the {len(shared)} frames with colour and depth has a finite rigid transform as pose",
+            hint="remove the pose files to have the poses estimated",
         )
     return frames, [*notices, *_left_out(found, shared, len(frames))]
 

@@ -68,7 +68,7 @@ def open_redwood(files: Files) -> Recording:
 def _poses(files: Files, log: str) -> dict[int, Rigid3 | None]:
     numbers = read_numbers(files.read(log))
     if numbers is None or not numbers.size or numbers.size % _ROW:
-        found = "words that are no numbers" if numbers is None else f"{numbers.size} numbers"
+        found = "words that are not numbers" if numbers is None else f"{numbers.size} numbers"
         raise CaptureError(f"{files.source}/{log}: {found}, {_ROW} a frame were expected", hint="copy the recording again")
     rows = numbers.reshape(-1, _ROW)
     return {int(row[0]): pose_of_matrix(row[3:].reshape(4, 4)) for row in rows if np.isfinite(row[0])}

@@ -60,7 +60,7 @@ def open_rtabmap(files: Files) -> Recording:
     found = Found(colour=colour, depth=depth, poses=poses, times_s={number: node.time_s for number, node in nodes.items()})
     frames, notices = joined_frames(files, found, cameras.__getitem__, lambda n: cameras[n].resized(*depth_size))
     if any(one.distorted for one in read.values()):
-        notices.append("the calibration has lens distortion, which is not taken out: export rectified images")
+        notices.append("the calibration has lens distortion, which is not corrected: export rectified images")
     return Recording(
         format="RTAB-Map export",
         files=files,

@@ -72,7 +72,7 @@ def open_recording(source: Path) -> Recording:
     if matches := {folder: reader for folder, root in inner.items() if (reader := _reader_of(root))}:
         folder = next(iter(matches))
         recording = _opened(matches[folder], inner[folder])
-        choice = f"{len(matches)} recordings lie here, {folder} is read: {', '.join(list(matches)[:6])}"
+        choice = f"{len(matches)} recordings found, {folder} is read: {', '.join(list(matches)[:6])}"
         return replace(recording, notices=(choice, *recording.notices)) if len(matches) > 1 else recording
     raise _unknown(source, files, [*outer, *inner.values()])
 
@@ -80,7 +80,7 @@ def open_recording(source: Path) -> Recording:
 def _opened(reader: Reader, root: Files) -> Recording:
     recording = upright(plausible(reader.open(root)))
     borrowed = borrowed_by(root, recording.names)
-    told = (f"the calibration is that of {borrowed[0]}, one folder up",) if borrowed else ()
+    told = (f"the calibration was read from {borrowed[0]}, one folder up",) if borrowed else ()
     return replace(recording, notices=(*told, *recording.notices))
 
 
@@ -94,17 +94,17 @@ def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
     archives = sorted(name for name in files.names() if name.endswith((".r3d", ".zip")))
     if not nearest and archives:
         inside = f"{source}: holds {archives[0]}, which may be a recording itself"
-        return CaptureError(inside, hint="choose that file; take it out first if it lies in another archive")
+        return CaptureError(inside, hint="choose that file; unpack it first if it is in another archive")
     if not nearest and (instead := foreign_among(files.names())):
         name, kind = instead
         return kind.refusal(str(source), name)
     if not nearest:
         return CaptureError(f"{source}: {_found(files)}; no known recording format", hint=_BRING)
     reader, missing = nearest[0]
-    others = "".join(f"; it would be {other.name} with {' and '.join(lacking)}" for other, lacking in nearest[1:])
+    others = "".join(f"; {other.name} would need {' and '.join(lacking)}" for other, lacking in nearest[1:])
     lacks = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
     has_depth = any("depth" in name.lower() for name in files.names())
-    flat = "" if has_depth else "; what was captured without depth, as in a photo mode, cannot be used"
+    flat = "" if has_depth else "; captures without depth, as in a photo mode, cannot be used"
     return CaptureError(
         f"{source}: {_found(files)}; looks like {reader.name}, but {lacks}", hint=f"it holds {reader.expects}{flat}{others}"
     )

@@ -28,7 +28,7 @@ def open_threedmatch(files: Files) -> Recording:
     size, depth_size = first_size(files, colour.values(), "colour image"), first_size(files, depth.values(), "depth image")
     rgb_camera, depth_camera, others, notices = _cameras(files, prefix, size, depth_size)
     if len(folders) > 1:
-        notices.append(f"of {len(folders)} sequences {folders[0]} is read; give the folder of another one to read that")
+        notices.append(f"of {len(folders)} sequences {folders[0]} is read; to read another one, give its folder")
     found = Found(colour=colour, depth=depth, poses=read_poses(files, poses))
     frames, left_out = joined_frames(files, found, lambda _: rgb_camera, lambda _: depth_camera)
     return Recording(

@@ -89,7 +89,7 @@ def _placed(files: Files, pose_name: str, times_s: dict[int, float], rgb_lines: 
         return _Placed({n: pose for n, pose in near.items() if pose is not None}, times_s, None)
     if rgb_lines != pose_lines:
         raise CaptureError(
-            f"{files.source}: {rgb_lines} images and {pose_lines} poses, and their clocks share no time ({pose_name})",
+            f"{files.source}: {rgb_lines} images and {pose_lines} poses, and their times do not overlap ({pose_name})",
             hint="the pose file belongs to another recording",
         )
     return _Placed(
@@ -147,7 +147,7 @@ def _present(files: Files, name: str, images: _Listed) -> tuple[dict[int, tuple[
     """(time, file) by line, of the files that exist, and the number of lines."""
     present = {n: (time_s, image) for n, (time_s, image) in enumerate(images) if image in files.names()}
     if not present:
-        found = f"none of the {len(images)} files it names exist" if images else "it names no file"
+        found = f"none of the {len(images)} files it lists exist" if images else "it lists no file"
         raise CaptureError(f"{files.source}/{name}: {found}", hint="copy the images beside it")
     return present, len(images)
 

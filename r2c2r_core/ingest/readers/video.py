@@ -22,7 +22,7 @@ from r2c2r_core.ingest.readers.images import MAX_PIXELS
 from r2c2r_core.ingest.readers.protocol import UnreadableFrame
 
 _FIRST_BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip")  # QuickTime files may begin with any
-_AGAIN = "export the recording again, or copy it again"
+_AGAIN = "export or copy the recording again"
 _DECODER = (sys.executable, "-m", "r2c2r_core.alone", "r2c2r_core.ingest.readers.decoder")
 
 

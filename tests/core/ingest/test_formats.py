@@ -45,7 +45,7 @@ def test_arkitscenes_images_between_poses_are_left_out(tmp_path):
 
 def test_a_sequence_of_arti4d_that_was_filmed_upside_down_is_turned_back(tmp_path):
     recording = open_recording(write_arti4d(tmp_path / "a", SMALL, flipped=True))
-    assert told(recording, "hangs upside down")
+    assert told(recording, "camera upside down")
     for frame, pose in zip(recording.frames, SMALL.poses(), strict=True):
         assert np.allclose(frame.capture_from_camera.matrix, pose.matrix, atol=1e-6)
     assert not open_recording(write_arti4d(tmp_path / "b", SMALL)).notices
@@ -354,7 +354,7 @@ def test_an_unknown_folder_is_told_the_two_nearest_formats_and_what_each_lacks(t
     with pytest.raises(CaptureError) as caught:
         open_recording(folder)
     assert "looks like 7-Scenes folder, but intrinsics_color.txt is missing" in str(caught.value)
-    assert "it would be Redwood / Open3D with trajectory.log or a camera's .json" in caught.value.hint
+    assert "Redwood / Open3D would need trajectory.log or a camera's .json" in caught.value.hint
     assert len(f"{caught.value}{caught.value.hint}") < 500
 
 
@@ -367,9 +367,9 @@ def test_an_unknown_folder_is_told_the_two_nearest_formats_and_what_each_lacks(t
         ("rosbag2_0.mcap", "a ROS 2 bag", "color/ and depth/"),
         ("k4a.mkv", "Azure Kinect", "save_frames"),
         ("rtabmap.db", "a database of RTAB-Map", "rtabmap-export"),
-        ("scene0000_00.sens", "ScanNet's packed stream", "SensReader"),
+        ("scene0000_00.sens", "ScanNet's packed .sens stream", "SensReader"),
         ("HD720.svo2", "a ZED camera", "16-bit depth"),
-        ("scan.tar", "another kind than zip", "as a zip"),
+        ("scan.tar", "an archive that is not a zip", "as a zip"),
         ("IMG_0042.MOV", "a film without depth", "the whole folder"),
         ("IMG_0042.HEIC", "a picture", "with depth"),
     ],
@@ -412,7 +412,7 @@ def test_a_calibration_one_folder_up_is_taken_and_told(write, name, top, tmp_pat
         source = (folder / top).rename(tmp_path / "scene" / top)
     recording = open_recording(source)
     assert recording.frames[0].rgb_camera == ROOM.camera
-    assert told(recording, f"the calibration is that of {name}, one folder up")
+    assert told(recording, f"the calibration was read from {name}, one folder up")
     digest = recording.files.sha256(recording.names)
     calibration = tmp_path / "scene" / name
     calibration.write_text(calibration.read_text() + "\n")
@@ -540,4 +540,4 @@ def test_of_several_recordings_the_first_is_read_and_named(tmp_path):
         write_scannet(tmp_path / "scans" / name, SMALL)
     recording = open_recording(tmp_path / "scans")
     assert len(recording.frames) == 4
-    assert told(recording, "2 recordings lie here, monday is read: monday, tuesday")
+    assert told(recording, "2 recordings found, monday is read: monday, tuesday")

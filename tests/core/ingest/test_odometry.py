@@ -83,7 +83,7 @@ def test_a_break_cuts_the_recording_to_its_longest_stretch():
 
 
 def test_a_recording_that_cannot_be_tracked_is_refused():
-    with pytest.raises(CaptureError, match="tracked in one piece"):
+    with pytest.raises(CaptureError, match="tracked continuously"):
         tracked(Views(ROOM.poses(), blind={2, 5, 8, 11}))
 
 

@@ -53,7 +53,7 @@ def test_depth_beside_colour_is_moved_there_by_the_fit_when_asked(scan, tmp_path
 
 def test_registered_depth_is_left_as_it_is_and_told(scan, tmp_path):
     asked, plain = (read_capture(scan, tmp_path / str(k), config) for k, config in enumerate((ASKED, CONFIG)))
-    assert asked.notices[0].startswith("depth was left as it is")
+    assert asked.notices[0].startswith("depth was not changed")
     for frame, other in zip(asked.frames, plain.frames, strict=True):
         assert frame.rgb_camera == other.rgb_camera
         assert np.array_equal(asked.images.depth(frame.index).metres, plain.images.depth(frame.index).metres)

@@ -347,7 +347,7 @@ BAD = {
     "absolute": (escaping("/etc/evil"), "points outside"),
     "drive": (escaping("C:/evil"), "points outside"),
     "symlink": (symlink, "symbolic link"),
-    "bomb": (bomb, "256 MiB at most"),
+    "bomb": (bomb, "at most 256 MiB"),
     "no depth": (no_depth, "12 colour images but no depth"),
     "no poses": (metadata(poses=[]), "no poses"),
     "poses are no table": (metadata(poses=[[1, 2], 3]), "rows of 7 numbers"),
@@ -361,7 +361,7 @@ BAD = {
     "odd depth size": (odd_depth, "have no size of the shape"),
     "kitchen without calibration": (without("intrin*"), "looks like 7-Scenes folder, but intrinsics_color.txt is missing"),
     "kitchen without depth": (without("depth/*"), "but depth/N.png is missing"),
-    "link out of the folder": (leaving_link, "link that leaves"),
+    "link out of the folder": (leaving_link, "link to a file outside"),
 }
 
 
@@ -409,5 +409,5 @@ def test_a_scale_multiplies_every_length_alike_and_is_noticed(once, scan, tmp_pa
         assert np.allclose(other.world_from_camera.rotation, one.world_from_camera.rotation, atol=0.01)
     sizes = [np.ptp(one.surface.vertices_world, axis=0) for one in (once, larger)]
     assert sizes[1] == pytest.approx(1.25 * sizes[0], rel=0.02)  # a voxel of 3 cm is no larger
-    assert "every length was multiplied by 1.2500, as a person measured" in larger.notices
+    assert "all lengths were multiplied by 1.2500, as a person measured" in larger.notices
     assert not any("multiplied" in notice for notice in once.notices)
