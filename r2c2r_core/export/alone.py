@@ -37,7 +37,7 @@ def leave_alone(model: Any) -> Left:
     seconds = max(time.thread_time() - started, 1e-9)
     drift_m = _by_body(model, moved)
     notes = [
-        finding("drift", name, f"moves {1000 * distance:.1f} mm in {REST_SECONDS:.0f} s with nobody touching it")
+        finding("drift", name, f"moves {1000 * distance:.1f} mm in {REST_SECONDS:.0f} s without being touched")
         for name, distance in drift_m.items()
         if not distance <= ALLOWED_DRIFT_M
     ]

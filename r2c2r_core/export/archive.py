@@ -94,16 +94,16 @@ def replace_folder(source: Path, destination: Path) -> None:
 
 
 def _refuse_foreign_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
-    again = "this is no bundle of r2c2r: export or download it again"
+    again = "not a bundle of r2c2r: export or download it again"
     if len(members) > MOST_MEMBERS:
-        raise BundleError(f"{path.name}: {len(members)} members, at most {MOST_MEMBERS} expected", hint=again)
+        raise BundleError(f"{path.name}: {len(members)} members, expected at most {MOST_MEMBERS}", hint=again)
     seen: set[str] = set()
     for member in members:
         name = member.filename.rstrip("/")
         if not is_inside(name) or stat.S_ISLNK(member.external_attr >> 16):
             raise BundleError(f"{path.name}: member {name!r} leaves the bundle", hint=again)
         if name.casefold() in seen:
-            raise BundleError(f"{path.name}: member {name!r} is there twice", hint=again)
+            raise BundleError(f"{path.name}: member {name!r} appears twice", hint=again)
         seen.add(name.casefold())
 
 
@@ -117,7 +117,7 @@ def _extract(archive: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path, bu
             while chunk := source.read(_CHUNK):
                 written += len(chunk)
                 if written > budget:
-                    raise BundleError(f"{path.name}: more than {MOST_BYTES >> 30} GB when unpacked", hint="this is no bundle")
+                    raise BundleError(f"{path.name}: more than {MOST_BYTES >> 30} GB when unpacked", hint="use another bundle")
                 sink.write(chunk)
     except (NotADirectoryError, IsADirectoryError, FileExistsError) as error:
         raise BundleError(f"{path.name}: {member.filename!r} is a file and a folder", hint="export it again") from error

@@ -32,7 +32,7 @@ def certify(folder: Path, *, sapien_python: str | None = None, progress: Progres
     findings = lint(folder)
     things, colliders = tuple[ThingResult, ...](), tuple[ColliderFit, ...]()
     if any(finding.rule in UNSAFE for finding in findings):
-        refused = "not given to it: the bundle names files outside itself"
+        refused = "not loaded: the bundle refers to files outside itself"
         loaders = tuple(LoaderResult(loader=name, state="not tried", detail=refused) for name in EVERY_LOADER)
         simulation = _NOT_SIMULATED
     else:
@@ -130,7 +130,7 @@ def _things(urdf: Urdf, files: BundleFiles, simulation: Simulation) -> tuple[Thi
 
 def _closed_openings(things: tuple[ThingResult, ...]) -> tuple[Finding, ...]:
     return tuple(
-        finding("opening", thing.name, f"{100 * thing.opening_free:.0f} % of its hollow is free of its colliders")
+        finding("opening", thing.name, f"{100 * thing.opening_free:.0f} % of its cavity is free of colliders")
         for thing in things
         if thing.opening_free is not None and thing.opening_free < NEEDED_OPENING
     )

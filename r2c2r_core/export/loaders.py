@@ -107,7 +107,7 @@ def _agreed(found: Readback) -> str:
     held = f"{found.version}: {len(found.joints)} joints, {len(found.bodies)} links, {total:.2f} kg read back and equal"
     lost = found.not_kept
     words = " or ".join(filter(None, (", ".join(lost[:-1]), *lost[-1:])))
-    return f"{held}; it keeps no joint {words}" if lost else held
+    return f"{held}; it does not keep joint {words}" if lost else held
 
 
 def _yourdfpy(scene: Path) -> dict[str, Any]:
@@ -135,9 +135,9 @@ def _pybullet(scene: Path) -> dict[str, Any]:
 def _apart(folder: Path, own: Apart, python: str | None) -> dict[str, Any]:
     """Output of the loader's probe, run in its own environment."""
     if not python:
-        raise _NotThereError(f"no environment of its own given: set {own.variable} to its python")
+        raise _NotThereError(f"no Python environment configured: set {own.variable} to its python")
     if not Path(python).is_file():
-        raise _NotThereError(f"{own.variable} names {python}, which is not there")
+        raise _NotThereError(f"{own.variable} is {python}, which does not exist")
     present = subprocess.run([python, "-c", f"import {own.module}"], capture_output=True, timeout=_SECONDS, check=False)
     if present.returncode != 0:
         raise _NotThereError(f"{python} cannot import {own.module}")
@@ -164,8 +164,8 @@ def _probe(command: list[str], scene: Path, seconds: int = _SECONDS) -> dict[str
         run = subprocess.run(words, capture_output=True, timeout=seconds, check=False, cwd=scratch)
         if run.returncode != 0 or not answer.is_file():
             said = run.stderr.decode(errors="replace").strip().splitlines()
-            died = f"died of {signal.Signals(-run.returncode).name}" if run.returncode < 0 else "gave up"
-            raise RuntimeError(f"{died}: {said[-1] if said else 'without a word'}")
+            died = f"killed by {signal.Signals(-run.returncode).name}" if run.returncode < 0 else "failed"
+            raise RuntimeError(f"{died}: {said[-1] if said else 'no output'}")
         document: dict[str, Any] = json.loads(answer.read_text())
     return document
 

@@ -6,7 +6,7 @@ from typing import Any
 from r2c2r_core.model.report import LoaderResult
 
 FALSE_ALARMS = {
-    "RB.007": "what stands fast has a mass for whoever lets it move; engines leave a mass without a rigid body aside",
+    "RB.007": "fixed parts have a mass in case somebody frees them; engines ignore a mass without a rigid body",
     "UsdAsciiPerformanceChecker": "the files are text so that they can be read and compared; a binary one is quicker to open",
     "VG.009": "it would save space: texture coordinates repeat",
     "VG.016": "it would save space: points of one place are kept apart for their texture coordinates",
@@ -30,4 +30,4 @@ def validated(loader: str, document: dict[str, Any]) -> LoaderResult:
 def _alarms(issues: list[dict[str, Any]]) -> str:
     counted = sorted(Counter(issue["rule"] for issue in issues).items())
     lines = [f"{count} x {rule} ({FALSE_ALARMS.get(rule, 'a warning')})" for rule, count in counted]
-    return "; ".join(lines) or "nothing to complain about"
+    return "; ".join(lines) or "no issues"

@@ -84,7 +84,7 @@ class Plan:
     def notes(self, object_name: str) -> tuple[str, ...]:
         """Notes for the user about the export of an object."""
         plate = any(body.is_support and body.object_name == object_name for body in self.bodies)
-        return ("nothing that was named carries it: a thin plate under it does",) if plate else ()
+        return ("none of the named objects supports it: a thin plate was added under it",) if plate else ()
 
 
 def plan_bundle(scene: ArticulatedScene) -> Plan:
@@ -142,7 +142,7 @@ def _parents_first(item: SceneObject, joints: dict[str, Joint]) -> list[str]:
     while waiting:
         ready = [n for n in waiting if n not in joints or joints[n].parent in ordered]
         if not ready or base in joints or len(set(names)) != len(names):
-            raise ExportFailed(f"{item.name}: its joints form no tree below {base}", hint="report this scene as a defect")
+            raise ExportFailed(f"{item.name}: its joints do not form a tree below {base}", hint="report this scene as a defect")
         ordered += ready
         waiting = [n for n in waiting if n not in ready]
     return ordered

@@ -63,7 +63,7 @@ def _resistances(joint: Joint) -> dict[str, float]:
 
 def _around(value: float) -> Range:
     low, high = _RESISTANCE
-    why = "half to twice what a hand was found to need; no furniture was measured"
+    why = "half to twice the force that a hand was measured to need; no furniture was measured"
     return Range(distribution="loguniform", low=low * value, high=high * value, source="default", why=why)
 
 

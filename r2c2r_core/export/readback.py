@@ -133,7 +133,7 @@ def _body_differences(expected: HeldBody, found: HeldBody) -> Iterator[str]:
     if not _near(expected.origin_world, found.origin_world, _LENGTH_M):
         yield f"stands at {_numbers(found.origin_world)} m, not {_numbers(expected.origin_world)}"
     if not _near(expected.rotation_world, found.rotation_world, _DIRECTION):
-        yield "is turned otherwise"
+        yield "has another orientation"
     if expected.colliders != found.colliders:
         yield f"has {found.colliders} of {expected.colliders} colliders"
 

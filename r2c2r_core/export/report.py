@@ -276,7 +276,7 @@ def _things(things: list[dict[str, Any]]) -> str:
         ]
         for thing in things
     ]
-    head = ["free-standing", "moved in 5 s, left alone", "its hollow free of colliders"]
+    head = ["free-standing", "moved in 5 s, untouched", "cavity free of colliders"]
     return "<h2>Free-standing things</h2>" + _table(head, rows, numeric=(1, 2))
 
 
@@ -321,7 +321,7 @@ def _arm(arm: dict[str, Any] | None) -> str:
     about = arm["arm"]
     said = (
         f"A {_text(about['name'])} ({_text(about['source'])}) on a lifting column reaches {arm['joints_in_reach']} of "
-        f"{arm['joints']} joints without meeting anything, from {len(arm['places'])} places. It opened and closed "
+        f"{arm['joints']} joints without collision, from {len(arm['places'])} places. It opened and closed "
         f"{arm['joints_opened']} of them by the friction of its pads."
     )
     picture = (
@@ -345,7 +345,7 @@ def _grips(folder: str, grips: list[dict[str, Any]]) -> str:
         ]
         for grip in grips
     ]
-    head = ["", "where", "done", "how", "grip", "opened", "slip, or off its place", "most force", "why not, and whose doing"]
+    head = ["", "where", "done", "how", "grip", "opened", "slip, or offset from the goal", "most force", "reason and cause"]
     return _table(head, rows, numeric=(4, 5, 6, 7))
 
 

@@ -28,21 +28,21 @@ def check_seal(folder: Path) -> tuple[Finding, ...]:
     except (OSError, ValueError, RecursionError, AttributeError):
         return ()
     if listed is None:
-        return (finding("file-unsealed", MANIFEST, "it lists no checksums, so nobody can tell whether a file was changed"),)
+        return (finding("file-unsealed", MANIFEST, "it lists no checksums, so changed files cannot be detected"),)
     if not isinstance(listed, dict):
-        return (finding("file-unsealed", MANIFEST, f"files is {type(listed).__name__}, a table of SHA-256 by path expected"),)
+        return (finding("file-unsealed", MANIFEST, f"files is {type(listed).__name__}, expected a table of SHA-256 by path"),)
     return tuple(_differences(listed, checksums(folder)))
 
 
 def _differences(listed: dict[str, object], there: dict[str, str]) -> Iterator[Finding]:
     for name in sorted(listed.keys() & there.keys()):
         if listed[name] != there[name]:
-            what = f"its SHA-256 is {there[name][:12]}…, the manifest says {str(listed[name])[:12]}…: take the bundle again"
+            what = f"its SHA-256 is {there[name][:12]}…, the manifest says {str(listed[name])[:12]}…: download the bundle again"
             yield finding("file-changed", name, what)
     for name in sorted(listed.keys() - there.keys()):
-        yield finding("file-lost", name, "the manifest lists it, and it is not in the bundle")
+        yield finding("file-lost", name, "it is in the manifest, but not in the bundle")
     for name in sorted(there.keys() - listed.keys()):
-        yield finding("file-unlisted", name, "it is in the bundle, and not in its manifest")
+        yield finding("file-unlisted", name, "it is in the bundle, but not in its manifest")
 
 
 def _sha256(path: Path) -> str:

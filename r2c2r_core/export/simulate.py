@@ -70,7 +70,7 @@ def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:
     with _apart("joints together", findings):
         met = meetings(strict)
         together = all_together(strict)
-    progress.at(0.8, "leaving everything alone")
+    progress.at(0.8, "simulating at rest")
     with _apart("left alone", findings):
         left = leave_alone(shipped)
     return Simulation(

@@ -20,7 +20,7 @@ def examine_joint(strict: Any, solid: Any, name: str) -> tuple[JointResult, list
     """Sweep and push one joint, all others closed; `solid` is the `strict` model with free-standing objects."""
     deepest, notes = _swept(strict, name)
     blockers = things_in_the_way(solid, name)
-    notes += [finding("blocked-by", name, f"{blocker.name} stands in its way") for blocker in blockers]
+    notes += [finding("blocked-by", name, f"{blocker.name} blocks it") for blocker in blockers]
     travel = push_open(strict, name)
     if travel < NEEDED_TRAVEL:
         unit = f"{DRIVE_FORCE_N:.0f} N" if strict.joint(name).type[0] == 2 else f"{DRIVE_TORQUE_NM:.0f} N m"

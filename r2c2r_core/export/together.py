@@ -27,7 +27,7 @@ class Meeting:
     def finding(self) -> Finding:
         """The collision as a finding."""
         first, second = self.joints
-        message = f"meets {second} when both are open (by up to {1000 * self.depth_m:.0f} mm): open one at a time"
+        message = f"collides with {second} when both are open (by up to {1000 * self.depth_m:.0f} mm): open one at a time"
         return finding("together", first, message)
 
     def blocker_of(self, joint: str) -> Blocker | None:

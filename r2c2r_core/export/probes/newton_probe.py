@@ -102,7 +102,7 @@ def _swept(newton: Any, model: Any, moving: list[int]) -> str:
         if not np.isfinite(found).all():
             return f"it diverges with {name} open"
         if abs(found[at] - upper) > _HELD * upper:
-            return f"{name}, let go at {upper:.3g}, is at {found[at]:.3g} after {_STEPS} steps"
+            return f"{name}, released at {upper:.3g}, is at {found[at]:.3g} after {_STEPS} steps"
     return ""
 
 

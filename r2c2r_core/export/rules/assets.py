@@ -62,7 +62,7 @@ def _paths(name: str, references: Iterable[str], files: BundleFiles, meshes: Col
         if not is_inside(path) or files.path(path) is None:
             yield finding("asset-path", name, f"reads '{reference}'")
         elif not (files.folder / path).is_file() and str(PurePosixPath(path).with_suffix(".obj")) not in meshes:
-            yield finding("asset-missing", name, f"reads '{reference}', which is not there")
+            yield finding("asset-missing", name, f"reads '{reference}', which does not exist")
 
 
 def _same_joints(name: str, path: Path, urdf: Urdf, objects: list[dict[str, Any]]) -> Iterator[Finding]:

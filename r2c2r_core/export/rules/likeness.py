@@ -78,7 +78,7 @@ def _unsure_hinges(objects: list[dict[str, Any]]) -> Iterator[Finding]:
     }
     if unsure:
         yield finding(
-            "hinge-unsure", ", ".join(sorted(unsure)), "no handle tells the side of its hinge; set it, for several at once"
+            "hinge-unsure", ", ".join(sorted(unsure)), "no handle shows its hinge side; set it, also for several doors at once"
         )
 
 
@@ -87,7 +87,7 @@ def _cut_short(name: str, joint: dict[str, Any]) -> Iterator[Finding]:
     if uncut is not None and joint["upper"] < _LEAST_TRAVEL * uncut:
         share = 100 * joint["upper"] / uncut
         yield finding(
-            "travel-cut", name, f"{joint['name']} opens {share:.0f} % of what its kind does before something is in its way"
+            "travel-cut", name, f"{joint['name']} opens {share:.0f} % of the usual range of its kind before something blocks it"
         )
 
 
@@ -97,4 +97,4 @@ def _handles(joint: dict[str, Any]) -> Iterator[Finding]:
         free = Room(before_m=room["before_m"], beside_m=tuple(room["beside_m"]), depth_m=tuple(room["depth_m"]))
         reason = out_of_reach(handle["kind"], handle["size_m"][1], free)
         if reason is not None:
-            yield finding("handle-reach", handle["name"], f"a gripper 9 cm wide cannot take it: {reason}")
+            yield finding("handle-reach", handle["name"], f"a gripper 9 cm wide cannot grasp it: {reason}")

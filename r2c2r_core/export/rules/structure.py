@@ -38,7 +38,7 @@ def _names(urdf: Urdf) -> Iterator[Finding]:
 def _tree(urdf: Urdf) -> Iterator[Finding]:
     links = {link.name for link in urdf.links}
     if urdf.roots != (WORLD,):
-        found = ", ".join(urdf.roots) or "none (the joints go round)"
+        found = ", ".join(urdf.roots) or "none (the joints form a cycle)"
         yield finding("root", urdf.name, f"root links are {found}; expected one, '{WORLD}'")
     parents = Counter(joint.child for joint in urdf.joints)
     for joint in urdf.joints:
@@ -49,4 +49,4 @@ def _tree(urdf: Urdf) -> Iterator[Finding]:
             yield finding("tree", joint.name, f"'{joint.child}' is the child of {parents[joint.child]} joints")
     unreached = links - set(urdf.world_poses())
     if unreached:
-        yield finding("tree", sorted(unreached)[0], f"{len(unreached)} links hang on no root")
+        yield finding("tree", sorted(unreached)[0], f"{len(unreached)} links are not connected to a root")

@@ -70,9 +70,9 @@ def check_glb(path: Path) -> Iterator[str]:
         return
     version, length = struct.unpack("<II", content[4:12])
     if version != 2:
-        yield f"is glTF {version}, 2 is expected"
+        yield f"is glTF {version}, expected 2"
     if length != len(content):
-        yield f"holds {len(content)} bytes, {length} are expected"
+        yield f"holds {len(content)} bytes, expected {length}"
 
 
 class _Gltf:

@@ -50,7 +50,7 @@ FORMATS: tuple[Format, ...] = (
         write=write_urdf,
         loses=(
             "free-standing things are fixed where they stand (loaders disagree on floating joints)",
-            "no floor, no contact exclusions, no surface friction and no joint armature (URDF has no words for them)",
+            "no floor, no contact exclusions, no surface friction and no joint armature (URDF cannot express them)",
             "SAPIEN's loader drops the friction, effort and velocity of joints: set them as README.txt says",
             "where each number comes from: see manifest.json",
         ),
@@ -73,8 +73,8 @@ FORMATS: tuple[Format, ...] = (
         reads_meshes=True,
         write=write_usd,
         loses=(
-            "fixtures without a joint are static: their mass is written, engines do not use it",
-            "dry friction and largest velocity of joints are in PhysX's words; other engines see damping and effort only",
+            "fixtures without a joint are static: their mass is written, but engines ignore it",
+            "dry friction and maximum velocity of joints are PhysX attributes; other engines read damping and effort only",
             "where each number comes from: see manifest.json",
         ),
         others=("scene.usdz",),
@@ -87,9 +87,7 @@ FORMATS: tuple[Format, ...] = (
         reads_meshes=False,
         write=write_glb,
         check=check_glb,
-        loses=(
-            "masses, colliders and how joints resist: it is the scene to look at; joints are clips that open and close them",
-        ),
+        loses=("masses, colliders and joint dynamics: it is for viewing; joints are animation clips that open and close them",),
     ),
     Format(
         name="sdf",
@@ -98,7 +96,7 @@ FORMATS: tuple[Format, ...] = (
         reads_meshes=True,
         write=write_sdf,
         required=False,
-        loses=("no joint armature, no contact exclusions, no handles and labels (SDF has no words for them)",),
+        loses=("no joint armature, no contact exclusions, no handles and labels (SDF cannot express them)",),
     ),
     Format(
         name="ros",

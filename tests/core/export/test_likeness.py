@@ -76,14 +76,14 @@ def test_a_place_that_is_unsure_is_a_finding_with_how_far_another_one_is_turned(
 
 def test_likeness_is_judged_by_its_own_rules_and_names_each_object_once() -> None:
     about = [
-        finding("hinge-unsure", "cabinet_1, cabinet_2", "no handle tells"),
+        finding("hinge-unsure", "cabinet_1, cabinet_2", "no handle shows"),
         finding("travel", "drawer_1_slide", "a joint jams"),
     ]
     assert judge_likeness(about[1:]).state == "passed"
     assert judge_likeness(about).state == "doubtful"
     worse = judge_likeness([*about, finding("same-thing", "cabinet_2, mug_1", "one thing")])
     assert worse.state == "failed"
-    assert worse.doubts == (("cabinet_2", "one thing"), ("mug_1", "one thing"), ("cabinet_1", "no handle tells"))
+    assert worse.doubts == (("cabinet_2", "one thing"), ("mug_1", "one thing"), ("cabinet_1", "no handle shows"))
 
 
 def test_what_the_clearance_takes_from_a_joint_is_known() -> None:

@@ -22,7 +22,7 @@ GIVEN = {name: os.environ.get(own.variable, "") for name, own in APART.items()}
 
 def own_environment(name: str) -> pytest.MarkDecorator:
     given = Path(GIVEN[name]).is_file()
-    return pytest.mark.skipif(not given, reason=f"no environment of {name}: set {APART[name].variable} to its python")
+    return pytest.mark.skipif(not given, reason=f"no Python environment of {name}: set {APART[name].variable} to its python")
 
 
 @own_environment("Drake")
@@ -30,7 +30,7 @@ def test_the_good_bundle_loads_in_drake_and_an_edited_world_fails(good_folder: P
     monkeypatch.setenv(APART["Drake"].variable, GIVEN["Drake"])
     found = verdicts(good_folder)["Drake"]
     assert found.state == "passed", found
-    assert found.detail.endswith("it keeps no joint friction or effort")
+    assert found.detail.endswith("it does not keep joint friction or effort")
     scene = good_folder / "scene.sdf"
     scene.write_text(scene.read_text().replace("<upper>0.42</upper>", "<upper>0.9</upper>"))
     assert "drawer_1_slide has limits 0 .. 0.9, not 0 .. 0.42" in verdicts(good_folder)["Drake"].detail
@@ -55,7 +55,7 @@ def test_newton_holds_every_value_but_velocity_and_no_body_for_what_stands_fast(
     found = verdicts(good_folder)["Newton"]
     assert found.state == "passed", found
     assert "4 joints, 8 links" in found.detail
-    assert found.detail.endswith("it keeps no joint velocity")
+    assert found.detail.endswith("it does not keep joint velocity")
 
 
 @own_environment("NVIDIA asset validator")
@@ -81,7 +81,7 @@ def test_the_good_bundle_loads_in_yourdfpy_mujoco_pybullet_and_usd(good_folder: 
     for name in ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet", "USD"):
         assert found[name].state == "passed", found[name]
         assert "4 joints, 9 links" in found[name].detail
-    assert found["MuJoCo (MJCF)"].detail.endswith("it keeps no joint velocity")
+    assert found["MuJoCo (MJCF)"].detail.endswith("it does not keep joint velocity")
 
 
 def test_usd_is_loaded_in_a_process_of_its_own(good_folder: Path) -> None:

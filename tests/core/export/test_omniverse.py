@@ -25,4 +25,4 @@ def test_a_warning_of_another_rule_passes_and_is_shown() -> None:
 
 
 def test_nothing_said_is_said() -> None:
-    assert validated("NVIDIA", said()).detail == "validator 1: nothing to complain about"
+    assert validated("NVIDIA", said()).detail == "validator 1: no issues"

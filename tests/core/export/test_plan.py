@@ -112,7 +112,7 @@ def test_a_scene_without_objects_or_with_a_loop_is_refused_by_name() -> None:
         plan_bundle(scene_of())
     item = cabinet("c")
     loop = replace(item, joints=(replace(item.joints[0], parent="c_door"),))
-    with pytest.raises(ExportFailed, match="c: its joints form no tree"):
+    with pytest.raises(ExportFailed, match="c: its joints do not form a tree"):
         plan_bundle(scene_of(loop))
 
 

@@ -59,7 +59,7 @@ URDF_EDITS: dict[str, tuple[Callable[[ET.Element], None], str]] = {
     "type": (lambda r: named(r, "joint", JOINT).set("type", "revolute"), f"{JOINT} is revolute, not prismatic"),
     "axis": (urdf_joint("axis", xyz="0 -0.8 0.6"), f"{JOINT} has the axis (0, -0.8, 0.6), not (0, -1, 0)"),
     "origin": (urdf_joint("origin", xyz="0 0.001 0"), f"{JOINT} lies at (0, 0.001, 0.67) m, not (0, 0, 0.67)"),
-    "turn": (urdf_joint("origin", rpy="0 0.01 0"), f"{LINK} is turned otherwise"),
+    "turn": (urdf_joint("origin", rpy="0 0.01 0"), f"{LINK} has another orientation"),
     "limits": (urdf_joint("limit", upper="0.43"), f"{JOINT} has limits 0 .. 0.43, not 0 .. 0.42"),
     "damping": (urdf_joint("dynamics", damping="4"), f"{JOINT} has damping 4, not 5"),
     "friction": (urdf_joint("dynamics", friction="0"), f"{JOINT} has friction 0, not 1"),
