@@ -129,14 +129,14 @@ def loose_ends(spread: Spread, front: FrontPanel | None) -> tuple[str, ...]:
         ("its size", f"{100 * params.sigmas * spread.scale:.0f} %"),
     )
     return tuple(
-        f"{what} is hardly held by what the scan shows: it may be off by {how_much}"
+        f"{what} is poorly constrained by the scan: it may be off by {how_much}"
         for (what, how_much), loose in zip(texts, params.sigmas * figures > limits, strict=True)
         if loose
     )
 
 
 def _turn_in_words(axis_world: Vector3) -> str:
-    return "its turn about the vertical" if abs(axis_world[2]) > 0.8 else "its lean"
+    return "its yaw" if abs(axis_world[2]) > 0.8 else "its tilt"
 
 
 def _shift_in_words(axis_world: Vector3, front: FrontPanel | None) -> str:

@@ -88,7 +88,7 @@ def _doubts(best: Trial, rival: Trial | None, other_size: Trial | None, spread: 
     if best.judgement.iou < tuned(Params).trusted_iou:
         lines.append(f"the placed mesh covers the masks poorly (IoU {best.judgement.iou:.2f})")
     if len(case.observation.views) < 2:
-        lines.append("one frame alone shows the object: nothing confirms its place and size")
+        lines.append("only one frame shows the object: its position and size are unconfirmed")
     return (*lines, *loose_ends(spread, case.track.front))
 
 
@@ -97,14 +97,14 @@ def _warnings(pose: Similarity3, rms_m: float, condition: float, case: Case) -> 
     lines = []
     allowed = max(0.015, 0.03 * case.observation.size_m)
     if np.isnan(rms_m):
-        lines.append("the scan has no depth inside its masks: outlines alone placed it")
+        lines.append("the scan has no depth inside its masks: it was placed by its outlines only")
     elif rms_m > allowed:
-        lines.append(f"scan and mesh are {rms_m * 1000:.0f} mm apart (rms; {allowed * 1000:.0f} mm expected at most)")
+        lines.append(f"scan and mesh are {rms_m * 1000:.0f} mm apart (rms; {allowed * 1000:.0f} mm allowed)")
     if condition > 30000:
-        lines.append("the visible surface is flat or round: where it could slide or turn, outlines alone hold it")
+        lines.append("the visible surface is flat or round: only outlines constrain how it could slide or turn")
     if len(case.observation.views) == 2:
         lines.append("only 2 frames show the object")
     lean = lean_deg(pose, case)
     if lean > 0:
-        lines.append(f"it leans by {lean:.0f} degrees from any way it could stand")
+        lines.append(f"it is tilted by {lean:.0f} degrees from every stable pose")
     return tuple(lines)

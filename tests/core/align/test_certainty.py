@@ -97,8 +97,8 @@ def test_the_yaw_of_a_bottle_counts_for_nothing(bench: Any) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"turn_deg": 1.0}, "its turn about the vertical is hardly held by what the scan shows: it may be off by 2.0 degrees"),
-        ({"turn_deg": 1.0, "turn_axis_world": np.array([1.0, 0.0, 0.0])}, "its lean is .* 2.0 degrees"),
+        ({"turn_deg": 1.0}, "its yaw is poorly constrained by the scan: it may be off by 2.0 degrees"),
+        ({"turn_deg": 1.0, "turn_axis_world": np.array([1.0, 0.0, 0.0])}, "its tilt is .* 2.0 degrees"),
         ({"shift_m": 0.02, "shift_axis_world": np.array([0.0, 0.0, 1.0])}, "its height above the floor is .* 40 mm"),
         ({"scale": 0.03}, "its size is .* 6 %"),
     ],
@@ -113,6 +113,6 @@ def test_a_front_tells_along_the_wall_from_into_it() -> None:
     facing_x = Rigid3(rotation_about_z(np.pi / 2), np.zeros(3))  # its width runs along world y
     front = FrontPanel(world_from_front=facing_x, width_m=0.6, height_m=0.7, handle=None, confidence=1.0)
     (slides,) = loose_ends(replace(SURE, shift_m=0.02, shift_axis_world=np.array([0.0, 1.0, 0.0])), front)
-    assert slides == "its place along the wall is hardly held by what the scan shows: it may be off by 40 mm"
+    assert slides == "its place along the wall is poorly constrained by the scan: it may be off by 40 mm"
     (deep,) = loose_ends(replace(SURE, shift_m=0.02, shift_axis_world=np.array([1.0, 0.0, 0.0])), front)
     assert "its distance from the wall" in deep

@@ -151,7 +151,7 @@ def test_one_frame_alone_is_never_trusted(bench: Any) -> None:
     alone = replace(track, masks={3: track.masks[3]})
     placement = place_mesh(capture, alone, asset, "sift", LIGHT)
     assert placement.unsure
-    assert any("one frame alone" in w for w in placement.warnings)
+    assert any("only one frame" in w for w in placement.warnings)
 
 
 def test_the_same_seed_gives_the_same_placement(bench: Any) -> None:
