@@ -34,19 +34,19 @@ from r2c2r_core.tuning import Changes
 class AlignConfig:
     """Sizes of the pose search. Pixel sizes are of our own small views, not of a camera."""
 
-    views: int = setting(9, "photos compared with", ge=1, le=200)
-    view_px: int = setting(128, "side of the compared views, in px", ge=16, le=1024)
-    match_photos: int = setting(6, "photos that keypoints are matched in", ge=1, le=200)
-    match_views: int = setting(100, "rendered views that keypoints are matched in (the authors': 200)", ge=1, le=1000)
-    match_px: int = setting(200, "side of those views, in px", ge=16, le=1024)
-    points: int = setting(1600, "observed points kept", ge=10, le=1_000_000)
-    surface_points: int = setting(8000, "samples of the mesh's surface", ge=10, le=1_000_000)
-    face_limit: int = setting(6000, "triangles that a candidate is simplified to", ge=100, le=1_000_000)
-    settled: int = setting(36, "hypotheses rendered and compared", ge=1, le=10_000)
-    refined: int = setting(8, "hypotheses of them that are refined", ge=1, le=1000)
-    least_iou: float = setting(0.2, "overlap with the masks below which no pose is trustworthy", ge=0, le=1)
+    views: int = setting(9, "number of photos that a pose is compared with", ge=1, le=200)
+    view_px: int = setting(128, "side of the rendered views that are compared, in px", ge=16, le=1024)
+    match_photos: int = setting(6, "number of photos in which keypoints are matched", ge=1, le=200)
+    match_views: int = setting(100, "number of rendered views for matching keypoints (200 in the paper)", ge=1, le=1000)
+    match_px: int = setting(200, "side of the views for keypoint matching, in px", ge=16, le=1024)
+    points: int = setting(1600, "maximum number of observed points", ge=10, le=1_000_000)
+    surface_points: int = setting(8000, "number of points sampled on the mesh", ge=10, le=1_000_000)
+    face_limit: int = setting(6000, "maximum number of triangles of a simplified candidate", ge=100, le=1_000_000)
+    settled: int = setting(36, "number of pose hypotheses rendered and compared", ge=1, le=10_000)
+    refined: int = setting(8, "number of the best hypotheses that are refined", ge=1, le=1000)
+    least_iou: float = setting(0.2, "minimum IoU with the masks of a trustworthy pose", ge=0, le=1)
     weights: str = setting(
-        "", "of a learned matcher: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id", max_length=4000
+        "", "learned matcher's weights, folder or hub id; empty: R2C2R_<NAME>_WEIGHTS, else its default", max_length=4000
     )
     params: Changes = tuned_numbers("align")
 
@@ -83,7 +83,7 @@ def place_mesh(
 ) -> Placement:
     """Placement of a candidate with its evidence; raises PlacementFailed."""
     rng = np.random.default_rng(seed)
-    progress.at(0.0, f"{asset.object_name}: gathering views")
+    progress.at(0.0, f"{asset.object_name}: selecting views")
     observation = observe(capture, track, view_count=config.views, size_px=config.view_px, point_count=config.points)
     _require_evidence(observation, track)
     shape = prepare_shape(asset.mesh, point_count=config.surface_points, face_limit=config.face_limit, rng=rng)
@@ -124,7 +124,7 @@ def _require_cover(best: Trial, asset: MeshAsset, config: AlignConfig) -> None:
     if best.judgement.iou < config.least_iou:
         raise PlacementFailed(
             f"{asset.object_name}: the best pose of {asset.candidate_id} covers the mask with IoU {best.judgement.iou:.2f}, "
-            f"{config.least_iou:.2f} needed",
+            f"expected at least {config.least_iou:.2f}",
             hint="choose another candidate, or add a click on a frame that shows more of the object",
         )
 
@@ -141,8 +141,8 @@ def _require_evidence(observation: Observation, track: MaskTrack) -> None:
         raise PlacementFailed(f"{track.name}: no frame shows enough of the object", hint="add a click on a nearer frame")
     if len(observation.points_world) < 30 and not len(known_corners(track)):
         raise PlacementFailed(
-            f"{track.name}: {len(observation.points_world)} depth points inside the masks, 30 needed",
-            hint="film it from nearer, or click frames where its depth is measured",
+            f"{track.name}: {len(observation.points_world)} depth points inside the masks, expected at least 30",
+            hint="film it from nearer, or click frames in which it has depth",
         )
 
 

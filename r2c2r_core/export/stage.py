@@ -63,14 +63,12 @@ T = TypeVar("T")
 class ExportConfig:
     """How a bundle is written."""
 
-    texture_max_px: int = setting(
-        2048, "longest side of a texture, in px: WebGL 2 promises no more everywhere", ge=16, le=16384
-    )
-    keep_folder: bool = setting(False, "whether the unpacked bundle stays beside the zip, under its name without .zip")
+    texture_max_px: int = setting(2048, "longest side of a texture, in px: WebGL 2 guarantees no more", ge=16, le=16384)
+    keep_folder: bool = setting(False, "whether to keep the unpacked bundle beside the zip, under its name without .zip")
     pictures: bool = setting(True, "whether report.html shows a photo beside the model for each object")
-    gripper: bool = setting(True, "whether a gripper tries every joint and free thing, and report.html shows pictures of it")
+    gripper: bool = setting(True, "whether a gripper tries every joint and free object; report.html shows pictures of it")
     arm: bool = setting(
-        False, "whether a Franka Panda tries every joint within its reach, and report.html shows where it stands (extra arm)"
+        False, "whether a Franka Panda tries every joint within reach; report.html shows its base positions (extra arm)"
     )
 
 
@@ -103,7 +101,7 @@ def write_bundle(
         gripped = begin_gripping(folder, pool or Pool(1), progress.part(0.7, 0.9)) if config.gripper else None
         write_formats(plan, folder, [entry for entry in formats() if entry not in tried], progress=progress.part(0.05, 0.1))
         fits, seen, pictures = dict[str, ScanFit](), dict[str, Seen](), dict[str, str]()
-        with apart("export", "the fit to the scan", {}):
+        with apart("export", "measuring the fit to the scan", {}):
             looks = looks_of(reconstruction.capture, plan)
             seen = seen_sides(reconstruction, plan, looks)
             fits = scan_fits(reconstruction, plan, looks, progress=progress.part(0.1, 0.2))
@@ -194,13 +192,13 @@ def _tried(path: Path, certified: Callable[[Path], T]) -> T:
         unsafe = [found for found in lint(folder) if found.rule in UNSAFE]
         if unsafe:
             raise BundleError(
-                f"{path}: {unsafe[0].message}", hint="no simulator is given a bundle that names files outside itself"
+                f"{path}: {unsafe[0].message}", hint="bundles that refer to files outside themselves are not simulated"
             )
         try:
             return certified(folder / SCENE)
         except ValueError as error:
             why = str(error).partition("\n")[0]
-            raise BundleError(f"{path}: MuJoCo cannot load scene.xml ({why})", hint="r2c2r check says more") from error
+            raise BundleError(f"{path}: MuJoCo cannot load scene.xml ({why})", hint="see r2c2r check") from error
 
 
 def _write_reports(

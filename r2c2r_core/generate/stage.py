@@ -76,15 +76,15 @@ class GenerateConfig:
     """Number of candidates, number of frames, and the rule of choice."""
 
     # the paper samples up to 10; 5 take about 4 s an object on one core
-    count: int = setting(5, "1 to 10 candidates an object", ge=1, le=10)
-    pool_frames: int = setting(20, "frames to choose from, one an interval of the recording (paper, 4.2)", ge=1, le=1000)
-    rule: Rule = setting("medoid", "medoid, or mean (the paper's): how one candidate is chosen (consensus.py)")
+    count: int = setting(5, "number of candidates per object, 1 to 10", ge=1, le=10)
+    pool_frames: int = setting(20, "frames to choose from, one per interval of the recording (paper, 4.2)", ge=1, le=1000)
+    rule: Rule = setting("medoid", "medoid, or mean (as in the paper): how one candidate is chosen (consensus.py)")
     weights: str = setting(
-        "", "of a learned generator: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id", max_length=4000
+        "", "learned generator's weights, folder or hub id; empty: R2C2R_<NAME>_WEIGHTS, else its default", max_length=4000
     )
     url: str = field(
         default_factory=lambda: os.environ.get("R2C2R_GENERATOR_URL", ""),
-        metadata={"description": "address of the remote generator; R2C2R_GENERATOR_URL unless said", "max_length": 4000},
+        metadata={"description": "address of the remote generator; default: R2C2R_GENERATOR_URL", "max_length": 4000},
     )
     params: Changes = tuned_numbers("generate")
 

@@ -25,14 +25,14 @@ Fusion = Literal["none", "depth-mask", "evidence"]
 class SegmentConfig:
     """Settings of segmentation. Lengths are in metres, so that they hold for any camera."""
 
-    cell_m: float = setting(0.0025, "side of the mosaic's cells, in m: about a pixel of a phone at 2 m", ge=0.0005, le=0.1)
+    cell_m: float = setting(0.0025, "cell size of the orthomosaic, in m: about a pixel of a phone at 2 m", ge=0.0005, le=0.1)
     # more add smear, not evidence (real kitchen: 24 and 48 cut alike)
-    mosaic_frames: int = setting(24, "frames that a front's mosaic is made of", ge=1, le=1000)
-    least_area_px: int = setting(60, "visible pixels below which an object does not count as seen", ge=0, le=10**6)
+    mosaic_frames: int = setting(24, "maximum number of frames in a front's orthomosaic", ge=1, le=1000)
+    least_area_px: int = setting(60, "minimum number of visible pixels of an object in a frame", ge=0, le=10**6)
     weights: str = setting(
-        "", "of a learned segmenter: a folder or a hub id; empty takes R2C2R_<NAME>_WEIGHTS, then its usual id", max_length=4000
+        "", "learned segmenter's weights, folder or hub id; empty: R2C2R_<NAME>_WEIGHTS, else its default", max_length=4000
     )
-    fusion: Fusion = setting("evidence", "none, depth-mask (the paper's) or evidence: how depth corrects learned masks")
+    fusion: Fusion = setting("evidence", "none, depth-mask (as in the paper) or evidence: how depth corrects learned masks")
     params: Changes = tuned_numbers("segment")
 
 

@@ -49,12 +49,12 @@ Said = TypeVar("Said")
 class SynthesizeConfig:
     """Settings of this stage."""
 
-    seed: int = setting(0, "seed of what is drawn at random", ge=0, lt=2**31)
-    box: BoxSearch = setting("upright", "upright, or powell (the paper's): how a box is fitted (benchmarks/boxes.json)")
-    surroundings: bool = setting(True, "whether worktops and plinths that the scan shows and nobody clicked are added")
-    fixtures: str = setting(CARCASSES.default, "boards, or scene-synthesizer (its extra), the paper's: what makes carcasses")
+    seed: int = setting(0, "random seed", ge=0, lt=2**31)
+    box: BoxSearch = setting("upright", "upright, or powell (as in the paper): how a box is fitted (benchmarks/boxes.json)")
+    surroundings: bool = setting(True, "whether to add worktops and plinths that are visible in the scan but not clicked")
+    fixtures: str = setting(CARCASSES.default, "boards, or scene-synthesizer (an extra; as in the paper): maker of carcasses")
     outliers: Outliers = setting(
-        "leave-out", "leave-out, or keep where it was measured: what overlaps others by more than errors of measuring explain"
+        "leave-out", "leave-out, or keep as measured: an object that overlaps others beyond measurement error"
     )
     params: Changes = tuned_numbers("synthesize")
 

@@ -32,11 +32,11 @@ class WarpConfig:
     """Settings of this stage."""
 
     front_scale: tuple[float, float] = setting(
-        (0.7, 1.4), "[least, most] stretch of a front in its plane before its mesh is not believed"
+        (0.7, 1.4), "[least, most] stretch of a front in its plane: beyond, its mesh is not used"
     )
     depth_scale: tuple[float, float] = setting((0.2, 5.0), "[least, most] stretch in depth, which is mostly unobserved")
-    method: Literal["axes", "paper"] = setting("axes", "axes, or paper: its corners and affine map (eq. 15-16) as printed")
-    seed: int = setting(0, "seed of what is drawn at random", ge=0, lt=2**31)
+    method: Literal["axes", "paper"] = setting("axes", "axes, or paper: by the paper's corners and affine map (eq. 15-16)")
+    seed: int = setting(0, "random seed", ge=0, lt=2**31)
     params: Changes = tuned_numbers("warp")
 
 
