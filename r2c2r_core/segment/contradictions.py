@@ -121,7 +121,7 @@ def _between(
         yield Contradiction(
             rule="same-thing",
             objects=(first.name, second.name),
-            message=f"{where} are on the same thing: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
+            message=f"{where} are on the same object: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
             mend="delete one, or click off each of them on the other",
         )
     else:
@@ -160,11 +160,11 @@ def _disobeyed(track: MaskTrack, prompt: ObjectPrompt, params: Params) -> Iterat
         if packed is None and (point.label == 0 or point.frame in corrected):
             continue
         if packed is None:
-            said, mend = "is on it, and nothing of it is seen in that frame", "delete it, or click where it has depth"
+            said, mend = "is on it, but it is not visible in that frame", "delete it, or click where it has depth"
         elif point.label == 1 and not _near(unpack_mask(packed), point, params.near_click * packed.width):
-            said, mend = "is on it, and its mask leaves that out", "take it away, or click nearer to its middle"
+            said, mend = "is on it, but outside its mask", "delete the click, or click nearer to its middle"
         elif point.label == 0 and _within(unpack_mask(packed), point):
-            said, mend = "is off it, and its mask takes that in", "click off it in a second place there"
+            said, mend = "is off it, but inside its mask", "add a second click off it there"
         else:
             continue
         yield Contradiction(
@@ -205,10 +205,10 @@ def _unlikely_sizes(track: MaskTrack, category: Category, params: Params) -> Ite
 
 def _size_mend(too_large: bool, category: Category) -> str:
     if too_large and category.kind == "front":
-        return "where it is several, click each as an object of its own; else correct its category"
+        return "if it is several objects, click each separately; else correct its category"
     if too_large:
-        return "click off it where its mask goes too far; else correct its category"
-    return "click on it where its mask stops short; else correct its category"
+        return "click off it where its mask is too large; else correct its category"
+    return "click on it where its mask is too small; else correct its category"
 
 
 def _misplaced(track: MaskTrack, category: Category, walls: Sequence[Wall], params: Params) -> Iterator[Contradiction]:
@@ -228,7 +228,7 @@ def _misplaced(track: MaskTrack, category: Category, walls: Sequence[Wall], para
             rule="in-a-wall",
             objects=(track.name,),
             message=f"{track.name} lies in the plane of a wall, where no '{category.label}' has room behind its front",
-            mend="delete it if it is the bare wall; set its depth if it is let into the wall",
+            mend="delete it if it is the bare wall; set its depth if it is built into the wall",
         )
 
 

@@ -27,7 +27,9 @@ def corrected_track(track: MaskTrack, said: tuple[FrameSaid, ...]) -> MaskTrack:
     painted = {one.frame: _at_size(one.mask, size) for one in said if one.mask is not None}
     masks = {frame: mask for frame, mask in track.masks.items() if frame not in numbers} | painted
     if not masks:
-        raise ObjectNotSeen(f"{track.name}: said to be visible in 0 frames, at least 1 expected", hint="take one back")
+        raise ObjectNotSeen(
+            f"{track.name}: marked as visible in 0 frames, expected at least 1", hint="undo one of the corrections"
+        )
     return replace(
         track,
         masks=dict(sorted(masks.items())),

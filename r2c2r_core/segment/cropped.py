@@ -71,7 +71,7 @@ def cropped(found: Found, crop: Crop, scene: Scene, name: str) -> Found:
     if within.sum() < least:
         raise ObjectNotSeen(
             f"{name}: {within.sum()} of its {len(within)} points lie in its crop box, at least {least} expected",
-            hint="move the box over the thing, or take it away",
+            hint="move the box over the object, or delete the box",
         )
     return FoundCropped(found, thing, crop, scene)
 

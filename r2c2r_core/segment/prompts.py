@@ -56,7 +56,7 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
     if prompt.crop is not None and category_of(prompt.category).kind != "thing":
         raise PromptError(
             f"{prompt.name}: a crop box of a '{prompt.category}' found, of a thing expected",
-            hint="correct its category, or take the box away",
+            hint="correct its category, or delete the box",
         )
     if prompt.front is None and not any(point.label == 1 for point in prompt.points):
         found = f"{len(prompt.points)} clicks off it" if prompt.points else "no clicks"
@@ -68,7 +68,7 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
         if said.frame not in frames:
             raise PromptError(
                 f"{prompt.name}: frame {said.frame} set right found, a frame of {min(frames)}..{max(frames)} expected",
-                hint="leave it out",
+                hint="remove it",
             )
         if said.mask is not None:
             camera = frames[said.frame].rgb_camera

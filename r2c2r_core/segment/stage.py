@@ -21,7 +21,7 @@ SEGMENTERS: Registry[Segmenter] = Registry(
         Backend(
             name="geometric",
             target="r2c2r_core.segment.geometric.session:GeometricSegmenter",
-            summary="no weights: fronts are found on a straightened picture of each furniture run, things in the fused surface",
+            summary="no weights: fronts are found on an orthomosaic of each furniture run, objects in the fused surface",
         ),
         Backend(
             name="sam2",

@@ -71,7 +71,7 @@ def test_a_thing_that_is_too_large_is_said_at_the_click_with_what_mends_it(new_c
         expect(rows(page)).to_have_count(3)
         said = rows(page).last.locator(".contradicted", has_text="m wide")
         expect(said.first).to_contain_text("0.80 m wide")
-        expect(said.first).to_contain_text("click off it where its mask goes too far")
+        expect(said.first).to_contain_text("click off it where its mask is too large")
 
 
 def test_a_size_that_its_category_does_not_have_is_said_at_the_click_with_what_mends_it(
@@ -87,7 +87,7 @@ def test_a_size_that_its_category_does_not_have_is_said_at_the_click_with_what_m
         expect(rows(page)).to_have_count(3)
         said = rows(page).last.locator(".contradicted", has_text="m high")  # beside that it is on the stand-in's one panel
         expect(said).to_contain_text("1.20 m high")
-        expect(said).to_contain_text("click each as an object of its own; else correct its category")
+        expect(said).to_contain_text("click each separately; else correct its category")
         picture(page, "doubt")
         page.get_by_label("Category of drawer_2").fill("refrigerator")
         page.get_by_label("Category of drawer_2").press("Enter")

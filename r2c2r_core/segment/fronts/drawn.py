@@ -64,7 +64,8 @@ def _run_of(grid: PlaneGrid, cell: Cell, scene: Scene, frame_count: int) -> Run:
     tiles = [tile for index in chosen if (tile := make_tile(grid, scene, index)) is not None]
     if not tiles:
         raise ObjectNotSeen(
-            f"the drawn front is seen in 0 of {len(scene.frames)} frames, at least 1 expected", hint="draw it where the scan is"
+            f"the drawn front is seen in 0 of {len(scene.frames)} frames, at least 1 expected",
+            hint="draw it on the scanned surface",
         )
     relief = measure_relief(grid, scene, chosen)
     lines = [scored(tile, grid.cell_m) for tile in tiles]

@@ -60,12 +60,12 @@ def find_object(
         warnings = (
             ()
             if category.kind != "front"
-            else (f"no flat front under the click: treated as a thing of its own ({prompt.category})",)
+            else (f"no flat front under the click: treated as a free-standing object ({prompt.category})",)
         )
         return replace(thing, warnings=warnings)
     clicks = [click for click in prompt.points if click.label == 1]
     raise ObjectNotSeen(
-        f"{prompt.name}: no surface of its own under {len(clicks)} click(s)",
+        f"{prompt.name}: no separate surface under {len(clicks)} click(s)",
         hint=f"click on its middle, or add a second click{_without_depth(prepared.scene, clicks)}",
     )
 
@@ -75,7 +75,7 @@ def _without_depth(scene: Scene, clicks: list[PromptPoint]) -> str:
     for click in clicks:
         if not scene.has_depth(click.frame, click.x, click.y):
             at = f"({click.x:.0f}, {click.y:.0f}) in frame {click.frame}"
-            return f"; the sensor measured no depth at {at} (glass, black gloss), where only what stands out is found"
+            return f"; the sensor measured no depth at {at} (glass, black gloss), where only protruding objects are found"
     return ""
 
 

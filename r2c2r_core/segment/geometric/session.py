@@ -109,7 +109,7 @@ class GeometricSession:
             progress.at(min(0.1 + 0.9 * position / total, 0.99), f"{prompt.name}: seen in {position + 1} frames")
         if not masks:
             raise ObjectNotSeen(
-                f"{prompt.name}: seen in 0 of {total} frames, at least 1 expected", hint="click where it is in plain view"
+                f"{prompt.name}: seen in 0 of {total} frames, at least 1 expected", hint="click where it is clearly visible"
             )
         progress.at(1.0, f"{prompt.name}: {len(masks)} frames")
         return MaskTrack(

@@ -123,7 +123,7 @@ def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int) ->
             masks[frame.index], confidence[frame.index] = pack_mask(mask), trust
     if not masks:
         return found
-    said = (f"the model lost it in {filled} frames: filled in from where the others see it",) if filled else ()
+    said = (f"the model lost it in {filled} frames: filled in from the other frames",) if filled else ()
     return Fused(masks, confidence, found.warnings + said)
 
 

@@ -79,7 +79,7 @@ def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int,
         return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category))
     front = _front(prepared, prompt, masks, body, category)
     if front is None:
-        said = (f"no flat front in its masks: treated as a thing of its own ({prompt.category})",)
+        said = (f"no flat front in its masks: treated as a free-standing object ({prompt.category})",)
         return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category), warnings=said)
     behind = depth_behind(front, prepared.scene.capture.room, category)
     if category.kind == "front":

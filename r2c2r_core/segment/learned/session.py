@@ -127,7 +127,7 @@ class LearnedSession:
         if not masks:
             raise ObjectNotSeen(
                 f"{prompt.name}: {self.name} sees it in 0 of {total} frames, at least 1 expected",
-                hint="click where it is in plain view, or add a second click",
+                hint="click where it is clearly visible, or add a second click",
             )
         progress.at(0.9, f"{prompt.name}: comparing frames")
         body = agreed_body(self.prepared.scene, masks)
@@ -242,7 +242,9 @@ class _Followed:
         """Warnings to the user about the object's masks."""
         if not self._apart:
             return ()
-        return (f"colour and depth masks disagreed in {self._apart} of {len(self._found)} frames: colour was taken there",)
+        return (
+            f"colour and depth masks disagreed in {self._apart} of {len(self._found)} frames: the colour mask was used there",
+        )
 
     def _advance(self) -> bool:
         following = next(self._rest, None)
