@@ -28,7 +28,7 @@ _TOLD: dict[DepthSource, str] = {
     "box": "as its box was measured",
     "wall": "to the wall behind it",
     "worktop": "as the worktop on it",
-    "category": "as its kind usually is",
+    "category": "as is usual for its category",
     "catalogue": "the next size sold",
 }
 

@@ -59,7 +59,7 @@ class Plan:
         """Plan of the weight-free default generator as fallback, with the reason; None if this is already it."""
         if self.generator == GENERATORS.default:
             return None
-        excuse = f"{self.generator} made no mesh, {GENERATORS.default} stands in: {why}"
+        excuse = f"{self.generator} made no mesh, {GENERATORS.default} was used instead: {why}"
         return replace(self, generator=GENERATORS.default, excuse=excuse)
 
 

@@ -68,7 +68,9 @@ def choose_candidate(candidates: Sequence[MeshAsset], *, rejected: Sequence[str]
     allowed = [i for i, c in enumerate(candidates) if c.candidate_id not in rejected]
     if not allowed:
         name = candidates[0].object_name if candidates else "object"
-        raise GenerationFailed(f"{name}: every candidate was rejected", hint="take one back, upload a mesh or change the seed")
+        raise GenerationFailed(
+            f"{name}: every candidate was rejected", hint="accept one again, upload a mesh or change the seed"
+        )
     costs = _costs(candidates, allowed, rule)
     cost = sum(costs.values(), np.zeros(len(candidates)))
     order = sorted(range(len(candidates)), key=lambda i: (i not in allowed, round(float(cost[i]), 12), i))

@@ -77,15 +77,15 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
         known = carved(variation)
         found = find_bars(known.carving, variation.views)
         if found is None:
-            raise GenerationFailed("depth saw too little of it", hint="scan it from nearer")
+            raise GenerationFailed("too little of it has depth", hint="scan it from nearer")
         seen = known.carving.seen
         surface = surface_at(known.carving.grid, found.field, 0.0, seen.floor)
-        said = ("legs that depth lost are the mirror image of those it saw",) if found.mirrored > 0 else ()
+        said = ("unobserved legs mirror the observed ones",) if found.mirrored > 0 else ()
         return thing_model(surface, seen.world_from_local, {"bars": 1.0, "mirrored": found.mirrored}, said)
 
     family = [Hypothesis("carved from free space", hull)]
     if is_legged and support is None:
-        frame = Hypothesis("only what depth saw of it, as thick as a bar", bars)
+        frame = Hypothesis("only its observed part, as thick as a bar", bars)
         closer = _cost(frame, evidence, everything) < _cost(family[0], evidence, everything)
         family.insert(0 if closer else 1, frame)
     if is_round:
@@ -93,7 +93,7 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
     if known.mirrored:
         family.append(Hypothesis("carved, not mirrored", unmirrored))
     if np.ptp(known.carving.seen.points, axis=0).min() > tuned(Params).least_sheets * tuned(CarvedParams).sheet_m:
-        family.append(Hypothesis("as thin as a board where nobody saw its back", sheet))
+        family.append(Hypothesis("as thin as a board where its back was not observed", sheet))
     if support is not None:
         family.insert(0, Hypothesis(ON_LEGS, lambda variation: _on_legs(carved(variation), support)))
     return tuple(family)

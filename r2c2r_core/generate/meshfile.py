@@ -137,7 +137,7 @@ def _check_geometries(label: str, geometries: Sequence[Any]) -> None:
     if count > _MOST_FACES:
         raise OverrideError(f"{label}: {count} triangles, at most {_MOST_FACES} expected", hint="simplify the mesh first")
     if not all(g.faces.min() >= 0 and g.faces.max() < len(g.vertices) for g in geometries):
-        raise OverrideError(f"{label}: triangles between vertices that are not there", hint="export it again")
+        raise OverrideError(f"{label}: triangles refer to missing vertices", hint="export it again")
     if not all(np.isfinite(g.vertices).all() for g in geometries):
         raise OverrideError(f"{label}: vertices that are not numbers", hint="export it again")
 

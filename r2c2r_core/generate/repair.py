@@ -67,7 +67,7 @@ def mended(parts: list[MeshPart], label: str) -> Mended:
     try:
         return _closed_and_coloured(parts, label, vertices, faces)
     except (ValueError, ArithmeticError, LookupError) as error:  # raised by the libraries on unusual shapes
-        raise OverrideError(f"{label}: the mesh cannot be mended ({error})", hint="close it in a mesh editor") from error
+        raise OverrideError(f"{label}: the mesh cannot be repaired ({error})", hint="close it in a mesh editor") from error
 
 
 def _closed_and_coloured(parts: list[MeshPart], label: str, vertices: Points, faces: Faces) -> Mended:
@@ -84,7 +84,7 @@ def _once_each(faces: Faces, notes: list[str]) -> Faces:
     """The faces without duplicates, regardless of winding."""
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     if len(first) < len(faces):
-        notes.append(f"{len(faces) - len(first)} faces given twice were dropped")
+        notes.append(f"{len(faces) - len(first)} duplicate faces were dropped")
     return faces[np.sort(first)]
 
 
@@ -99,7 +99,7 @@ def _bodies(vertices: Points, faces: Faces, notes: list[str]) -> list[Surface]:
     sizes = np.array([np.linalg.norm(np.ptp(piece[0], axis=0)) for piece in pieces])
     kept = [pieces[k] for k in np.argsort(-sizes) if sizes[k] > params.crumb * sizes.max()]
     if len(kept) < len(pieces):
-        notes.append(f"{len(pieces) - len(kept)} crumbs smaller than {100 * params.crumb:.0f} % of it were dropped")
+        notes.append(f"{len(pieces) - len(kept)} fragments smaller than {100 * params.crumb:.0f} % of it were dropped")
     return kept
 
 
@@ -177,13 +177,13 @@ def _solid_union(bodies: list[Surface], notes: list[str]) -> Surface | None:
         solids.append(mended_body)
     inward = sum(volume(*body) < 0 for body in solids)
     if patched:
-        notes.append("it was not closed: small holes were filled and its faces turned the same way")
+        notes.append("it was not closed: small holes were filled and its faces oriented consistently")
     if inward == len(solids):
         notes.append("its faces pointed inwards and were turned round")
     if len(solids) == 1:
         return _outward(solids[0])
     union = unite([_outward(body) for body in solids])
-    notes.append(f"its {len(solids)} bodies were united; what lay inside another is gone")
+    notes.append(f"its {len(solids)} bodies were united; inner surfaces were removed")
     return union if _is_solid(*union) else None
 
 

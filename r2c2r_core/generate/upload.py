@@ -18,7 +18,7 @@ def read_mended(path: Path) -> Mended:
     Raises OverrideError when it cannot be used.
     """
     mesh, notes = mended(read_parts(path), path.name)
-    absent = [f"{name} was not given with it" for name in missing_files(path)]
+    absent = [f"{name} was not uploaded with it" for name in missing_files(path)]
     return Mended(mesh, (*absent, *notes))
 
 

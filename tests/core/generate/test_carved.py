@@ -110,5 +110,5 @@ def test_a_shell_answers_for_what_it_leaves_empty():
     everything = whole_pool(evidence)
     family = {h.assumes: h for h in carved_family(evidence, everything, is_round=False)}
     assert family["carved from free space"].shape(everything).unseen_error_m is None
-    shell = family["as thin as a board where nobody saw its back"].shape(everything)
+    shell = family["as thin as a board where its back was not observed"].shape(everything)
     assert 0.06 < shell.unseen_error_m < 0.2

@@ -59,7 +59,7 @@ def test_what_lies_inside_another_body_is_gone():
     shell = trimesh.creation.box((0.8, 0.6, 0.6))
     shell.invert()
     vertices, faces, notes = repaired(trimesh.util.concatenate([trimesh.creation.box((1.0, 0.8, 0.8)), shell]))
-    assert "what lay inside another is gone" in notes
+    assert "inner surfaces were removed" in notes
     assert filled(vertices, faces) == pytest.approx(0.64, rel=1e-3)
 
 
@@ -79,7 +79,7 @@ def test_crumbs_do_not_count_for_the_size():
     vertices, _, notes = repaired(
         trimesh.creation.box((1.0, 0.5, 0.5)), moved(trimesh.creation.icosphere(radius=0.003, subdivisions=1), 3, 0, 0)
     )
-    assert "1 crumbs" in notes
+    assert "1 fragments" in notes
     extents = oriented_extents(vertices)
     assert extents / extents[0] == pytest.approx([1, 0.5, 0.5], rel=1e-3)
 
@@ -107,7 +107,7 @@ def test_faces_given_twice_and_faces_without_area_do_no_harm():
     faces = np.vstack([box.faces, box.faces[:3], [[0, 0, 1]]])
     vertices, faces, notes = repaired(trimesh.Trimesh(box.vertices, faces, process=False))
     assert len(faces) == 12
-    assert "3 faces given twice" in notes
+    assert "3 duplicate faces" in notes
     extents = oriented_extents(vertices)
     assert extents / extents[0] == pytest.approx([1, 0.6, 0.4], rel=1e-3)
 
@@ -120,7 +120,7 @@ def test_a_size_that_no_arithmetic_carries_is_refused(size):
 
 def test_scattered_specks_are_no_body():
     corners = np.eye(4, 3)[:, None] + 1e-3 * np.random.default_rng(0).random((4, 3, 3))
-    with pytest.raises(OverrideError, match="the mesh cannot be mended"):
+    with pytest.raises(OverrideError, match="the mesh cannot be repaired"):
         repaired(trimesh.Trimesh(corners.reshape(-1, 3), np.arange(12).reshape(4, 3), process=False))
 
 
@@ -167,7 +167,7 @@ def test_files_that_were_not_given_are_named(tmp_path):
     (tmp_path / "chair.mtl").write_text("newmtl wood\nmap_Kd -s 1 1 1 wood grain.png\n".replace("wood grain", "wood_grain"))
     assert missing_files(obj) == ("wood_grain.png",)
     asset = read_upload(obj, "chair_1", "upload0")
-    assert any("wood_grain.png was not given" in warning for warning in asset.warnings)
+    assert any("wood_grain.png was not uploaded" in warning for warning in asset.warnings)
     assert asset.watertight
 
 
