@@ -56,7 +56,7 @@ def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: fro
                 joints.append(joint)
                 continue
             free, blocker = joint.upper, None
-            with spared(f"how far {joint.name} opens was not looked at", warnings):
+            with spared(f"how far {joint.name} opens was not checked", warnings):
                 free, blocker = free_travel(item, joint, index, objects, obstacles, walls)
             if joint.motion is not None:  # filmed to open this far, so the apparent obstacle is a measurement error
                 free = max(free, min(joint.motion.largest, joint.upper))
@@ -65,7 +65,7 @@ def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: fro
                 continue
             joints.append(replace(joint, upper=free, uncut=joint.upper, sources={**joint.sources, "limits": "inferred"}))
             warnings.append(
-                f"{joint.name} opens to {_amount(joint, free)} of {_amount(joint, joint.upper)}: {blocker} is in the way"
+                f"{joint.name} opens to {_amount(joint, free)} of {_amount(joint, joint.upper)}: {blocker} blocks it"
             )
         result.append(replace(item, joints=tuple(joints), warnings=(*item.warnings, *warnings)))
     return result

@@ -161,7 +161,7 @@ def measure_object(
         warnings=tuple(warnings),
     )
     if front is not None and front.slides > tuned(Params).slides and spec.opens == "side" and not track.motions:
-        warnings.append(f"it stands before a panel beside it: taken for a sliding door ({front.slides:.0%})")
+        warnings.append(f"it lies in front of the panel beside it: treated as a sliding door ({front.slides:.0%})")
         measured = replace(measured, spec=category_of("sliding_door"), warnings=tuple(warnings))
         return _corrected(measured, override)
     return _corrected(replace(measured, spec=_at_width(spec, float(measured.dimensions_m[0]), handle)), override)
@@ -232,7 +232,7 @@ def _fits(front: FrontPanel, mesh_size: Vector3, warnings: list[str]) -> bool:
     if (ratio < 0.8).any() or (ratio > 1.25).any():
         warnings.append(
             f"the mesh measures {mesh_size[0]:.2f} x {mesh_size[2]:.2f} m across, its front in the frames "
-            f"{front.width_m:.2f} x {front.height_m:.2f} m: the frames were believed"
+            f"{front.width_m:.2f} x {front.height_m:.2f} m: the frames were used"
         )
     return True
 

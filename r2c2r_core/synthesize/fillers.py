@@ -23,7 +23,7 @@ def leave_fillers(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
     result = []
     for item in objects:
         said: list[str] = []
-        with spared("no filler was looked for beside it", said):
+        with spared("the search for a filler beside it failed", said):
             item = _without_fillers(item, objects)
         result.append(replace(item, warnings=(*item.warnings, *said)))
     return result
@@ -62,4 +62,4 @@ def _without_handle_beside(item: MeasuredObject) -> MeasuredObject:
     """The door without a handle that lies on its filler: the shadow in a corner resembles a vertical bar."""
     if item.handle is None or abs(item.handle.centre[0]) < item.dimensions_m[0] / 2:
         return item
-    return replace(item, handle=None, warnings=(*item.warnings, "what looked like its handle is on the filler: left out"))
+    return replace(item, handle=None, warnings=(*item.warnings, "its supposed handle is on the filler: left out"))

@@ -75,7 +75,7 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
             continue
         asked = overrides.of(item.name).hinge
         said, seen = list[str](), None
-        with spared("its handle was not looked at", said):
+        with spared("its handle was not examined", said):
             seen = _side_seen(item)
         if said:
             seen = _by_category(item, said[0])
@@ -94,7 +94,7 @@ def choose_hinges(objects: Sequence[MeasuredObject], overrides: Overrides) -> di
             undecided.append(item)
     for item in sorted(undecided, key=lambda o: _along(o, o)):
         said = []
-        with spared("what stands beside it told no side", said):
+        with spared("its neighbours were not examined", said):
             hinges[item.name] = _from_neighbours(item, objects, hinges)
         if said:
             hinges[item.name] = _by_category(item, said[0])
@@ -133,7 +133,7 @@ def handle_hinge(item: MeasuredObject) -> Hinge | None:
         reason = f"the handle is on the {'right' if x > 0 else 'left'}"
         right = _of_its_kind(item, side, _worth(float(trust)))
         if right < 0.5:
-            return _by_category(item, f"{reason}, as far as it shows, but nearly all are hinged there", 1 - right)
+            return _by_category(item, f"{reason}, weakly, but nearly all are hinged there", 1 - right)
         return Hinge(side=side, source="inferred", reason=reason, confidence=right, by_handle=True)
     wide = item.dimensions_m[0] > params.flap_wide * item.dimensions_m[2]
     if item.spec.flap and wide and not handle.is_vertical and z < -params.flap_low * half[1]:

@@ -58,7 +58,7 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
     Outliers are not among the layout's objects: they remain as measured and have no effect.
     """
     params, outliers, unseen = tuned(Params), dict[str, str](), list[str]()
-    with spared("what cannot be there was not looked for", unseen):
+    with spared("the search for impossible objects failed", unseen):
         outliers = outliers_of(objects)
     objects = [item for item in objects if item.name not in outliers]
     placed = list(leave_fillers(align_runs(objects, manhattan_yaw_rad)))
@@ -107,7 +107,7 @@ def outliers_of(objects: Sequence[MeasuredObject]) -> dict[str, str]:
         others = {other: depth for pair, depth in clashes.items() if worst in pair for other in pair if other != worst}
         said = ", ".join(f"{other} by {1000 * depth:.0f} mm" for other, depth in others.items())
         mend = "delete it if it is one of them, else click it again"
-        found[worst] = f"where it was measured it overlaps {said}, and they agree without it; {mend}"
+        found[worst] = f"as measured it overlaps {said}, which agree without it; {mend}"
         clashes = {pair: depth for pair, depth in clashes.items() if worst not in pair}
     return found
 
@@ -130,7 +130,7 @@ def settled(item: MeasuredObject, others: Sequence[MeasuredObject], *, floor_fou
     if not item.spec.stands or item.fixed_by_person:
         return item
     said: list[str] = []
-    with spared("it was not put on what carries it", said):
+    with spared("it was not put on its support", said):
         return _on_support(item, others, floor_found=floor_found)
     return replace(item, warnings=(*item.warnings, *said))
 
@@ -159,8 +159,8 @@ def solved_apart(objects: Sequence[MeasuredObject]) -> tuple[list[MeasuredObject
         items = _solved_in_rounds(objects)
     except OBJECT_FAILS as error:  # one bad box must not fail the kitchen
         _log.warning("the layout was not solved", exc_info=error)
-        warnings.append(f"the layout was not solved ({error}): everything stands where it was measured; check sizes and poses")
-    with spared("what overlaps was not looked for", warnings):
+        warnings.append(f"the layout was not solved ({error}): all objects stay as measured; check sizes and poses")
+    with spared("the search for overlaps failed", warnings):
         for first, second, depth in overlapping_pairs(items):
             if depth > params.gap_m:
                 names = f"{items[first].name} and {items[second].name}"

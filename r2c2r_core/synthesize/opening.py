@@ -57,7 +57,7 @@ def open_all(
             continue
         reason, said = f"hung on the {hinge.side} it could not open", list[str]()
         other = Hinge(side=_OTHER[hinge.side], source="inferred", reason=reason, confidence=params.opens)
-        with spared("it was not tried on its other side", said):
+        with spared("a hinge on its other side was not tried", said):
             turned = rebuild(item.name, other)
         if said:
             opened[index] = replace(opened[index], warnings=(*opened[index].warnings, *said))

@@ -273,7 +273,7 @@ def _by_part(name: str, parts: Sequence[str], said: Mapping[str, Said]) -> tuple
     meant = {joint: next((part for part in parts if joint in (part, _joint_name(name, part))), None) for joint in said}
     there = ", ".join(parts) or "none"
     unheard = [
-        f"what was said of a joint {joint} was not used: its joints are {there}" for joint, part in meant.items() if not part
+        f"corrections of a joint {joint} were not used: its joints are {there}" for joint, part in meant.items() if not part
     ]
     return {part: said[joint] for joint, part in meant.items() if part}, tuple(unheard)
 
@@ -342,4 +342,4 @@ def _open_ended(joint: Joint) -> str | None:
         return None
     seen = joint.motion.largest
     amount = f"{seen:.2f} m" if joint.type == "prismatic" else f"{np.degrees(seen):.0f} deg"
-    return f"{joint.name} was seen open to {amount}, which need not be all it opens"
+    return f"{joint.name} was seen open to {amount}, but may open further"

@@ -23,7 +23,7 @@ from r2c2r_core.synthesize.unit_runs import UnitRun
 from r2c2r_core.synthesize.worktops import runs_of, worktop
 from r2c2r_core.tuning import param, tuned
 
-MADE = "made from the scan: nobody clicked it"
+MADE = "made from the scan, without clicks"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +70,7 @@ def surroundings_of(capture: Capture, objects: Sequence[MeasuredObject], said: l
     if not capture.room.floor_found:
         return []
     counters, boards = list[Slab](), list[Slab]()
-    with spared("no worktop or plinth was looked for", said):
+    with spared("the search for worktops and plinths failed", said):
         facets = facets_of(capture.surface)
         for run in runs_of(objects):
             with spared(f"no worktop was made over {_names(run)}", said):

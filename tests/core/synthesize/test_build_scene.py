@@ -174,7 +174,7 @@ def test_limits_of_one_of_several_joints_name_it() -> None:
     assert (left.lower, left.upper, left.sources["limits"]) == (0.0, 1.0, "person")
     assert (right.lower, right.sources["lower"]) == (0.1, "person")
     assert (right.lower, right.upper, right.sources["limits"]) == (0.1, usual[right.name], "default")
-    assert any("what was said of a joint lid was not used: its joints are left_door, right_door" in w for w in item.warnings)
+    assert any("corrections of a joint lid were not used: its joints are left_door, right_door" in w for w in item.warnings)
 
 
 def test_limits_that_name_no_joint_move_none_of_several() -> None:
@@ -199,7 +199,7 @@ def test_a_wall_beside_the_hinge_limits_the_door() -> None:
     joint = scene.objects[0].joints[0]
     assert np.deg2rad(75) < joint.upper < np.deg2rad(100)
     assert joint.sources["limits"] == "inferred"
-    assert any("a wall is in the way" in w for w in scene.objects[0].warnings)
+    assert any("a wall blocks it" in w for w in scene.objects[0].warnings)
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ def test_a_flap_stops_where_its_handle_meets_the_floor_and_opens_wholly_above_a_
 
     rng = np.random.default_rng(0)
     grounded = oven(0.002)
-    assert grounded.warnings == ("a_door_joint opens to 86 deg of 90 deg: the floor is in the way",)
+    assert grounded.warnings == ("a_door_joint opens to 86 deg of 90 deg: the floor blocks it",)
     joint = grounded.joints[0]
     flap = next(link for link in grounded.links if link.name == joint.child)
     touching = motion_at(grounded, joint, joint.upper + SPARE_RAD) @ grounded.world_from_object @ flap.object_from_link
@@ -137,6 +137,6 @@ def test_a_blocked_limit_is_lowered_and_says_so_and_a_persons_stays() -> None:
     opened, _ = open_freely([drawer, before], (), frozenset())
     assert opened.joints[0].upper < drawer.joints[0].upper
     assert opened.joints[0].sources["limits"] == "inferred"
-    assert "block is in the way" in opened.warnings[-1]
+    assert "block blocks it" in opened.warnings[-1]
     kept, _ = open_freely([drawer, before], (), frozenset({drawer.joints[0].name}))
     assert kept.joints[0].upper == drawer.joints[0].upper

@@ -99,4 +99,4 @@ def test_of_what_was_not_measured_the_marks_are_all_that_is_known() -> None:
     np.testing.assert_allclose(np.abs(motion.axis_world), [0, 0, 1], atol=1e-9)
     assert item.joints[0].upper == 2.0  # it was seen to open further than its category does
     assert item.joints[0].sources["limits"] == "at_least"
-    assert any("said of a joint lid was not used" in line for line in item.warnings)
+    assert any("corrections of a joint lid were not used" in line for line in item.warnings)

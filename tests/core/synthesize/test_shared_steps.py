@@ -45,12 +45,12 @@ def test_a_run_that_cannot_be_straightened_leaves_the_others_straight(monkeypatc
 
 def test_an_object_whose_fillers_cannot_be_told_keeps_its_width(monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, fillers, "_excess", lambda item, *_: item.name == "cab_r")
-    assert named(built(*RUN), "no filler was looked for beside it") == {"cab_r"}
+    assert named(built(*RUN), "the search for a filler beside it failed") == {"cab_r"}
 
 
 def test_a_thing_whose_support_cannot_be_told_stays_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, layout, "_carries", lambda _, item: item.name == "mug")
-    assert named(built(*RUN, MUG), "it was not put on what carries it") == {"mug"}
+    assert named(built(*RUN, MUG), "it was not put on its support") == {"mug"}
 
 
 def test_neighbours_that_cannot_be_fitted_stay_as_measured(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,7 +82,7 @@ def test_a_door_whose_side_cannot_be_told_is_hung_as_its_category(step: str, mon
 def test_a_joint_whose_way_cannot_be_told_opens_as_its_category(monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, clearance, "free_travel", lambda item, *_: item.name == "cab_r")
     scene = built(*RUN)
-    assert named(scene, "how far cab_r_door_joint opens was not looked at") == {"cab_r"}
+    assert named(scene, "how far cab_r_door_joint opens was not checked") == {"cab_r"}
 
 
 def test_boxes_that_cannot_be_made_are_in_nobodys_way(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,13 +105,13 @@ def test_a_door_that_cannot_be_hung_otherwise_stays_as_it_is(monkeypatch: pytest
     monkeypatch.setattr(stage, "_fixture", built_once)
     scene = built(Unit("bare", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7)), ALONE)
     assert turned == ["bare"]
-    assert named(scene, "it was not tried on its other side") == {"bare"}
+    assert named(scene, "a hinge on its other side was not tried") == {"bare"}
 
 
 @pytest.mark.parametrize(
     ("step", "said"),
     [
-        ("facets_of", "no worktop or plinth was looked for"),
+        ("facets_of", "the search for worktops and plinths failed"),
         ("worktop", "no worktop was made over cab_l, cab_r"),
         ("plinths", "no plinth was made below cab_l, cab_r"),
     ],
