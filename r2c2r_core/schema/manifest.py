@@ -86,7 +86,9 @@ class ManifestRange(Document):
     low: float = Field(description="the least, in the number's unit")
     high: float = Field(description="the most")
     sigma: float | None = Field(description="standard deviation of a normal distribution; null of another")
-    source: Literal["measured", "sourced", "default"] = Field(description="its spread was measured, is published, or a choice")
+    source: Literal["measured", "sourced", "default"] = Field(
+        description="whether its spread was measured, published or chosen"
+    )
     why: str = Field(description="by what")
 
 
@@ -176,7 +178,7 @@ class ManifestCandidate(Document):
     id: str = Field(description="the candidate's id")
     generator: str = Field(description="the backend that made it")
     seed: int = Field(description="the seed it was drawn with")
-    assumes: str = Field(description="what it takes for true of what nobody saw; empty: a sample of the generator's own")
+    assumes: str = Field(description="assumption about its unobserved part; empty: a sample of a generator")
     metrics: dict[str, float | None] = Field(description="what was measured of it, by name")
 
 
@@ -191,8 +193,8 @@ class ManifestChoice(Document):
 class ManifestSpread(Document):
     """By how much a pose may be off: standard deviations."""
 
-    turn_deg: float | None = Field(description="deg, about the axis held least")
-    shift_m: float | None = Field(description="m, along the direction held least")
+    turn_deg: float | None = Field(description="deg, about the least constrained axis")
+    shift_m: float | None = Field(description="m, along the least constrained direction")
     scale: float | None = Field(description="share of the size")
 
 
@@ -264,17 +266,17 @@ class ManifestObject(Document):
         description="where what its fronts close comes from: measured, seen behind an open front; default, its category's",
     )
     layout_move_m: float | None = Field(description="m by which the layout moved it")
-    mask: ManifestMask | None = Field(description="null for what was made from the scan without clicks")
+    mask: ManifestMask | None = Field(description="null for parts made from the scan without clicks")
     candidates: list[ManifestCandidate] = Field(description="meshes that were proposed")
-    chosen: ManifestChoice | None = Field(description="null for what was made from the scan without clicks")
-    placement: ManifestPlacement | None = Field(description="null for what was made from the scan without clicks")
+    chosen: ManifestChoice | None = Field(description="null for parts made from the scan without clicks")
+    placement: ManifestPlacement | None = Field(description="null for parts made from the scan without clicks")
     warp: ManifestWarp = Field(description="how the mesh was fitted")
     scan_fit: ManifestScanFit | None = Field(description="the mesh beside the scan; null where it was not seen")
     seen: ManifestSeen | None = Field(default=None, description="what was seen of it; null where that is not known")
     meshes: ManifestMeshes = Field(description="its files")
     mass_kg: float = Field(gt=0, description="kg of all its links")
     randomize: ManifestObjectRanges | None = Field(default=None, description="how far its numbers may be varied")
-    warnings: list[str] = Field(description="what every stage said about it")
+    warnings: list[str] = Field(description="warnings of all stages about it")
 
 
 class ManifestContradiction(Document):
@@ -300,7 +302,7 @@ class Manifest(Document):
 
     schema_: Version = Field(alias="schema", description="1, the current format")
     tool_version: str = Field(description="the version of r2c2r that wrote it")
-    created: str | None = Field(description="ISO 8601; null where nobody gave a time, so that equal inputs give equal bytes")
+    created: str | None = Field(description="ISO 8601; null if no time was given, so that equal inputs give equal bytes")
     capture: ManifestCapture = Field(description="the recording")
     world_from_capture: _Pose = Field(description="4x4: the levelled world from the recording's own")
     objects: list[ManifestObject] = Field(description="what the scene holds")

@@ -69,7 +69,7 @@ JOINTS_SAID = f"a table of joints, each by its name or its part's, with {LIMITS_
 STATES_SAID = "a table of joints as under joints, each with the frames in which a person marked how far it stands open"
 HINGE_SAID = "left, right, top or bottom, as seen by a person facing the front; of a sliding door: where it slides to"
 BUILT_AS_SAID = "a category of the table, whose body and joints it takes, whatever it is called"
-LEFT_OUT_SAID = "true leaves out a worktop or plinth that was made from the scan and nobody clicked"
+LEFT_OUT_SAID = "true leaves out a worktop or plinth that was made from the scan without clicks"
 COLOUR_SAID = "[red, green, blue] from 0 to 1, of a worktop or plinth that was made from the scan"
 BATCHES_SAID = f"0 to {MOST_BATCHES}: how often further candidates were asked for"
 
