@@ -64,7 +64,7 @@ def test_where_a_generator_fails_the_weight_free_one_stands_in_and_every_candida
         assert found["good_1"].value.chosen.warnings == ()
         for asset in found["bad_1"].value.candidates:
             assert asset.generator == "completion"
-            assert "remote made no mesh, completion stands in" in asset.warnings[0]
+            assert "remote made no mesh, completion was used instead" in asset.warnings[0]
             assert "CUDA out of memory" in asset.warnings[0]
 
         # the failure is not kept: the next run asks the server for that object again, and only for that one
