@@ -6,13 +6,13 @@ from pydantic import BaseModel, ConfigDict
 
 
 class Shape(BaseModel):
-    """Unknown fields are a mistake of the sender, not a wish."""
+    """Base class of the API schemas; unknown fields are rejected, as they are mistakes of the sender."""
 
     model_config = ConfigDict(extra="forbid", json_schema_serialization_defaults_required=True)
 
 
 class ErrorBody(Shape):
-    """The one shape of an error; `current` is what is stored now when the kind is `conflict`."""
+    """Body of every error response; `current` is the stored state when the kind is `conflict`."""
 
     kind: str
     message: str

@@ -1,4 +1,4 @@
-"""Finished bundles and the proof in them."""
+"""Finished bundles and their certificates."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ class ObjectAsset(Shape):
 
 
 class RobotGrip(Shape):
-    """How a gripper or an arm did at one joint or thing."""
+    """Result of a gripper or an arm at one joint or free-standing object."""
 
     kind: str
     name: str
@@ -39,11 +39,11 @@ class RobotGrip(Shape):
     grip_n: float | None
     opened: float | None  # 0..1 of the travel
     why: str
-    picture: str | None  # address of a sheet of moments
+    picture: str | None  # address of a sheet of snapshots
 
 
 class StandingPlace(Shape):
-    """Where an arm stands, and for which joints."""
+    """Base position of an arm, and the joints that it operates from there."""
 
     x_m: float
     y_m: float
@@ -63,14 +63,14 @@ class RobotTrial(Shape):
 
 
 class SimulatorLines(Shape):
-    """How a bundle is taken into one simulator."""
+    """Loading code of a bundle for one simulator."""
 
     simulator: str
     install: str
     language: str
     code: str
     note: str
-    loader: str | None  # of the certificate: it loads the same file
+    loader: str | None  # of the certificate, which loads the same file
 
 
 class BundleInside(Shape):
@@ -83,22 +83,22 @@ class BundleInside(Shape):
 
 
 class BundleChange(Shape):
-    """One difference between two bundles; an empty object is the whole."""
+    """One difference between two bundles; an empty `object` refers to the whole bundle."""
 
     object: str
     text: str
 
 
 class BundleCheck(Shape):
-    """A bundle looked at again, now."""
+    """Result of a new check of a stored bundle."""
 
     version: int
-    intact: bool  # its bytes are those that were certified
+    intact: bool  # its bytes are unchanged since it was certified
     findings: list["Finding"]
 
 
 class Finding(Shape):
-    """One thing the linter or the simulation has to say."""
+    """One finding of the linter or the simulation."""
 
     rule: str
     severity: str
@@ -112,7 +112,7 @@ class LoaderVerdict(Shape):
     loader: str
     state: str
     detail: str
-    steps_per_s: list[list[float]] = Field(default_factory=list)  # pairs: worlds at once, and steps of all in a second
+    steps_per_s: list[list[float]] = Field(default_factory=list)  # pairs: number of parallel worlds, total steps per second
 
 
 class BlockerVerdict(Shape):
@@ -129,20 +129,20 @@ class JointVerdict(Shape):
     joint: str
     deepest_penetration_m: float
     travel_reached: float
-    cavity_open: float | None = None  # share of the space it opens that is free
+    cavity_open: float | None = None  # fraction of the space it opens that no collider fills
     blocked_by: tuple[BlockerVerdict, ...] = ()
 
 
 class ThingVerdict(Shape):
-    """One free-standing thing, left alone."""
+    """Rest test of one free-standing object."""
 
     name: str
     drift_m: float | None
-    opening_free: float | None = None  # share of its hollow that no collider fills
+    opening_free: float | None = None  # fraction of its cavity that no collider fills
 
 
 class Doubt(Shape):
-    """An object that may not be what was filmed, and why."""
+    """An object that may differ from the filmed one, and the reason."""
 
     object: str
     why: str
@@ -150,24 +150,24 @@ class Doubt(Shape):
     @model_validator(mode="before")
     @classmethod
     def from_pair(cls, stored: Any) -> Any:
-        """Rows of November 2026 hold a pair."""
+        """Convert the pairs stored in rows of November 2026."""
         return dict(zip(("object", "why"), stored, strict=True)) if isinstance(stored, list) else stored
 
 
 class Likeness(Shape):
-    """Whether the scene can be what was filmed: passed, doubtful or failed."""
+    """Plausibility of the scene as a model of the filmed one: passed, doubtful or failed."""
 
     state: str
     doubts: list[Doubt]
 
 
 class Certificate(Shape):
-    """The proof in the newest bundle."""
+    """The certificate in the newest bundle."""
 
     version: int
     current: bool  # nothing was changed since
     passed: bool
-    likeness: Likeness | None = None  # of a bundle made before it was judged: null
+    likeness: Likeness | None = None  # null in bundles older than this check
     findings: list[Finding]
     loaders: list[LoaderVerdict]
     joints: list[JointVerdict]

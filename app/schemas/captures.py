@@ -6,7 +6,7 @@ from app.schemas.base import Shape
 
 
 class CaptureRemark(Shape):
-    """One thing that is wrong with a recording, how much it matters, and what to do."""
+    """One problem of a recording, its severity, and a remedy."""
 
     verdict: str  # good | usable with care | unusable
     cause: str
@@ -18,14 +18,14 @@ class CaptureMoment(Shape):
     """Measures of one frame examined by the capture doctor."""
 
     frame_index: int
-    sharpness: float  # over the median frame's
+    sharpness: float  # relative to the median frame's
     depth_share: float
     brightness: float
-    error_mm: float | None  # disagreement of its depth with a later frame's
+    error_mm: float | None  # difference of its depth from a later frame's
 
 
 class CaptureFigure(Shape):
-    """One measured figure, as a person reads it."""
+    """One measured figure, formatted for display."""
 
     name: str
     value: str

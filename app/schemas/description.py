@@ -20,9 +20,9 @@ class DescribedPoint(Shape):
 
 
 class DescribedObject(Shape):
-    """One object: what people clicked, corrected and said about it."""
+    """One object with its clicks, corrections and verdicts."""
 
-    id: int | None  # as the database knew it; None where the folder is of an r2c2r that wrote no project.json
+    id: int | None  # in the database; None for a folder of a version without project.json
     name: str
     category: str
     colour: int
@@ -31,7 +31,7 @@ class DescribedObject(Shape):
     front: dict[str, Any] | None = None
     crop: dict[str, Any] | None = None
     assignee: str | None = None
-    run_name: str = ""  # what the last run called it, where that is another name
+    run_name: str = ""  # its name in the last run, if different
     frames: dict[str, Any] = Field(default_factory=dict)
     override: dict[str, Any] = Field(default_factory=dict)
     verdicts: list[dict[str, Any]] = Field(default_factory=list)
@@ -42,12 +42,12 @@ class Description(Shape):
 
     version: Literal[1] = 1
     id: str
-    changed: float  # when anybody last changed what is in it
+    changed: float  # time of the last change of the content
     project: dict[str, Any]
-    owner: str | None = None  # accounts go by name: another database numbers them otherwise
+    owner: str | None = None  # accounts by name, as their numbers differ between databases
     assignee: str | None = None
-    members: list[str] | None = None  # None where it was not told
+    members: list[str] | None = None  # None if not stored
     objects: list[DescribedObject]
     comments: list[dict[str, Any]] = Field(default_factory=list)
-    true_lengths: list[dict[str, Any]] | None = None  # None where an r2c2r wrote it that told of none
+    true_lengths: list[dict[str, Any]] | None = None  # None in files of older versions
     bundles: list[dict[str, Any]] = Field(default_factory=list)

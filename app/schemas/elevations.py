@@ -1,4 +1,4 @@
-"""Planes of the scan seen from the front, on which fronts are drawn."""
+"""Elevations: orthophotos of vertical planes of the scan, on which fronts are drawn."""
 
 from pydantic import Field
 
@@ -7,7 +7,7 @@ from r2c2r_core.schema.prompts import PromptsFileHandle
 
 
 class ElevationLines(Shape):
-    """How clearly lines of one direction show: what edges snap to."""
+    """Line evidence in one direction, to which drawn edges snap."""
 
     block: int  # cells in a block
     blocks: int
@@ -19,7 +19,7 @@ class Elevation(Shape):
     """A plane to scale. Cells are counted from its top left corner, to the right and down; axes are unit vectors."""
 
     id: int
-    url: str  # of its picture, a pixel a cell
+    url: str  # of its picture, one pixel per cell
     cell_m: float
     columns: int
     rows: int
@@ -29,22 +29,22 @@ class Elevation(Shape):
     top_m: float  # height of that corner above the floor
     upright: ElevationLines  # positions are columns
     level: ElevationLines  # positions are rows
-    cells: list[list[float]]  # left, top, right, bottom of the panels that were cut
+    cells: list[list[float]]  # left, top, right, bottom of the segmented panels
 
 
 class Elevations(Shape):
-    """All of them, the largest first and walls last; none while the live segmenter has not drawn them."""
+    """All elevations, largest first and walls last; none until the live segmenter has rendered them."""
 
     drawn: bool
     items: list[Elevation]
 
 
 class FoundFront(Shape):
-    """The flat front of an object, as its masks were drawn with it."""
+    """The flat front of an object, as used for its masks."""
 
     object: int
     corners_m: list[list[float]]  # as in prompts.json
     handle: PromptsFileHandle | None
     edges: list[float] = Field(
         default_factory=list
-    )  # probability of a seam at each: left, right, top, bottom; none where a person drew it
+    )  # seam probability of the left, right, top and bottom edge; empty if drawn by a user

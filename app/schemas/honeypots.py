@@ -1,4 +1,4 @@
-"""Honeypots: sample kitchens in a user's queue, scored against their truth. Visible to admins only."""
+"""Honeypots: sample kitchens in a user's queue, scored against ground truth. Visible to admins only."""
 
 from app.schemas.base import Shape
 from app.schemas.states import ReviewState
@@ -6,24 +6,24 @@ from app.schemas.text import Title, Word
 
 
 class HoneypotIn(Shape):
-    """Whose queue it is slipped into, and what it is called there."""
+    """A new honeypot: the user to whose queue it is added, and its displayed name."""
 
     person: Word
     name: Title
 
 
 class Honeypot(Shape):
-    """One that was."""
+    """A stored honeypot."""
 
     project: str
     name: str
-    person: str | None  # whose turn it is
+    person: str | None  # current assignee
     review_state: ReviewState
     made: float
 
 
 class TrueObject(Shape):
-    """An object that is really there, and the person's that was found to be it."""
+    """A ground-truth object, and the user's object matched to it, if any."""
 
     name: str
     category: str
@@ -35,8 +35,8 @@ class TrueObject(Shape):
 class HoneypotScore(Shape):
     """The user's score on a honeypot."""
 
-    found: int  # objects that are really there, and have one of the person's on them
-    extra: int  # objects of the person on nothing of the kind
+    found: int  # ground-truth objects matched by one of the user's
+    extra: int  # the user's objects without a match
     mean_iou: float | None  # of those found
     same_category: int  # of those found
     objects: list[TrueObject]

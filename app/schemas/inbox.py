@@ -7,18 +7,18 @@ from app.schemas.text import Word
 
 
 class AssigneeIn(Shape):
-    """Whose turn it is from now on; None: nobody's."""
+    """The new assignee; None clears the assignment."""
 
     name: Word | None
 
 
 class InboxProject(Shape):
-    """A project that waits for you, and who brought it to its state, when and why."""
+    """A project that waits for you; author, time and reason of its current state."""
 
     id: str
     name: str
     review_state: ReviewState
-    who: str  # empty while it is a draft that nobody has sent anywhere
+    who: str  # empty for a draft that was never submitted
     at: float
     reason: str
 
@@ -32,7 +32,7 @@ class InboxObject(Shape):
     object: int
     name: str
     category: str
-    at: float  # when the last change about it was stored
+    at: float  # time of its last change
 
 
 class InboxMention(Shape):
@@ -46,14 +46,14 @@ class InboxMention(Shape):
 class Inbox(Shape):
     """The current user's inbox; each project is in one of the first two lists."""
 
-    returned: list[InboxProject]  # sent back: to whom it is assigned, else to who had sent it to review
+    returned: list[InboxProject]  # sent back, to the assignee, else to the user who submitted it for review
     assigned: list[InboxProject]
     objects: list[InboxObject]
     mentions: list[InboxMention]
 
 
 class PersonsChanges(Shape):
-    """How much somebody did."""
+    """Number of changes by one user."""
 
     who: str
     changes: int
@@ -62,13 +62,13 @@ class PersonsChanges(Shape):
 class News(Shape):
     """Changes of a project by others since your last visit, newest first."""
 
-    since: float | None  # None: you were never here, or have no account; there is nothing to tell then
-    last: int  # the newest event there is, to say that all of it is read
+    since: float | None  # None before your first visit and without an account; there are no news then
+    last: int  # the newest event, to mark all as read
     people: list[PersonsChanges]
     entries: list[HistoryEntry]
 
 
 class SeenIn(Shape):
-    """Up to which event the news were read."""
+    """The last event that was read."""
 
     event: int

@@ -1,4 +1,4 @@
-"""Heavy work and its history."""
+"""Jobs and their history."""
 
 from typing import Literal
 
@@ -19,7 +19,7 @@ class StageState(Shape):
 
 
 class Job(Shape):
-    """One piece of heavy work."""
+    """One job: an import, a sample, a run or variants."""
 
     id: int
     project: str
@@ -33,8 +33,8 @@ class Job(Shape):
     eta_s: float | None
     message: str
     error: ErrorBody | None
-    no_retry: str  # why it cannot be retried once it failed; empty where it can
-    position: int | None  # in the queue, 1 is next
+    no_retry: str  # reason why it cannot be retried after a failure; empty if it can
+    position: int | None  # in the queue, from 1
     attempts: int
     who: str
     has_log: bool
@@ -55,7 +55,7 @@ class JobEvent(Shape):
 
 
 class RunRequest(Shape):
-    """A run's backends, where not the defaults."""
+    """A run's backends, where they differ from the defaults."""
 
     segmenter: Word | None = None
     generator: Word | None = None

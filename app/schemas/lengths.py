@@ -12,17 +12,17 @@ PointWorld = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 
 
 class TrueLengthIn(Shape):
-    """A length as a tape says it: of an object's side in the finished scene, or between two points of the world."""
+    """A length measured with a tape: of an object's side in the finished scene, or between two points of the world."""
 
     metres: float = Field(gt=0.005, le=100.0)
     object: int | None = Field(default=None, ge=0, lt=2**63)
     side: Side | None = None
     points_world: Annotated[list[PointWorld], Field(min_length=2, max_length=2)] | None = None
-    text: Remark = ""  # what it is of; empty: the object's side, or that it was between two points
+    text: Remark = ""  # description; by default the object's side, or "between two points"
 
     @model_validator(mode="after")
     def _of_one_thing(self) -> Self:
-        """A side has an object; else there are two points."""
+        """Require either an object and its side, or two points."""
         of_side = self.object is not None and self.side is not None
         if of_side == (self.points_world is not None) or (self.object is None) != (self.side is None):
             raise ValueError("a true length is of an object's side (object, side) or between two points (points_world)")
@@ -30,25 +30,25 @@ class TrueLengthIn(Shape):
 
 
 class TrueLength(Shape):
-    """A length that was measured in the room, beside what the scan says."""
+    """A length measured in the room, beside the length in the scan."""
 
     id: int
     text: str
     object: int | None
     side: Side | None
-    points_world: list[list[float]] | None  # as they lie in the recording as it is read now
+    points_world: list[list[float]] | None  # at the current scale of the recording
     metres: float
-    measured_m: float | None  # in the finished scene, or between the points; None: there is none now
-    error_m: float | None  # measured less true
+    measured_m: float | None  # in the finished scene, or between the points; None without a current one
+    error_m: float | None  # measured - true
     who: str
     at: float
 
 
 class TrueLengths(Shape):
-    """All of a project's, and what follows from them."""
+    """All true lengths of a project, and the scale that fits them best."""
 
     lengths: list[TrueLength]
-    scale: float  # of the recording as it is read now
-    scale_wanted: float | None  # with which they fit best; None without any that can be compared
-    mean_error: float | None  # relative, of those that can be compared: |measured - true| / true
-    mean_error_scaled: float | None  # with `scale_wanted`
+    scale: float  # current scale of the recording
+    scale_wanted: float | None  # best fit of the lengths; None without any that can be compared
+    mean_error: float | None  # mean of |measured - true| / true of those that can be compared
+    mean_error_scaled: float | None  # the same at `scale_wanted`

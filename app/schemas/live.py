@@ -10,7 +10,7 @@ ProjectId = Annotated[str, Field(max_length=40, pattern=r"^[A-Za-z0-9_-]+$")]
 
 
 class Watch(Shape):
-    """Where a tab is: what it hears of, and what the others at the project see of it."""
+    """Position of a tab: determines its messages, and its presence shown to others at the project."""
 
     type: Literal["watch"]
     project: ProjectId | None = None

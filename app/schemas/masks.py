@@ -32,7 +32,7 @@ class FrameMask(Shape):
 
 
 class Lane(Shape):
-    """Where an object is seen: frames, and the confidence on each."""
+    """Frames with a mask of an object, and the confidence in each."""
 
     object: int
     state: SegmentState
@@ -43,21 +43,21 @@ class Lane(Shape):
 
 
 class OpenState(Shape):
-    """Where a leaf stood in a frame that shows it: rad or m from closed; null where that is not known."""
+    """Joint position of a leaf in a frame that shows it: rad or m from closed; null if unknown."""
 
     frame: int
     value: float | None
-    sigma: float | None  # its standard deviation; null where a person said so
+    sigma: float | None  # standard deviation; null where marked by a user
 
 
 class Opening(Shape):
-    """How a leaf of an object was filmed to move."""
+    """Filmed motion of a leaf of an object."""
 
     object: int
-    part: str  # of an object of several; else empty
+    part: str  # of an object with several; else empty
     kind: Literal["revolute", "prismatic"]
-    largest: float  # the widest state seen, rad or m
-    limit_source: Source  # of that as the joint's limit: measured where it was seen to stop, else at_least
+    largest: float  # widest observed state, rad or m
+    limit_source: Source  # of `largest` as joint limit: measured where the leaf was seen to stop, else at_least
     source: Source  # of axis and pivot
     states: list[OpenState]
 

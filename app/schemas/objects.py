@@ -12,7 +12,7 @@ SegmentState = Literal["none", "waiting", "running", "partial", "done", "failed"
 
 
 class PointIn(Shape):
-    """A click. Outside the frame is refused."""
+    """A click; refused outside the frame."""
 
     frame: int = Field(ge=0, lt=2**31)
     x: float = Field(allow_inf_nan=False)
@@ -51,14 +51,14 @@ class FrameIn(Shape):
 
 
 class FrameSaid(Shape):
-    """A frame in which a person set an object right."""
+    """A frame in which a user corrected the object."""
 
     frame: int
     visible: bool
 
 
 class ObjectIn(Shape):
-    """A new object; without a name it gets its category's and the next number."""
+    """A new object; without a name it gets its category and the next number."""
 
     name: Word | None = None
     category: Word = "object"
@@ -69,7 +69,7 @@ class ObjectIn(Shape):
 class ObjectPatch(Shape):
     """Changes of an object; a drawn front, a crop box and the assignee can also be removed.
 
-    With `version`, only if nobody changed it meanwhile.
+    With `version`, refused if it was changed since that version.
     """
 
     name: Word | None = None
@@ -82,7 +82,7 @@ class ObjectPatch(Shape):
 
 
 class SceneObject(Shape):
-    """One object a person named."""
+    """One annotated object."""
 
     id: int
     project: str
@@ -92,18 +92,18 @@ class SceneObject(Shape):
     version: int
     deleted: bool
     points: list[Point]
-    front: PromptsFileFront | None  # drawn; None: what the clicks find
-    frames: list[FrameSaid]  # set right by a person
-    crop: PromptsFileCrop | None  # a box that it lies in, drawn by a person
-    assignee: str | None  # whose turn it is
+    front: PromptsFileFront | None  # drawn; None: detected from the clicks
+    frames: list[FrameSaid]  # corrected by a user
+    crop: PromptsFileCrop | None  # bounding box drawn by a user
+    assignee: str | None  # current assignee
     can_undo: bool
     can_redo: bool
     segment: SegmentState
     mask_frames: int
-    mask_backend: str  # the segmenter that drew the masks; empty while there are none
+    mask_backend: str  # segmenter of the masks; empty without any
     notices: list[str]
-    doubts: list[str]  # about its front: a size or a place that its category does not have, edges that hardly show
-    saved: float  # when the last change was stored
+    doubts: list[str]  # about its front: implausible size or position for its category, weak edges
+    saved: float  # time of the last stored change
 
 
 class UndoRequest(Shape):
@@ -111,7 +111,7 @@ class UndoRequest(Shape):
 
     object: int | None = Field(default=None, ge=0, lt=2**63)
     scope: Literal["prompts", "review"] = "prompts"
-    version: int | None = Field(default=None, ge=0)  # of it in this scope, as last seen: 409 when somebody changed it since
+    version: int | None = Field(default=None, ge=0)  # of the object in this scope, as last seen: 409 if it was changed since
 
 
 class Undone(Shape):
@@ -120,11 +120,11 @@ class Undone(Shape):
     object: SceneObject
     text: str
     frame: int | None
-    version: int  # of the object in this scope by now
+    version: int  # current, of the object in this scope
 
 
 class HistoryEntry(Shape):
-    """Who changed what, when."""
+    """One change with its author and time."""
 
     id: int
     object: int | None
@@ -141,9 +141,9 @@ class ObjectPoints(Shape):
     """An object's shape from masks and depth: points around their centre, +Z up."""
 
     count: int
-    frames: int  # that they come from
+    frames: int  # number of frames they come from
     centre_m: list[float]  # world
-    size_m: list[float]  # of the box around most of them, along the world's axes
+    size_m: list[float]  # of the box around most of them, along the world axes
     around: PromptsFileCrop | None  # that box, a little larger, as a crop box; None without points
-    xyz_mm: str  # base64 of int16, little endian, three a point
-    rgb: str  # base64 of bytes, three a point
+    xyz_mm: str  # base64 of int16, little endian, three per point
+    rgb: str  # base64 of bytes, three per point

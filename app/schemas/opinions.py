@@ -6,13 +6,13 @@ from app.schemas.text import Word
 
 
 class OpinionIn(Shape):
-    """Who is to work on a copy of the recording; None: nobody yet."""
+    """Assignee of a copy of the recording; None: not assigned."""
 
     name: Word | None
 
 
 class Opinion(Shape):
-    """A project of the recording."""
+    """A project on the same recording."""
 
     project: str
     name: str
@@ -28,29 +28,29 @@ class AgreedObject(Shape):
     object: int
     name: str
     category: str
-    frames: int  # in which it has a mask, of those looked at
+    frames: int  # of the compared ones, with a mask
 
 
 class Agreed(Shape):
-    """An object that both have, or one of them: then the other is None, and so is what is said of the two."""
+    """An object of both projects, or of one; then the other one and the comparison are None."""
 
     first: AgreedObject | None
     second: AgreedObject | None
-    iou: float | None  # pixels in both masks of the pixels in either, over all frames looked at
-    frames: int  # in which both have a mask
+    iou: float | None  # intersection over union of the pixels of all compared frames
+    frames: int  # with a mask in both
     same_category: bool | None
 
 
 class Agreement(Shape):
-    """How far two projects agree; what disagrees most comes first."""
+    """Agreement of two projects; objects with the largest disagreement first."""
 
     first: Opinion
     second: Opinion
-    frames: int  # looked at
+    frames: int  # compared
     both: int
     only_first: int
     only_second: int
-    mean_iou: float | None  # of the objects that both have
+    mean_iou: float | None  # of the objects in both
     same_category: int  # of them
     objects: list[Agreed]
-    unmasked: list[AgreedObject]  # of either, without a mask: nothing can be said of them
+    unmasked: list[AgreedObject]  # of either project, without a mask, so that they cannot be compared

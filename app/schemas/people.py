@@ -37,7 +37,7 @@ class AccountInfo(Shape):
     name: str
     role: RoleName
     created: float
-    used: float | None  # when one of its sessions was last used, to the hour; None: nobody is signed in with it
+    used: float | None  # last use of its sessions, to the hour; None without sessions
     you: bool
 
 
@@ -57,26 +57,26 @@ class AccountPatch(Shape):
 
 
 class PasswordChange(Shape):
-    """One's own password."""
+    """Change of one's own password."""
 
     old: str = Field(min_length=1, max_length=1000)
     new: str = Field(min_length=1, max_length=1000)
 
 
 class AuditEntry(Shape):
-    """One line of the record of sign-ins and accounts."""
+    """One entry of the audit log of sign-ins and accounts."""
 
     id: int
     at: float
     action: AuditAction
-    account: str  # whose; empty for a name that nobody has, and for whoever started the server
-    who: str  # did it
-    client: str  # the address it came from, as far as the server was told which proxy to believe
+    account: str  # affected account; empty for an unknown name, and for the user who started the server
+    who: str  # author
+    client: str  # client address, as reported by a trusted proxy if there is one
     detail: str
 
 
 class AuditPage(Shape):
-    """Some lines of the record, newest first, and how many there are."""
+    """A page of the audit log, newest first, and the total number of entries."""
 
     entries: list[AuditEntry]
     total: int

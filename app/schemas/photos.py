@@ -11,26 +11,26 @@ OverlayLook = Literal["ghost", "outline", "residual"]
 
 
 class Leaf(Shape):
-    """The part moved by a joint of the object: its front as a box, closed, and the line it turns about or goes along."""
+    """The part moved by a joint of the object: its front as a box, closed, and the joint axis."""
 
     joint: str
-    part: str  # which of the object's it is: marks are by this
+    part: str  # its name in the object, the key of marks
     type: Literal["revolute", "prismatic"]
-    most: float  # how far it can open at all, rad or m
+    most: float  # maximum opening, rad or m
     pose: list[list[float]]  # world_from_leaf, 4x4
     size_m: list[float]
-    axis: list[float]  # world; opening turns about it by the right-hand rule, or goes along it
+    axis: list[float]  # world; opening rotates about it by the right-hand rule, or moves along it
     pivot: list[float]
-    opening: Opening | None  # as it was filmed and marked
+    opening: Opening | None  # filmed and marked motion
 
 
 class PhotoState(Shape):
-    """Where a joint stood in a photo, as it was filmed: rad or m; null where that is not known."""
+    """Filmed joint position in a photo: rad or m; null if unknown."""
 
     joint: str
     type: Literal["revolute", "prismatic"]
     value: float | None
-    sigma: float | None  # null where a person said so
+    sigma: float | None  # null where marked by a user
 
 
 class Photo(Pinhole):
@@ -39,20 +39,20 @@ class Photo(Pinhole):
     frame: int
     camera_from_world: list[list[float]]
     confidence: float
-    box: list[float]  # left, top, right, bottom of its mask, as shares of the image
-    whole: bool  # whether it ends before the image does
+    box: list[float]  # left, top, right, bottom of its mask, as fractions of the image
+    whole: bool  # whether the object is entirely within the image
     states: list[PhotoState]
 
 
 class ObjectPhotos(Shape):
-    """The photos to check an object on, whole ones first, then the surest; its box in the finished scene, where there is one.
+    """Photos for checking an object, entire views first, then the most confident; its box in the finished scene, if any.
 
     Overlays: /media/{project}/overlay/{object}/{frame}.png?of=fitted&look=ghost&v={version}.
     """
 
     photos: list[Photo]
     version: str
-    of: list[OverlayOf]  # what there is to lay over them
+    of: list[OverlayOf]  # available overlays
     world_from_object: list[list[float]] | None
     dimensions_m: list[float] | None
     leaves: list[Leaf]  # of the finished scene

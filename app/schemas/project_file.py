@@ -19,7 +19,7 @@ _At = Annotated[FiniteFloat, Field(ge=0, description="seconds since 1970")]
 
 
 class ProjectFileFrame(Document):
-    """A frame of the recording: by these the recording is known."""
+    """A frame of the recording; the frames identify the recording."""
 
     index: int = Field(ge=0, lt=MOST_FRAMES, description="a whole number: the frame's number in the recording")
     width: _Side = Field(description="a whole number of pixels")
@@ -30,7 +30,7 @@ class ProjectFileFrame(Document):
 
 
 class ProjectFileRecording(Document):
-    """The recording that everything is about."""
+    """The annotated recording."""
 
     file_name: FileName = Field(description="a file name")
     frames: list[ProjectFileFrame] = Field(min_length=1, max_length=100_000, description="a list of frames, in order")
@@ -47,7 +47,7 @@ class ProjectFileComment(Document):
 
 
 class ProjectFileLength(Document):
-    """A length that somebody measured."""
+    """A length measured by a user."""
 
     who: Word = Field(description="a name")
     at: _At
@@ -76,11 +76,11 @@ class ProjectFile(Document):
 class ProjectFileOffer(Shape):
     """Size of a project's export file."""
 
-    size_bytes: int  # without the recording, about
-    recording_bytes: int | None  # None: the recording is not kept here
+    size_bytes: int  # approximate, without the recording
+    recording_bytes: int | None  # None: the recording is not stored here
 
 
 class RecordingIn(Shape):
-    """The recording of a project that has none: an upload that is complete."""
+    """The recording for a project without one: a complete upload."""
 
     upload: Word

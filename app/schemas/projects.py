@@ -24,7 +24,7 @@ class ProjectCounts(Shape):
 
 
 class ProjectSummary(Shape):
-    """One recording and what became of it, as the list of all shows it."""
+    """A project as in the list of all: its recording, state and results."""
 
     id: str
     name: str
@@ -36,34 +36,34 @@ class ProjectSummary(Shape):
     frame_count: int
     error: ErrorBody | None
     counts: ProjectCounts
-    job: Job | None  # the one under way, else the last one
-    result: Literal["none", "stale", "current"]  # stale: something was changed since the last run
+    job: Job | None  # the active one, else the last one
+    result: Literal["none", "stale", "current"]  # stale: user input has changed since the last run
     bundle: Bundle | None  # the newest
     thumbnail: str | None
     size_bytes: int
-    segmenter: str  # draws the masks
-    generator: str  # makes the candidates
+    segmenter: str  # computes the masks
+    generator: str  # generates the candidates
     matcher: str  # aligns them
-    arm: str  # tries the joints of the bundle
+    arm: str  # tests the joints of the bundle
     review_state: ReviewState
     tags: list[str]
-    archived: bool  # done with: lists show it when asked for
-    assignee: str | None  # whose turn it is
+    archived: bool  # completed; listed only on request
+    assignee: str | None  # current assignee
 
 
 class Project(ProjectSummary):
-    """A project by itself, with what the doctor said of its recording."""
+    """One project, with the capture doctor's findings on its recording."""
 
     capture: CaptureFacts | None
     notices: list[str]
-    register_depth: bool  # whether depth is moved onto the colour images when the recording is read
-    scale: float  # on every length of the recording when it is read
-    checklist: list[ListedObject]  # objects that are to be clicked, those that are already among them
-    awaits_recording: bool  # it has none, and may be given one
+    register_depth: bool  # whether depth is registered to the colour images when the recording is read
+    scale: float  # factor on all lengths of the recording when it is read
+    checklist: list[ListedObject]  # objects to be clicked, including those done already
+    awaits_recording: bool  # it has no recording, and may be given one
 
 
 class ProjectPatch(Shape):
-    """Changes of a project: its name, tags, whether it is archived, or which backends do its stages."""
+    """Changes of a project: name, tags, archive state, or backends of its stages."""
 
     name: Title | None = None
     tags: list[Word] | None = Field(default=None, max_length=20)
@@ -75,24 +75,24 @@ class ProjectPatch(Shape):
 
 
 class ReadingIn(Shape):
-    """How the recording is to be read."""
+    """Options for reading the recording."""
 
-    register_depth: bool | None = None  # None: as it is
-    scale: float | None = Field(default=None, ge=0.2, le=5.0)  # on every length, depth and camera path alike; None: as it is
+    register_depth: bool | None = None  # None: unchanged
+    scale: float | None = Field(default=None, ge=0.2, le=5.0)  # factor on depth and camera path; None: unchanged
 
 
 class ProjectMembers(Shape):
-    """Who may see a project: everybody, or its owner, its members and admins."""
+    """Visibility of a project: everybody, or only its owner, its members and admins."""
 
     members_only: bool
-    owner: str | None  # None: who started the server, or an account that is gone
+    owner: str | None  # None: the user who started the server, or a deleted account
     members: list[str]
-    may_change: bool  # whether you may
-    accounts: list[str]  # who could be a member; empty unless you may change it
+    may_change: bool  # whether you may change them
+    accounts: list[str]  # possible members; empty unless you may change them
 
 
 class MembersIn(Shape):
-    """Who may see a project from now on; the owner always does."""
+    """New visibility of a project; its owner can always see it."""
 
     members_only: bool
     members: list[Word] = Field(default_factory=list, max_length=500)
@@ -120,7 +120,7 @@ class Trashed(Shape):
 
     id: str
     name: str
-    at: float  # when it was put there
+    at: float  # time of deletion
     who: str
     size_bytes: int
     counts: ProjectCounts

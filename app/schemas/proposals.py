@@ -9,19 +9,19 @@ from app.schemas.text import Word
 
 
 class Proposal(Shape):
-    """An object that nobody clicked yet; confirming it adds this click under this category."""
+    """An object proposed without a click; confirming it adds this click under this category."""
 
     id: str
     kind: Literal["front", "appliance", "thing"]
     category: str
     confidence: float
-    frame: int  # the one that shows it best
+    frame: int  # with the best view
     x: float
     y: float
     size_m: list[float]  # width, depth, height
     outline: list[tuple[float, float]]  # in pixels of the stored frame
-    handle: list[tuple[float, float]]  # its corners there; empty where none was found
-    doubts: list[str]  # why it is not confirmed together with others
+    handle: list[tuple[float, float]]  # its corners in the frame; empty if none was detected
+    doubts: list[str]  # reasons against confirming it together with others
 
 
 class Proposals(Shape):

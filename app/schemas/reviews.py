@@ -37,7 +37,7 @@ class Candidate(Shape):
     id: str
     generator: str
     seed: int
-    assumes: str  # what it takes for true of what nobody saw; empty: a sample of a generator's own
+    assumes: str  # its hypothesis about unseen parts; empty: a generator's own sample
     watertight: bool
     faces: int
     frames: list[int]
@@ -52,31 +52,31 @@ class Candidate(Shape):
 
 
 class Difference(Shape):
-    """How far a candidate lies off another one, laid onto it by the side that was filmed."""
+    """Surface difference of a candidate from another one, aligned by the filmed side."""
 
     candidate: str
-    share: float  # of its surface that lies off
-    most: float  # of the other's longest side
+    share: float  # fraction of its surface that differs
+    most: float  # maximum distance, as a fraction of the other's longest side
 
 
 class MeshLook(Shape):
-    """A mesh that a person sent, as it would be used: mended, but neither placed nor scaled."""
+    """Preview of an uploaded mesh as a candidate: repaired, but neither placed nor scaled."""
 
     name: str
     size: list[float]  # of its box along the file's axes, longest first, in the file's unit
-    object_size_m: list[float] | None  # of what the masks show, along the world's axes, longest first; None: nothing
+    object_size_m: list[float] | None  # of the part in the masks, along the world axes, longest first; None without masks
     triangles: int
-    notes: list[str]  # what was repaired, dropped, united or is missing; none: it is taken as it is
+    notes: list[str]  # repaired, dropped, merged and missing parts; empty: it is used unchanged
     picture: str  # base64 of a PNG
 
 
 class Crop(Shape):
-    """A frame that candidates were made from, and where the object is in it."""
+    """A frame from which candidates were made, and the object's position in it."""
 
     frame: int
     width: int
     height: int
-    box: list[float]  # left, top, right, bottom of its mask, as shares of the image
+    box: list[float]  # left, top, right, bottom of its mask, as fractions of the image
 
 
 class Differences(Shape):
@@ -86,14 +86,14 @@ class Differences(Shape):
     """
 
     against: str
-    tolerance: float  # of the longest side: what lies further off than that differs
-    longest_m: float | None  # None before one of them was placed
+    tolerance: float  # distance, as a fraction of the longest side, above which surfaces differ
+    longest_m: float | None  # None before placement
     candidates: list[Difference]
     crops: list[Crop]
 
 
 class PoseSpread(Shape):
-    """By how much a pose may be off: standard deviations, each of the direction held least."""
+    """Uncertainty of a pose: standard deviations, each in the least constrained direction."""
 
     turn_deg: float
     shift_m: float
@@ -101,14 +101,14 @@ class PoseSpread(Shape):
 
 
 class Placement(Shape):
-    """Where the chosen candidate stands, with the evidence for it."""
+    """Placement of the chosen candidate, with its evidence."""
 
     candidate: str
     scale: float
     translation_m: list[float]
     matches: int
     inliers: int
-    rms_m: float | None  # None: no depth inside its masks
+    rms_m: float | None  # None: no depth in its masks
     mask_iou: float
     condition: float
     unsure: bool
@@ -121,13 +121,13 @@ class Placement(Shape):
 
 
 class CandidateGroup(Shape):
-    """All candidates of one object, the automatic choice and its reason, and what people said."""
+    """All candidates of one object, the automatic choice and its reason, and the users' verdicts and corrections."""
 
     object: int
     name: str
-    run_name: str  # what the last run called it, as do the scene's joints and the certificate
+    run_name: str  # its name in the last run, in the scene's joints and in the certificate
     category: str
-    assignee: str | None  # whose turn it is
+    assignee: str | None  # current assignee
     chosen: str
     chosen_by: str
     reason: str
@@ -136,24 +136,24 @@ class CandidateGroup(Shape):
     candidates: list[Candidate]
     placement: Placement | None
     override: "OverrideData"
-    version: int  # grows with every verdict, correction and undo of them
+    version: int  # increased by every verdict, correction and undo of them
     can_undo: bool
     can_redo: bool
-    can_regenerate: bool  # whether further candidates may be asked for
+    can_regenerate: bool  # whether further candidates may be requested
 
 
 class VerdictIn(Shape):
-    """A reviewer's verdict. Rejecting the last one makes new candidates; accepting another one aligns it anew."""
+    """A reviewer's verdict. Rejecting the last one makes new candidates; accepting another one aligns it again."""
 
     candidate: Word
     verdict: Literal["accepted", "rejected", "cleared"]
     reason: Remark = ""
     rerun: bool = True
-    version: int | None = Field(default=None, ge=0)  # as last seen: 409 when somebody said something since
+    version: int | None = Field(default=None, ge=0)  # as last seen: 409 if it was reviewed since
 
 
 class OverrideData(Shape):
-    """Manual corrections of one object; None is computed."""
+    """Manual corrections of one object; None: computed value."""
 
     candidate: str | None = None
     hinge: HingeSide | None = None
@@ -165,7 +165,7 @@ class OverrideData(Shape):
     states: dict[str, list[MarkedState]] = Field(default_factory=dict)  # by joint as above
     rejected: list[str] = Field(default_factory=list)
     regenerate: int = 0
-    built_as: str | None = None  # the category whose body and joints it takes
+    built_as: str | None = None  # the category whose body and joints are used
     left_out: bool = False
     colour: tuple[float, float, float] | None = None  # RGB 0..1
 
@@ -186,11 +186,11 @@ class OverridePatch(Shape):
     left_out: bool | None = Field(default=None, description=LEFT_OUT_SAID)
     colour: Colour | None = Field(default=None, description=COLOUR_SAID)
     rerun: bool = True
-    version: int | None = Field(default=None, ge=0)  # as last seen: 409 when somebody said something since
+    version: int | None = Field(default=None, ge=0)  # as last seen: 409 if it was reviewed since
 
 
 class Reviewed(Shape):
-    """The object after a verdict or a correction, and the job that follows from it."""
+    """The object after a verdict or a correction, and the resulting job."""
 
     group: CandidateGroup | None
     job: Job | None

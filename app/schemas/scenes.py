@@ -21,9 +21,9 @@ class SceneJoint(Shape):
 class SceneItem(Shape):
     """One object of the finished scene."""
 
-    object: int | None  # None: made from the scan, nobody clicked it
+    object: int | None  # None: made from the scan without a click
     name: str
-    run_name: str  # what the last run called it, as do its joints and the certificate
+    run_name: str  # its name in the last run, in its joints and in the certificate
     category: str
     fixture: str
     dimensions_m: list[float]
@@ -34,8 +34,8 @@ class SceneItem(Shape):
     placement_rms_m: float | None
     warp_residual_m: float | None
     warnings: list[str]
-    colour: list[float]  # RGB 0..1, of what no mesh dresses
-    override: OverrideData  # what people corrected, whether the last run knew it or not
+    colour: list[float]  # RGB 0..1, of parts without a mesh
+    override: OverrideData  # current corrections, including those since the last run
 
 
 class LeftOut(Shape):
@@ -46,11 +46,11 @@ class LeftOut(Shape):
 
 
 class StageInfo(Shape):
-    """How one stage was run."""
+    """Backend and duration of one stage."""
 
     name: str
     backend: str
-    seconds: float | None  # that its results took; None: not known
+    seconds: float | None  # computation time of its results; None: unknown
 
 
 class SceneSummary(Shape):
@@ -58,8 +58,8 @@ class SceneSummary(Shape):
 
     items: list[SceneItem]
     left_out: list[LeftOut]
-    unused: list[LeftOut]  # corrected, not clicked, and not in the scene
-    failures: dict[str, str]  # object name -> why it is missing
+    unused: list[LeftOut]  # corrected, without clicks, and not in the scene
+    failures: dict[str, str]  # object name -> reason why it is missing
     warnings: list[str]
     stages: list[StageInfo]
     glb: str | None

@@ -12,29 +12,29 @@ class SeatJob(Shape):
     kind: str
     stage: str
     progress: float
-    objects: list[str]  # those of another seat's job that this one computes; none: the job is its own
+    objects: list[str]  # of another seat's job, computed here; empty for its own job
 
 
 class Seat(Shape):
-    """One process that takes jobs, while it lives."""
+    """One running process that takes jobs."""
 
     id: int
     host: str
     process: int
-    here: bool  # it is the server that answers
+    here: bool  # it is the responding server
     version: str
     jobs_at_a_time: int
     began: float
-    silent_s: float  # since its last sign of life
-    draining: bool  # it takes no further job, and ends if it serves nothing
+    silent_s: float  # since its last heartbeat
+    draining: bool  # it takes no further jobs, and exits afterwards if it is not a server
     jobs: list[SeatJob]
 
 
 class Seats(Shape):
-    """All of them, and what waits for one."""
+    """All seats, and the number of waiting jobs."""
 
     waiting: int
-    shared: bool  # false: the rows are in a file, and the server that answers is all there is
+    shared: bool  # false: the database is a file, and the responding server is the only seat
     seats: list[Seat]
 
 

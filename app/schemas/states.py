@@ -12,18 +12,18 @@ ReviewState = Literal["draft", "ready", "in review", "changes requested", "appro
 
 
 class ReviewMove(Shape):
-    """One legal step from here; with something unmet it needs a written reason, which the history keeps."""
+    """One permitted step; with unmet conditions it needs a written reason, which is stored in the history."""
 
     to: ReviewState
-    text: str  # what its button says
+    text: str  # label of its button
     role: Literal["annotator", "reviewer"]
     unmet: list[str]
-    notes: list[str]  # worth a look before; the step may be taken all the same
+    notes: list[str]  # points to check before; they do not prevent the step
     needs_reason: bool
 
 
 class ReviewStatus(Shape):
-    """The state, who brought it there, and where it may go."""
+    """The review state with its author, and the possible next steps."""
 
     state: ReviewState
     who: str
@@ -33,7 +33,7 @@ class ReviewStatus(Shape):
 
 
 class ReviewStep(Shape):
-    """A wanted step; refused when the project has left `from_state` meanwhile."""
+    """A requested step; refused if the project is no longer in `from_state`."""
 
     from_state: ReviewState
     to: ReviewState
@@ -48,7 +48,7 @@ class CommentPin(Shape):
     x: float | None = Field(default=None, allow_inf_nan=False)
     y: float | None = Field(default=None, allow_inf_nan=False)
     point_world: tuple[float, float, float] | None = None
-    view: ViewerLook | None = None  # how the 3D view was looked at
+    view: ViewerLook | None = None  # settings and camera of the 3D view
 
 
 class CommentIn(CommentPin):
@@ -58,7 +58,7 @@ class CommentIn(CommentPin):
 
     @model_validator(mode="after")
     def _pinned_whole(self) -> Self:
-        """A pixel has a frame and both coordinates."""
+        """Require a frame and both coordinates for a pixel, and finite coordinates for a point."""
         given = [value is not None for value in (self.frame, self.x, self.y)]
         if any(given) and not all(given):
             raise ValueError("a pin on a frame needs frame, x and y")
@@ -88,10 +88,10 @@ class Figures(Shape):
     """Effort spent on the project so far; times in seconds."""
 
     objects: int
-    clicks: int  # points set, moved, removed; proposals confirmed, dismissed; objects edited, deleted; undos: each is one
+    clicks: int  # points set, moved, removed; proposals confirmed, dismissed; objects edited, deleted; undos: one each
     clicks_per_object: float | None
     verdicts: int  # verdicts and corrections
-    automatic_kept: float | None  # share of accepted candidates that were the automatic choice
-    upload_to_approval_s: float | None  # from the upload's beginning, or the import's where there was none
-    computing_s: float  # of the import, proposals, masks and runs; what went on at the same time counts once
+    automatic_kept: float | None  # fraction of accepted candidates that were the automatic choice
+    upload_to_approval_s: float | None  # from the start of the upload, or of the import without one
+    computing_s: float  # of import, proposals, masks and runs; overlapping times count once
     age_s: float

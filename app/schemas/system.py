@@ -15,20 +15,20 @@ class Category(Shape):
 
 
 class Backend(Shape):
-    """One way to do a stage's work."""
+    """One implementation of a stage."""
 
     name: str
     summary: str
     licence: str
     licence_class: Literal["open", "restricted"]
     available: bool
-    reason: str  # why not, and the next step
+    reason: str  # why it is unavailable, and the next step
 
 
 class BundleFormat(Shape):
-    """One file of a bundle that carries the scene."""
+    """One scene format of a bundle."""
 
-    name: str  # as a download of some formats only asks for it
+    name: str  # as requested by a download of some formats only
     file: str
     opened_by: str
 
@@ -40,14 +40,14 @@ class SystemInfo(Shape):
     user: str
     role: Literal["annotator", "reviewer", "admin"]
     account: bool  # has an account
-    sign_out: str | None  # the page that follows on signing out; None: who started the server, and where a proxy says who asks
+    sign_out: str | None  # page after signing out; None for the user who started the server, and for users named by a proxy
     max_upload_bytes: int
     free_bytes: int
     import_roots: list[str]
     categories: list[Category]
     palette: list[str]  # colours by object.colour, "#rrggbb"
     viewer: bool
-    segmenters: list[Backend]  # of each seam the first needs nothing and is the default
+    segmenters: list[Backend]  # of each stage, the first has no requirements and is the default
     generators: list[Backend]
     matchers: list[Backend]
     arms: list[Backend]
@@ -55,7 +55,7 @@ class SystemInfo(Shape):
 
 
 class FolderEntry(Shape):
-    """One line of a folder that a recording may be taken from."""
+    """One entry of a folder from which a recording may be imported."""
 
     name: str
     path: str

@@ -1,4 +1,4 @@
-"""Templates: names and categories of objects that are to be clicked."""
+"""Templates: names and categories of objects to be clicked."""
 
 from pydantic import Field
 
@@ -8,7 +8,7 @@ from r2c2r_core.schema.prompts import MOST_OBJECTS
 
 
 class ListedObject(Shape):
-    """An object that is to be clicked."""
+    """An object to be clicked."""
 
     name: Word
     category: Word
@@ -22,17 +22,17 @@ class TemplateIn(Shape):
 
 
 class Template(Shape):
-    """A stored one."""
+    """A stored template."""
 
     id: int
     name: str
     objects: list[ListedObject]
-    who: str  # changed it last
+    who: str  # author of the last change
     changed: float
-    may_change: bool  # whether you may
+    may_change: bool  # whether you may change it
 
 
 class ChecklistIn(Shape):
-    """The template whose objects form a project's checklist; None: none."""
+    """The template whose objects form a project's checklist; None: no checklist."""
 
     template: int | None = Field(ge=0, lt=2**63)

@@ -6,7 +6,7 @@ from pydantic import AfterValidator, BeforeValidator, StringConstraints
 
 from r2c2r_core.texts import OBEYED
 
-LONGEST_FILE_NAME = 255  # bytes: what file systems take
+LONGEST_FILE_NAME = 255  # bytes: the limit of file systems
 
 
 def readable(value: Any) -> Any:
@@ -28,7 +28,7 @@ def lines(value: Any) -> Any:
 
 
 def short_enough(text: str) -> str:
-    """The text itself; ValueError where no file can be called that."""
+    """The text itself; ValueError where it is too long for a file name."""
     if len(text.encode()) > LONGEST_FILE_NAME:
         raise ValueError(f"it is longer than {LONGEST_FILE_NAME} bytes; choose one of the object's candidates")
     return text
@@ -36,10 +36,10 @@ def short_enough(text: str) -> str:
 
 Word = Annotated[str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=60)]  # of an object, a category …
 Title = Annotated[str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=120)]  # of a project
-Remark = Annotated[str, BeforeValidator(one_line), StringConstraints(max_length=1000)]  # a reason, which may be none
+Remark = Annotated[str, BeforeValidator(one_line), StringConstraints(max_length=1000)]  # a reason, possibly empty
 Prose = Annotated[str, BeforeValidator(lines), StringConstraints(min_length=1, max_length=2000)]  # of several lines
 FileName = Annotated[str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=300)]
 ServerPath = Annotated[str, BeforeValidator(readable), StringConstraints(min_length=1, max_length=4096)]
-Reference = Annotated[  # a candidate by its id, or a mesh that was uploaded
+Reference = Annotated[  # id of a candidate, or an uploaded mesh
     str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=LONGEST_FILE_NAME), AfterValidator(short_enough)
 ]

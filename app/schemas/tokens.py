@@ -9,7 +9,7 @@ TokenScope = Literal["metrics", "read", "annotator", "reviewer", "admin"]
 
 
 class ApiTokenIn(Shape):
-    """A new token: what it is for, and how far it reaches. `read` changes nothing, `metrics` opens /metrics alone."""
+    """A new token: its purpose and scope. `read` permits no changes, `metrics` permits only /metrics."""
 
     name: Word
     scope: TokenScope = "annotator"
@@ -21,12 +21,12 @@ class ApiToken(Shape):
     id: int
     name: str
     scope: TokenScope
-    owner: str  # the account it acts for; empty: whoever started the server
+    owner: str  # account it acts for; empty: the user who started the server
     created: float
-    used: float | None  # when it was last used, to the minute
+    used: float | None  # time of last use, to the minute
 
 
 class NewApiToken(ApiToken):
-    """A token that was just made: its secret is told this once."""
+    """A new token with its secret, which is shown only once."""
 
     secret: str

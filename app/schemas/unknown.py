@@ -5,21 +5,21 @@ from typing import Literal
 from app.schemas.base import Shape
 
 UnknownKind = Literal["project", "newer", "upload", "other"]
-"""newer: what a project's folder said before an older database was restored; upload: bytes of one, maybe not all of them."""
+"""newer: a project's description from before an older database was restored; upload: its bytes, possibly incomplete."""
 
 
 class UnknownFolder(Shape):
-    """One file or folder that was set aside, and what is in it."""
+    """One file or folder that was set aside, and its content."""
 
     entry: str  # its name in the folder unknown/
     kind: UnknownKind
-    name: str  # the project's, where it is one
+    name: str  # of the project, if it is one
     path: str
     size_bytes: int
-    changed: float | None  # when anybody last changed it, as far as it says so
+    changed: float | None  # time of its last change, if known
     objects: int
     clicks: int
     bundles: int
     recording: bool
-    why_not: str  # why it cannot be adopted; empty where it can
+    why_not: str  # why it cannot be adopted; empty if it can
     left: bool  # an admin decided to leave it

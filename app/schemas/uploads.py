@@ -7,7 +7,7 @@ from app.schemas.text import FileName, Title
 
 
 class UploadIn(Shape):
-    """The file that will come, as its sender knows it."""
+    """Announcement of a file by its sender."""
 
     file_name: FileName
     size: int = Field(ge=1, lt=2**53, strict=True)
@@ -16,7 +16,7 @@ class UploadIn(Shape):
 
 
 class Upload(Shape):
-    """A recording on its way in; what comes next starts at `offset`."""
+    """An unfinished upload of a recording; the next bytes start at `offset`."""
 
     id: str
     file_name: str

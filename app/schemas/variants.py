@@ -8,7 +8,7 @@ from pydantic import Field
 from app.schemas.base import Shape
 
 MOST_VARIANTS = 1000
-"""At a time: as many were measured (benchmarks/variants.json), 9 minutes on two busy cores. The command line makes more."""
+"""At a time: the largest measured number (benchmarks/variants.json), 9 minutes on two busy cores. The CLI makes more."""
 
 VariantsName = Annotated[str, Path(pattern=r"^v\d+-n\d+-s\d+$", max_length=60)]
 
@@ -25,16 +25,16 @@ class VariantsOffer(Shape):
     """Estimated size of variants of the newest bundle."""
 
     version: int
-    most: int  # at a time
-    zip_bytes: int  # about, of what they share; as what follows
+    most: int  # maximum at a time
+    zip_bytes: int  # approximate, of the shared part; as the following
     each_zip_bytes: int  # of each variant
-    disk_bytes: int  # beside the zip while they are made, of what they share
+    disk_bytes: int  # temporary, in addition to the zip, of the shared part
     each_disk_bytes: int  # of each variant
-    free_bytes: int  # on the disk, for a job to fill
+    free_bytes: int  # on the disk, available to a job
 
 
 class VariantSet(Shape):
-    """Variants that were made together."""
+    """Variants made together by one job."""
 
     name: str
     version: int  # of the bundle
@@ -46,13 +46,13 @@ class VariantSet(Shape):
     sha256: str
     size: int
     created: float
-    rejected: dict[str, int]  # draws, by why
-    checked: int  # by the whole simulation certificate
-    failed: list[str]  # of them, by their names in the zip
+    rejected: dict[str, int]  # rejected draws, by reason
+    checked: int  # number tested by the full simulation certificate
+    failed: list[str]  # of the tested ones, by their names in the zip
 
 
 class Variants(Shape):
-    """All that were made of a project's bundles, and what more would take."""
+    """All variants of a project's bundles, and the estimated size of further ones."""
 
-    offer: VariantsOffer | None  # None: there is no bundle that can be varied
+    offer: VariantsOffer | None  # None without a bundle that can be varied
     sets: list[VariantSet]  # newest first

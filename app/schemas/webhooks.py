@@ -13,7 +13,7 @@ WebhookEvent = Literal["run.finished", "state.changed", "test"]
 
 
 def _address(text: str) -> str:
-    """The text itself; ValueError where nothing can be posted to it."""
+    """The text itself; ValueError for an address that cannot be posted to."""
     parts = urlsplit(text)
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.username is not None or parts.port == 0:
         raise ValueError("not an address to post to: give one such as https://lab.example/r2c2r, without name and password")
@@ -28,27 +28,27 @@ WebAddress = Annotated[
 
 
 class WebhookIn(Shape):
-    """A new one: of a project of yours, or, an admin's, of every project."""
+    """A new webhook, of a project of yours, or, for admins, of every project."""
 
     url: WebAddress
     project: ProjectId | None = None
 
 
 class Webhook(Shape):
-    """Where it posts and for what, and how the last attempt went."""
+    """A webhook with its address, project and last attempt."""
 
     id: int
     url: str
     project: str | None
     project_name: str
-    owner: str  # empty: whoever started the server
+    owner: str  # empty: the user who started the server
     created: float
     answer: str  # to the last attempt; empty before the first
-    delivered: float | None  # when something was last delivered
+    delivered: float | None  # time of the last successful delivery
 
 
 class NewWebhook(Webhook):
-    """One that was just made: the secret that signs what it posts is told this once."""
+    """A new webhook, with the secret that signs its messages, which is shown only once."""
 
     secret: str
 
@@ -61,6 +61,6 @@ class Delivery(Shape):
     body: str
     created: float
     attempts: int
-    due: float | None  # when it is tried next; null once it is delivered or given up
+    due: float | None  # time of the next attempt; null once delivered or given up
     delivered: float | None
     answer: str

@@ -22,7 +22,7 @@ export interface AccountPatch {
   password?: string | null;
 }
 
-/** An object that both have, or one of them: then the other is None, and so is what is said of the two. */
+/** An object of both projects, or of one; then the other one and the comparison are None. */
 export interface Agreed {
   first: AgreedObject | null;
   second: AgreedObject | null;
@@ -39,7 +39,7 @@ export interface AgreedObject {
   frames: number;
 }
 
-/** How far two projects agree; what disagrees most comes first. */
+/** Agreement of two projects; objects with the largest disagreement first. */
 export interface Agreement {
   first: Opinion;
   second: Opinion;
@@ -63,18 +63,18 @@ export interface ApiToken {
   used: number | null;
 }
 
-/** A new token: what it is for, and how far it reaches. `read` changes nothing, `metrics` opens /metrics alone. */
+/** A new token: its purpose and scope. `read` permits no changes, `metrics` permits only /metrics. */
 export interface ApiTokenIn {
   name: string;
   scope?: "metrics" | "read" | "annotator" | "reviewer" | "admin";
 }
 
-/** Whose turn it is from now on; None: nobody's. */
+/** The new assignee; None clears the assignment. */
 export interface AssigneeIn {
   name: string | null;
 }
 
-/** One line of the record of sign-ins and accounts. */
+/** One entry of the audit log of sign-ins and accounts. */
 export interface AuditEntry {
   id: number;
   at: number;
@@ -85,13 +85,13 @@ export interface AuditEntry {
   detail: string;
 }
 
-/** Some lines of the record, newest first, and how many there are. */
+/** A page of the audit log, newest first, and the total number of entries. */
 export interface AuditPage {
   entries: AuditEntry[];
   total: number;
 }
 
-/** One way to do a stage's work. */
+/** One implementation of a stage. */
 export interface Backend {
   name: string;
   summary: string;
@@ -120,20 +120,20 @@ export interface Bundle {
   current: boolean;
 }
 
-/** One difference between two bundles; an empty object is the whole. */
+/** One difference between two bundles; an empty `object` refers to the whole bundle. */
 export interface BundleChange {
   object: string;
   text: string;
 }
 
-/** A bundle looked at again, now. */
+/** Result of a new check of a stored bundle. */
 export interface BundleCheck {
   version: number;
   intact: boolean;
   findings: Finding[];
 }
 
-/** One file of a bundle that carries the scene. */
+/** One scene format of a bundle. */
 export interface BundleFormat {
   name: string;
   file: string;
@@ -167,7 +167,7 @@ export interface Candidate {
   thumbnail: string;
 }
 
-/** All candidates of one object, the automatic choice and its reason, and what people said. */
+/** All candidates of one object, the automatic choice and its reason, and the users' verdicts and corrections. */
 export interface CandidateGroup {
   object: number;
   name: string;
@@ -207,7 +207,7 @@ export interface CaptureFacts {
   moments: CaptureMoment[];
 }
 
-/** One measured figure, as a person reads it. */
+/** One measured figure, formatted for display. */
 export interface CaptureFigure {
   name: string;
   value: string;
@@ -222,7 +222,7 @@ export interface CaptureMoment {
   error_mm: number | null;
 }
 
-/** One thing that is wrong with a recording, how much it matters, and what to do. */
+/** One problem of a recording, its severity, and a remedy. */
 export interface CaptureRemark {
   verdict: string;
   cause: string;
@@ -238,7 +238,7 @@ export interface Category {
   sideways: boolean;
 }
 
-/** The proof in the newest bundle. */
+/** The certificate in the newest bundle. */
 export interface Certificate {
   version: number;
   current: boolean;
@@ -254,7 +254,7 @@ export interface Certificate {
   together_penetration_m: number | null;
 }
 
-/** The template whose objects form a project's checklist; None: none. */
+/** The template whose objects form a project's checklist; None: no checklist. */
 export interface ChecklistIn {
   template: number | null;
 }
@@ -297,7 +297,7 @@ export interface Credentials {
   password: string;
 }
 
-/** A frame that candidates were made from, and where the object is in it. */
+/** A frame from which candidates were made, and the object's position in it. */
 export interface Crop {
   frame: number;
   width: number;
@@ -322,7 +322,7 @@ export interface Delivery {
   answer: string;
 }
 
-/** How far a candidate lies off another one, laid onto it by the side that was filmed. */
+/** Surface difference of a candidate from another one, aligned by the filmed side. */
 export interface Difference {
   candidate: string;
   share: number;
@@ -338,7 +338,7 @@ export interface Differences {
   crops: Crop[];
 }
 
-/** An object that may not be what was filmed, and why. */
+/** An object that may differ from the filmed one, and the reason. */
 export interface Doubt {
   object: string;
   why: string;
@@ -360,7 +360,7 @@ export interface Elevation {
   cells: number[][];
 }
 
-/** How clearly lines of one direction show: what edges snap to. */
+/** Line evidence in one direction, to which drawn edges snap. */
 export interface ElevationLines {
   block: number;
   blocks: number;
@@ -368,13 +368,13 @@ export interface ElevationLines {
   clarity: string;
 }
 
-/** All of them, the largest first and walls last; none while the live segmenter has not drawn them. */
+/** All elevations, largest first and walls last; none until the live segmenter has rendered them. */
 export interface Elevations {
   drawn: boolean;
   items: Elevation[];
 }
 
-/** The one shape of an error; `current` is what is stored now when the kind is `conflict`. */
+/** Body of every error response; `current` is the stored state when the kind is `conflict`. */
 export interface ErrorBody {
   kind: string;
   message: string;
@@ -394,7 +394,7 @@ export interface Figures {
   age_s: number;
 }
 
-/** One thing the linter or the simulation has to say. */
+/** One finding of the linter or the simulation. */
 export interface Finding {
   rule: string;
   severity: string;
@@ -402,7 +402,7 @@ export interface Finding {
   message: string;
 }
 
-/** One line of a folder that a recording may be taken from. */
+/** One entry of a folder from which a recording may be imported. */
 export interface FolderEntry {
   name: string;
   path: string;
@@ -417,7 +417,7 @@ export interface FolderListing {
   entries: FolderEntry[];
 }
 
-/** The flat front of an object, as its masks were drawn with it. */
+/** The flat front of an object, as used for its masks. */
 export interface FoundFront {
   object: number;
   corners_m: number[][];
@@ -460,13 +460,13 @@ export interface FrameMask {
   mask: MaskBits;
 }
 
-/** A frame in which a person set an object right. */
+/** A frame in which a user corrected the object. */
 export interface FrameSaid {
   frame: number;
   visible: boolean;
 }
 
-/** Who changed what, when. */
+/** One change with its author and time. */
 export interface HistoryEntry {
   id: number;
   object: number | null;
@@ -479,7 +479,7 @@ export interface HistoryEntry {
   undone: boolean;
 }
 
-/** One that was. */
+/** A stored honeypot. */
 export interface Honeypot {
   project: string;
   name: string;
@@ -488,7 +488,7 @@ export interface Honeypot {
   made: number;
 }
 
-/** Whose queue it is slipped into, and what it is called there. */
+/** A new honeypot: the user to whose queue it is added, and its displayed name. */
 export interface HoneypotIn {
   person: string;
   name: string;
@@ -535,7 +535,7 @@ export interface InboxObject {
   at: number;
 }
 
-/** A project that waits for you, and who brought it to its state, when and why. */
+/** A project that waits for you; author, time and reason of its current state. */
 export interface InboxProject {
   id: string;
   name: string;
@@ -545,7 +545,7 @@ export interface InboxProject {
   reason: string;
 }
 
-/** One piece of heavy work. */
+/** One job: an import, a sample, a run or variants. */
 export interface Job {
   id: number;
   project: string;
@@ -593,7 +593,7 @@ export interface JointVerdict {
   blocked_by: BlockerVerdict[];
 }
 
-/** Where an object is seen: frames, and the confidence on each. */
+/** Frames with a mask of an object, and the confidence in each. */
 export interface Lane {
   object: number;
   state: "none" | "waiting" | "running" | "partial" | "done" | "failed";
@@ -603,7 +603,7 @@ export interface Lane {
   confidences: number[];
 }
 
-/** The part moved by a joint of the object: its front as a box, closed, and the line it turns about or goes along. */
+/** The part moved by a joint of the object: its front as a box, closed, and the joint axis. */
 export interface Leaf {
   joint: string;
   part: string;
@@ -622,13 +622,13 @@ export interface LeftOut {
   name: string;
 }
 
-/** Whether the scene can be what was filmed: passed, doubtful or failed. */
+/** Plausibility of the scene as a model of the filmed one: passed, doubtful or failed. */
 export interface Likeness {
   state: string;
   doubts: Doubt[];
 }
 
-/** An object that is to be clicked. */
+/** An object to be clicked. */
 export interface ListedObject {
   name: string;
   category: string;
@@ -667,13 +667,13 @@ export interface MaskBits {
   bits: string;
 }
 
-/** Who may see a project from now on; the owner always does. */
+/** New visibility of a project; its owner can always see it. */
 export interface MembersIn {
   members_only: boolean;
   members?: string[];
 }
 
-/** A mesh that a person sent, as it would be used: mended, but neither placed nor scaled. */
+/** Preview of an uploaded mesh as a candidate: repaired, but neither placed nor scaled. */
 export interface MeshLook {
   name: string;
   size: number[];
@@ -683,7 +683,7 @@ export interface MeshLook {
   picture: string;
 }
 
-/** A token that was just made: its secret is told this once. */
+/** A new token with its secret, which is shown only once. */
 export interface NewApiToken {
   id: number;
   name: string;
@@ -694,7 +694,7 @@ export interface NewApiToken {
   secret: string;
 }
 
-/** One that was just made: the secret that signs what it posts is told this once. */
+/** A new webhook, with the secret that signs its messages, which is shown only once. */
 export interface NewWebhook {
   id: number;
   url: string;
@@ -723,7 +723,7 @@ export interface ObjectAsset {
   url: string;
 }
 
-/** A new object; without a name it gets its category's and the next number. */
+/** A new object; without a name it gets its category and the next number. */
 export interface ObjectIn {
   name?: string | null;
   category?: string;
@@ -731,7 +731,7 @@ export interface ObjectIn {
   front?: PromptsFileFrontInput | null;
 }
 
-/** Changes of an object; a drawn front, a crop box and the assignee can also be removed. With `version`, only if nobody changed it meanwhile. */
+/** Changes of an object; a drawn front, a crop box and the assignee can also be removed. With `version`, refused if it was changed since that version. */
 export interface ObjectPatch {
   name?: string | null;
   category?: string | null;
@@ -742,7 +742,7 @@ export interface ObjectPatch {
   version?: number | null;
 }
 
-/** The photos to check an object on, whole ones first, then the surest; its box in the finished scene, where there is one. Overlays: /media/{project}/overlay/{object}/{frame}.png?of=fitted&look=ghost&v={version}. */
+/** Photos for checking an object, entire views first, then the most confident; its box in the finished scene, if any. Overlays: /media/{project}/overlay/{object}/{frame}.png?of=fitted&look=ghost&v={version}. */
 export interface ObjectPhotos {
   photos: Photo[];
   version: string;
@@ -763,14 +763,14 @@ export interface ObjectPoints {
   rgb: string;
 }
 
-/** Where a leaf stood in a frame that shows it: rad or m from closed; null where that is not known. */
+/** Joint position of a leaf in a frame that shows it: rad or m from closed; null if unknown. */
 export interface OpenState {
   frame: number;
   value: number | null;
   sigma: number | null;
 }
 
-/** How a leaf of an object was filmed to move. */
+/** Filmed motion of a leaf of an object. */
 export interface Opening {
   object: number;
   part: string;
@@ -781,7 +781,7 @@ export interface Opening {
   states: OpenState[];
 }
 
-/** A project of the recording. */
+/** A project on the same recording. */
 export interface Opinion {
   project: string;
   name: string;
@@ -791,12 +791,12 @@ export interface Opinion {
   updated: number;
 }
 
-/** Who is to work on a copy of the recording; None: nobody yet. */
+/** Assignee of a copy of the recording; None: not assigned. */
 export interface OpinionIn {
   name: string | null;
 }
 
-/** Manual corrections of one object; None is computed. */
+/** Manual corrections of one object; None: computed value. */
 export interface OverrideData {
   candidate: string | null;
   hinge: "left" | "right" | "top" | "bottom" | null;
@@ -831,13 +831,13 @@ export interface OverridePatch {
   version?: number | null;
 }
 
-/** One's own password. */
+/** Change of one's own password. */
 export interface PasswordChange {
   old: string;
   new: string;
 }
 
-/** How much somebody did. */
+/** Number of changes by one user. */
 export interface PersonsChanges {
   who: string;
   changes: number;
@@ -859,7 +859,7 @@ export interface Photo {
   states: PhotoState[];
 }
 
-/** Where a joint stood in a photo, as it was filmed: rad or m; null where that is not known. */
+/** Filmed joint position in a photo: rad or m; null if unknown. */
 export interface PhotoState {
   joint: string;
   type: "revolute" | "prismatic";
@@ -867,7 +867,7 @@ export interface PhotoState {
   sigma: number | null;
 }
 
-/** Where the chosen candidate stands, with the evidence for it. */
+/** Placement of the chosen candidate, with its evidence. */
 export interface Placement {
   candidate: string;
   scale: number;
@@ -895,7 +895,7 @@ export interface Point {
   label: 0 | 1;
 }
 
-/** A click. Outside the frame is refused. */
+/** A click; refused outside the frame. */
 export interface PointIn {
   frame: number;
   x: number;
@@ -915,14 +915,14 @@ export interface PointsIn {
   points: PointIn[];
 }
 
-/** By how much a pose may be off: standard deviations, each of the direction held least. */
+/** Uncertainty of a pose: standard deviations, each in the least constrained direction. */
 export interface PoseSpread {
   turn_deg: number;
   shift_m: number;
   scale: number;
 }
 
-/** A project by itself, with what the doctor said of its recording. */
+/** One project, with the capture doctor's findings on its recording. */
 export interface Project {
   id: string;
   name: string;
@@ -970,7 +970,7 @@ export interface ProjectFileOffer {
   recording_bytes: number | null;
 }
 
-/** Who may see a project: everybody, or its owner, its members and admins. */
+/** Visibility of a project: everybody, or only its owner, its members and admins. */
 export interface ProjectMembers {
   members_only: boolean;
   owner: string | null;
@@ -979,7 +979,7 @@ export interface ProjectMembers {
   accounts: string[];
 }
 
-/** Changes of a project: its name, tags, whether it is archived, or which backends do its stages. */
+/** Changes of a project: name, tags, archive state, or backends of its stages. */
 export interface ProjectPatch {
   name?: string | null;
   tags?: string[] | null;
@@ -990,7 +990,7 @@ export interface ProjectPatch {
   arm?: string | null;
 }
 
-/** One recording and what became of it, as the list of all shows it. */
+/** A project as in the list of all: its recording, state and results. */
 export interface ProjectSummary {
   id: string;
   name: string;
@@ -1098,7 +1098,7 @@ export interface PromptsFilePoint {
   label: 0 | 1;
 }
 
-/** An object that nobody clicked yet; confirming it adds this click under this category. */
+/** An object proposed without a click; confirming it adds this click under this category. */
 export interface Proposal {
   id: string;
   kind: "front" | "appliance" | "thing";
@@ -1132,18 +1132,18 @@ export interface ProposalsConfirmed {
   category?: string | null;
 }
 
-/** How the recording is to be read. */
+/** Options for reading the recording. */
 export interface ReadingIn {
   register_depth?: boolean | null;
   scale?: number | null;
 }
 
-/** The recording of a project that has none: an upload that is complete. */
+/** The recording for a project without one: a complete upload. */
 export interface RecordingIn {
   upload: string;
 }
 
-/** One legal step from here; with something unmet it needs a written reason, which the history keeps. */
+/** One permitted step; with unmet conditions it needs a written reason, which is stored in the history. */
 export interface ReviewMove {
   to: "draft" | "ready" | "in review" | "changes requested" | "approved";
   text: string;
@@ -1153,7 +1153,7 @@ export interface ReviewMove {
   needs_reason: boolean;
 }
 
-/** The state, who brought it there, and where it may go. */
+/** The review state with its author, and the possible next steps. */
 export interface ReviewStatus {
   state: "draft" | "ready" | "in review" | "changes requested" | "approved";
   who: string;
@@ -1162,21 +1162,21 @@ export interface ReviewStatus {
   moves: ReviewMove[];
 }
 
-/** A wanted step; refused when the project has left `from_state` meanwhile. */
+/** A requested step; refused if the project is no longer in `from_state`. */
 export interface ReviewStep {
   from_state: "draft" | "ready" | "in review" | "changes requested" | "approved";
   to: "draft" | "ready" | "in review" | "changes requested" | "approved";
   reason?: string;
 }
 
-/** The object after a verdict or a correction, and the job that follows from it. */
+/** The object after a verdict or a correction, and the resulting job. */
 export interface Reviewed {
   group: CandidateGroup | null;
   job: Job | null;
   text: string;
 }
 
-/** How a gripper or an arm did at one joint or thing. */
+/** Result of a gripper or an arm at one joint or free-standing object. */
 export interface RobotGrip {
   kind: string;
   name: string;
@@ -1198,7 +1198,7 @@ export interface RobotTrial {
   map: string | null;
 }
 
-/** A run's backends, where not the defaults. */
+/** A run's backends, where they differ from the defaults. */
 export interface RunRequest {
   segmenter?: string | null;
   generator?: string | null;
@@ -1246,7 +1246,7 @@ export interface SceneJoint {
   sources: Record<string, string>;
 }
 
-/** One object a person named. */
+/** One annotated object. */
 export interface SceneObject {
   id: number;
   project: string;
@@ -1282,7 +1282,7 @@ export interface SceneSummary {
   preview: string | null;
 }
 
-/** One process that takes jobs, while it lives. */
+/** One running process that takes jobs. */
 export interface Seat {
   id: number;
   host: string;
@@ -1312,19 +1312,19 @@ export interface SeatJob {
   objects: string[];
 }
 
-/** All of them, and what waits for one. */
+/** All seats, and the number of waiting jobs. */
 export interface Seats {
   waiting: number;
   shared: boolean;
   seats: Seat[];
 }
 
-/** Up to which event the news were read. */
+/** The last event that was read. */
 export interface SeenIn {
   event: number;
 }
 
-/** How a bundle is taken into one simulator. */
+/** Loading code of a bundle for one simulator. */
 export interface SimulatorLines {
   simulator: string;
   install: string;
@@ -1334,7 +1334,7 @@ export interface SimulatorLines {
   loader: string | null;
 }
 
-/** How one stage was run. */
+/** Backend and duration of one stage. */
 export interface StageInfo {
   name: string;
   backend: string;
@@ -1347,7 +1347,7 @@ export interface StageState {
   state: "waiting" | "running" | "done" | "failed" | "cancelled";
 }
 
-/** Where an arm stands, and for which joints. */
+/** Base position of an arm, and the joints that it operates from there. */
 export interface StandingPlace {
   x_m: number;
   y_m: number;
@@ -1375,7 +1375,7 @@ export interface SystemInfo {
   formats: BundleFormat[];
 }
 
-/** A stored one. */
+/** A stored template. */
 export interface Template {
   id: number;
   name: string;
@@ -1391,7 +1391,7 @@ export interface TemplateIn {
   objects: ListedObject[];
 }
 
-/** One free-standing thing, left alone. */
+/** Rest test of one free-standing object. */
 export interface ThingVerdict {
   name: string;
   drift_m: number | null;
@@ -1408,7 +1408,7 @@ export interface Trashed {
   counts: ProjectCounts;
 }
 
-/** A length that was measured in the room, beside what the scan says. */
+/** A length measured in the room, beside the length in the scan. */
 export interface TrueLength {
   id: number;
   text: string;
@@ -1422,7 +1422,7 @@ export interface TrueLength {
   at: number;
 }
 
-/** A length as a tape says it: of an object's side in the finished scene, or between two points of the world. */
+/** A length measured with a tape: of an object's side in the finished scene, or between two points of the world. */
 export interface TrueLengthIn {
   metres: number;
   object?: number | null;
@@ -1431,7 +1431,7 @@ export interface TrueLengthIn {
   text?: string;
 }
 
-/** All of a project's, and what follows from them. */
+/** All true lengths of a project, and the scale that fits them best. */
 export interface TrueLengths {
   lengths: TrueLength[];
   scale: number;
@@ -1440,7 +1440,7 @@ export interface TrueLengths {
   mean_error_scaled: number | null;
 }
 
-/** An object that is really there, and the person's that was found to be it. */
+/** A ground-truth object, and the user's object matched to it, if any. */
 export interface TrueObject {
   name: string;
   category: string;
@@ -1464,7 +1464,7 @@ export interface Undone {
   version: number;
 }
 
-/** One file or folder that was set aside, and what is in it. */
+/** One file or folder that was set aside, and its content. */
 export interface UnknownFolder {
   entry: string;
   kind: "project" | "newer" | "upload" | "other";
@@ -1480,7 +1480,7 @@ export interface UnknownFolder {
   left: boolean;
 }
 
-/** A recording on its way in; what comes next starts at `offset`. */
+/** An unfinished upload of a recording; the next bytes start at `offset`. */
 export interface Upload {
   id: string;
   file_name: string;
@@ -1490,7 +1490,7 @@ export interface Upload {
   created: number;
 }
 
-/** The file that will come, as its sender knows it. */
+/** Announcement of a file by its sender. */
 export interface UploadIn {
   file_name: string;
   size: number;
@@ -1498,7 +1498,7 @@ export interface UploadIn {
   modified?: number | null;
 }
 
-/** Variants that were made together. */
+/** Variants made together by one job. */
 export interface VariantSet {
   name: string;
   version: number;
@@ -1515,7 +1515,7 @@ export interface VariantSet {
   failed: string[];
 }
 
-/** All that were made of a project's bundles, and what more would take. */
+/** All variants of a project's bundles, and the estimated size of further ones. */
 export interface Variants {
   offer: VariantsOffer | null;
   sets: VariantSet[];
@@ -1539,7 +1539,7 @@ export interface VariantsOffer {
   free_bytes: number;
 }
 
-/** A reviewer's verdict. Rejecting the last one makes new candidates; accepting another one aligns it anew. */
+/** A reviewer's verdict. Rejecting the last one makes new candidates; accepting another one aligns it again. */
 export interface VerdictIn {
   candidate: string;
   verdict: "accepted" | "rejected" | "cleared";
@@ -1548,19 +1548,19 @@ export interface VerdictIn {
   version?: number | null;
 }
 
-/** The box of an object that is to be moved by hand. */
+/** The box of an object to be moved by hand. */
 export interface ViewerBox {
   pose: number[][];
   size: [number, number, number];
 }
 
-/** Where a camera of the 3D view stands in the world, and what it looks at. */
+/** Position and target of a camera of the 3D view, in the world. */
 export interface ViewerCamera {
   position: [number, number, number];
   target: [number, number, number];
 }
 
-/** A box outside which nothing is shown, as shares of the scene's width, depth (from its fronts) and height. */
+/** A clip box, as fractions of the scene's width, depth (from its fronts) and height. */
 export interface ViewerClip {
   low: [number, number, number];
   high: [number, number, number];
@@ -1574,7 +1574,7 @@ export interface ViewerJoint {
   value: number;
 }
 
-/** How the 3D view is looked at: what a comment keeps. */
+/** Display settings and camera of the 3D view, as stored with a comment. */
 export interface ViewerLookInput {
   mode: "cloud" | "candidate" | "aligned" | "scene";
   draw?: "meshes" | "wireframe" | "colliders" | "both" | "distance" | "unobserved";
@@ -1586,7 +1586,7 @@ export interface ViewerLookInput {
   camera?: ViewerCamera | null;
 }
 
-/** How the 3D view is looked at: what a comment keeps. */
+/** Display settings and camera of the 3D view, as stored with a comment. */
 export interface ViewerLookOutput {
   mode: "cloud" | "candidate" | "aligned" | "scene";
   draw: "meshes" | "wireframe" | "colliders" | "both" | "distance" | "unobserved";
@@ -1606,17 +1606,17 @@ export interface ViewerPicked {
   point: number[] | null;
 }
 
-/** Where to put the object that is moved by hand, world_from_object; null leaves it where it is. */
+/** New pose of the object being moved by hand, world_from_object; null leaves it unchanged. */
 export interface ViewerPlace {
   pose: number[][] | null;
 }
 
-/** Where the object that is moved by hand is, world_from_object; null when none is. */
+/** Pose of the object being moved by hand, world_from_object; null without one. */
 export interface ViewerPlaced {
   pose: number[][] | null;
 }
 
-/** Where the 3D view of a project is; `fallback` when it is down. */
+/** Address of a project's 3D view; the fallbacks when it is down. */
 export interface ViewerSession {
   state: "ready" | "down";
   url: string | null;
@@ -1656,7 +1656,7 @@ export interface ViewerShown {
   part: ViewerClip | null;
 }
 
-/** Where it posts and for what, and how the last attempt went. */
+/** A webhook with its address, project and last attempt. */
 export interface Webhook {
   id: number;
   url: string;
@@ -1668,7 +1668,7 @@ export interface Webhook {
   delivered: number | null;
 }
 
-/** A new one: of a project of yours, or, an admin's, of every project. */
+/** A new webhook, of a project of yours, or, for admins, of every project. */
 export interface WebhookIn {
   url: string;
   project?: string | null;
