@@ -16,7 +16,7 @@ from r2c2r_core.errors import InputError
 
 _OF_ACCOUNTS = {"owner_id", "assignee_id"}  # described by name, as account numbers differ between databases
 _DESCRIBED = {"id", "name", "category", "colour", "deleted", "front", "frames", "crop", "run_name", "assignee"}  # of an object
-_DERIVED = {"certificate"}  # it is in the bundle itself
+_DERIVED = {"certificate"}  # stored in the bundle itself
 
 
 def describe(session: Session, project: Project, files: ProjectFiles) -> Description:

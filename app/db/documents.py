@@ -13,7 +13,7 @@ from r2c2r_core.schema.prompts import PromptsFileFront
 
 
 def prompts_document(session: Session, project_id: str) -> dict[str, Any]:
-    """Current prompts.json of the project, without objects neither clicked nor drawn."""
+    """Current prompts.json of the project, without objects that have neither clicks nor a drawn front."""
     return _document_of(_entries(session, project_id).values())
 
 
@@ -35,7 +35,7 @@ def corrected_prompts(
 
 
 def _entries(session: Session, project_id: str) -> dict[int, dict[str, Any]]:
-    """Entries of prompts.json by object, of those that are clicked or drawn."""
+    """Entries of prompts.json by object, of those with a positive click or a drawn front."""
     clicks, items = clicks_by_object(session, project_id), live_objects(session, project_id)
     entries = {item.id or 0: prompt_entry(item, clicks.get(item.id or 0, [])) for item in items}
     return {
@@ -57,7 +57,7 @@ def prompt_entry(item: SceneObject, clicks: list[Click]) -> dict[str, Any]:
 
 
 def readable_front(front: dict[str, Any]) -> dict[str, Any]:
-    """A stored front; a handle left outside by an earlier merge of fronts is reset to be detected, as readers refuse it."""
+    """A stored front; a handle outside it, left by an earlier merge of fronts, is reset to automatic, as readers refuse it."""
     try:
         PromptsFileFront.model_validate(front)
     except ValidationError:

@@ -42,7 +42,7 @@ def open_engine(database: Path | str, *, anew: bool = False, busy_s: float = BUS
 
 @contextmanager
 def opened(database: Path | str, *, anew: bool = False) -> Iterator[Engine]:
-    """`open_engine` for as long as the block lasts."""
+    """Context with the engine of `open_engine`, disposed of at the end."""
     engine = open_engine(database, anew=anew)
     try:
         yield engine
@@ -81,7 +81,7 @@ def reading(engine: Engine) -> Iterator[Session]:
 
 @contextmanager
 def writing(engine: Engine, *, lasting: bool = True) -> Iterator[Session]:
-    """One transaction that takes the write lock at its start, so that its reads stay valid until it writes.
+    """Context with one transaction that takes the write lock at its start, so that its reads stay valid until it writes.
 
     Raises NoSpace when the disk is full, Unavailable when the database does not answer, DatabaseUnusable when it is damaged;
     nothing is stored then. After the commit, the engine's option `projects_changed` is called with the changed projects, and

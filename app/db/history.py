@@ -28,7 +28,7 @@ Scope = Literal["prompts", "review"]
 State = dict[str, Any]
 
 _FIELDS = ("name", "category", "colour", "deleted", "front", "crop", "assignee")
-_POINT, _FRAME, _CORRECTION, _VERDICT = "point ", "frame ", "override ", "verdict "  # then its id, number, name, candidate
+_POINT, _FRAME, _CORRECTION, _VERDICT = "point ", "frame ", "override ", "verdict "  # then id, frame, field, candidate
 
 
 class Steps(NamedTuple):

@@ -30,7 +30,7 @@ def migrate(engine: Engine, revision: str = "head") -> None:
 
 
 def _migrate_server(engine: Engine, revision: str) -> None:
-    """Migrate in one transaction under the writers' lock, so that only one of several starting servers migrates."""
+    """Migrate in one transaction under the write lock, so that only one of several starting servers migrates."""
     config, known = _config(), revisions()
     with engine.execution_options(write=True).begin() as connection:
         now = MigrationContext.configure(connection).get_current_revision()

@@ -137,7 +137,7 @@ class Click(NamedTuple):
 _CLICKS = sqlalchemy.select(
     col(Point.id), col(Point.frame), col(Point.x), col(Point.y), col(Point.label), col(Point.object_id)
 ).order_by(col(Point.id))
-_CLICKS_OF = _CLICKS.where(col(Point.object_id) == bindparam("object"))  # built once, which takes as long as the query itself
+_CLICKS_OF = _CLICKS.where(col(Point.object_id) == bindparam("object"))  # built once, as that takes as long as the query itself
 
 
 def clicks_of(session: Session, object_id: int | None) -> list[Click]:
@@ -203,7 +203,7 @@ def _job_shape(row: Job, name: str, source: str | None, waiting: list[tuple[int 
         id=row.id or 0,
         project=row.project_id,
         project_name=name,
-        kind=row.kind,  # type: ignore[arg-type]  # the column holds no other
+        kind=row.kind,  # type: ignore[arg-type]  # the column has no other values
         state=row.state,  # type: ignore[arg-type]
         stage=row.stage,
         stage_fraction=row.stage_fraction,

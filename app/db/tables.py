@@ -1,6 +1,6 @@
 """The only table definitions. A change here needs a migration in alembic/versions; a test compares the two.
 
-Times are seconds since 1970, UTC. Nothing but jobs' progress is ever updated without an event beside it.
+Times are seconds since 1970, UTC. Every update except jobs' progress also stores an event.
 """
 
 from typing import Any
@@ -13,22 +13,22 @@ from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.robot.arms import ARMS
 from r2c2r_core.segment.stage import SEGMENTERS
 
-BYTES = BigInteger().with_variant(Integer, "sqlite")  # more than 2 GiB; SQLite's integers hold as much as they are given
+BYTES = BigInteger().with_variant(Integer, "sqlite")  # more than 2 GiB; SQLite's integers have up to 64 bits anyway
 
 
 class Project(SQLModel, table=True):
-    """One recording and what became of it."""
+    """One recording with its state and options."""
 
     __tablename__ = "projects"
 
-    id: str = Field(primary_key=True)  # random, never used twice: media are cached for ever under it
+    id: str = Field(primary_key=True)  # random, never reused, as media are cached for ever under it
     name: str
     status: str  # importing | failed | ready
-    created: float  # when its upload began, where it was uploaded
+    created: float  # start of the upload, if it was uploaded
     updated: float
     source_name: str
     source_path: str | None = None  # absolute; the upload, or a recording on this machine
-    work_path: str | None = None  # absolute; set when the workspace is not in the project's folder
+    work_path: str | None = None  # absolute; set if the workspace is outside the project's folder
     media_version: str = ""  # changes when the recording is read again
     capture: dict[str, Any] = Field(default_factory=dict, sa_column=Column(JSON, nullable=False))
     notices: list[str] = Field(default_factory=list, sa_column=Column(JSON, nullable=False))
@@ -37,29 +37,29 @@ class Project(SQLModel, table=True):
     generator: str = Field(default=GENERATORS.default, sa_column_kwargs={"server_default": GENERATORS.default})
     matcher: str = Field(default=MATCHERS.default, sa_column_kwargs={"server_default": MATCHERS.default})
     arm: str = Field(default=ARMS.default, sa_column_kwargs={"server_default": ARMS.default})
-    register_depth: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # moved onto colour when read
-    scale: float = Field(default=1.0, sa_column_kwargs={"server_default": "1"})  # on every length of the recording when read
-    owner_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="SET NULL")  # who made it
-    assignee_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="SET NULL")  # whose turn it is
-    opinion_of: str | None = None  # a project of this recording, of which it is an independent one; it may be gone
+    register_depth: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # registered to colour when read
+    scale: float = Field(default=1.0, sa_column_kwargs={"server_default": "1"})  # factor on lengths when read
+    owner_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="SET NULL")  # its creator
+    assignee_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="SET NULL")  # current assignee
+    opinion_of: str | None = None  # the project of which it is a second opinion; may be deleted
     honeypot: bool = Field(
         default=False, sa_column_kwargs={"server_default": false()}
-    )  # its truth is known; visible to admins only
-    members_only: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # only they and admins see it
+    )  # ground truth is known; this is visible to admins only
+    members_only: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # members and admins only
     review_state: str = Field(default="draft", sa_column_kwargs={"server_default": "draft"})  # services/states.py
     tags: list[str] = Field(default_factory=list, sa_column=Column(JSON, nullable=False, server_default="[]"))
-    checklist: list[dict[str, str]] = Field(  # names and categories of objects that are to be clicked
+    checklist: list[dict[str, str]] = Field(  # names and categories of objects to be clicked
         default_factory=list, sa_column=Column(JSON, nullable=False, server_default="[]")
     )
-    archived: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # done with: not shown unless asked for
-    trashed: float | None = None  # when it was moved to the trash: hidden, with all files kept
-    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of everything a person gave
+    archived: bool = Field(default=False, sa_column_kwargs={"server_default": false()})  # completed: shown only on request
+    trashed: float | None = None  # time of the move to the trash: hidden, with all files kept
+    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: key of all user input
     size_bytes: int = Field(default=0, sa_type=BYTES, sa_column_kwargs={"server_default": "0"})  # of its folder
-    sized: float = Field(default=0.0, sa_column_kwargs={"server_default": "0"})  # when that was measured
+    sized: float = Field(default=0.0, sa_column_kwargs={"server_default": "0"})  # time of that measurement
 
 
 class Account(SQLModel, table=True):
-    """A person who may sign in."""
+    """A user account."""
 
     __tablename__ = "accounts"
     __table_args__ = (
@@ -69,14 +69,14 @@ class Account(SQLModel, table=True):
 
     id: int | None = Field(default=None, primary_key=True)
     name: str  # lower case
-    subject: str | None = None  # of an OpenID provider: the issuer, and whom it means for ever
+    subject: str | None = None  # OpenID issuer and subject, never reassigned
     role: str  # annotator | reviewer | admin
-    password: str  # argon2id, with its parameters and salt; empty: none opens it
+    password: str  # argon2id, with its parameters and salt; empty: no password is accepted
     created: float
 
 
 class Template(SQLModel, table=True):
-    """Names and categories of objects, to be clicked in whatever project takes them over."""
+    """Names and categories of objects, from which projects make checklists of objects to be clicked."""
 
     __tablename__ = "templates"
     __table_args__ = (UniqueConstraint("name", name="uq_templates_name"),)
@@ -89,7 +89,7 @@ class Template(SQLModel, table=True):
 
 
 class ProjectMember(SQLModel, table=True):
-    """Somebody who may see a project that not everybody may see."""
+    """A member of a project, who may see it even if it is restricted to members."""
 
     __tablename__ = "project_members"
 
@@ -98,18 +98,18 @@ class ProjectMember(SQLModel, table=True):
 
 
 class Seen(SQLModel, table=True):
-    """Up to where somebody has read what others did to a project."""
+    """The last event of a project that a user has read."""
 
     __tablename__ = "seen"
 
     project_id: str = Field(primary_key=True, foreign_key="projects.id", ondelete="CASCADE")
     account_id: int = Field(primary_key=True, foreign_key="accounts.id", ondelete="CASCADE")
-    event: int  # the last one; no foreign key: it is a place in their order
+    event: int  # the last read one; no foreign key, as it is a position in their order
     at: float
 
 
 class SignIn(SQLModel, table=True):
-    """One browser that is let in; without an account it is that of whoever started the server."""
+    """One session of a browser; without an account, of the user who started the server."""
 
     __tablename__ = "sign_ins"
 
@@ -120,7 +120,7 @@ class SignIn(SQLModel, table=True):
 
 
 class ApiToken(SQLModel, table=True):
-    """With which a program comes in; without an account it acts for whoever started the server."""
+    """An API token for a program; without an account it acts for the user who started the server."""
 
     __tablename__ = "api_tokens"
     __table_args__ = (UniqueConstraint("digest", name="uq_api_tokens_digest"),)
@@ -128,14 +128,14 @@ class ApiToken(SQLModel, table=True):
     id: int | None = Field(default=None, primary_key=True)
     digest: str  # SHA-256: the database alone gives no access
     account_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="CASCADE")
-    name: str  # what it is for
+    name: str  # its purpose
     scope: str  # metrics | read | annotator | reviewer | admin
     created: float
     used: float | None = None  # to the minute
 
 
 class Webhook(SQLModel, table=True):
-    """An address that is told of a project, or, an admin's, of all; without an account it is whoever started the server's."""
+    """A webhook for one project, or an admin's for all; without an account, of the user who started the server."""
 
     __tablename__ = "webhooks"
 
@@ -143,12 +143,12 @@ class Webhook(SQLModel, table=True):
     account_id: int | None = Field(default=None, foreign_key="accounts.id", ondelete="CASCADE")
     project_id: str | None = Field(default=None, foreign_key="projects.id", ondelete="CASCADE")
     url: str
-    secret: str  # signs what is posted: it is needed as it is
+    secret: str  # signs the messages, so it is stored in plain text
     created: float
 
 
 class Delivery(SQLModel, table=True):
-    """One message on its way to a webhook, stored with the change that it tells of."""
+    """One message to a webhook, stored in the transaction of the announced change."""
 
     __tablename__ = "webhook_deliveries"
     __table_args__ = (
@@ -159,17 +159,17 @@ class Delivery(SQLModel, table=True):
 
     id: int | None = Field(default=None, primary_key=True)
     webhook_id: int = Field(foreign_key="webhooks.id", ondelete="CASCADE")
-    event: str  # run.finished | state.changed
-    body: str  # JSON, as it is signed
+    event: str  # run.finished | state.changed | test
+    body: str  # JSON, as signed
     created: float
     attempts: int = 0
-    due: float | None = None  # when it is tried next; None: delivered, or given up
+    due: float | None = None  # time of the next attempt; None: delivered, or given up
     delivered: float | None = None
     answer: str = ""  # to the last attempt
 
 
 class LaunchKey(SQLModel, table=True):
-    """The key of a printed address that nobody has opened yet."""
+    """The unused one-time key of a printed address."""
 
     __tablename__ = "launch_keys"
 
@@ -178,7 +178,7 @@ class LaunchKey(SQLModel, table=True):
 
 
 class AuditEntry(SQLModel, table=True):
-    """Who was let in or refused, and who changed whose account. Append-only, but for the oldest of many refusals."""
+    """One audit entry: a sign-in, a refusal, or a change of an account. Append-only, except for the oldest of many refusals."""
 
     __tablename__ = "audit"
     __table_args__ = (Index("ix_audit_action", "action", "id"), {"sqlite_autoincrement": True})
@@ -186,27 +186,27 @@ class AuditEntry(SQLModel, table=True):
     id: int | None = Field(default=None, primary_key=True)
     at: float
     action: str  # schemas.AuditAction
-    account: str  # whose; no foreign key: the record outlives the account; "" for an unknown one, or none
-    who: str  # did it
-    client: str  # the address it came from; "" for the command line
+    account: str  # affected; no foreign key, as entries outlive accounts; "" if unknown or none
+    who: str  # author
+    client: str  # client address; "" for the command line
     detail: str
 
 
 class SentChange(SQLModel, table=True):
-    """A change that its sender marked with a key, and what was answered: sent again, it is not made again."""
+    """An applied change with its idempotency key and answer, so that a repeated request does not apply it again."""
 
     __tablename__ = "sent_changes"
 
-    digest: str = Field(primary_key=True)  # SHA-256 of who sent it and the key
+    digest: str = Field(primary_key=True)  # SHA-256 of sender and key
     request: str  # method and path
-    project_id: str | None = Field(default=None, index=True)  # no foreign key: it is stored before a new project is
+    project_id: str | None = Field(default=None, index=True)  # no foreign key, as it is stored before a new project
     at: float = Field(index=True)
     status: int | None = None  # None: the server stopped between the change and its answer
     answer: str = ""
 
 
 class Upload(SQLModel, table=True):
-    """A recording on its way in; its bytes are in the uploads folder, and how many they are is read from there."""
+    """An unfinished upload of a recording; its received size is that of its file in the uploads folder."""
 
     __tablename__ = "uploads"
 
@@ -214,13 +214,13 @@ class Upload(SQLModel, table=True):
     file_name: str
     name: str | None = None
     size: int = Field(sa_type=BYTES)
-    modified: float | None = None  # the file's own time of change: with name and size it tells that it is the same file
+    modified: float | None = None  # modification time, which with name and size identifies the file
     who: str
     created: float
 
 
 class SceneObject(SQLModel, table=True):
-    """One object a person named."""
+    """One annotated object."""
 
     __tablename__ = "objects"
     __table_args__ = (Index("ix_objects_project", "project_id"), {"sqlite_autoincrement": True})
@@ -230,17 +230,17 @@ class SceneObject(SQLModel, table=True):
     name: str
     category: str
     colour: int  # index into the palette
-    version: int = 1  # grows with every change
+    version: int = 1  # increased by every change
     deleted: bool = False
-    frames: dict[str, Any] = Field(  # by their numbers: a mask as in prompts.json, or None: not visible
+    frames: dict[str, Any] = Field(  # corrections by frame number: a mask as in prompts.json; None: not visible
         default_factory=dict, sa_column=Column(JSON, nullable=False, server_default="{}")
     )
-    front: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # drawn: as in prompts.json
+    front: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # drawn, as in prompts.json
     crop: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # as in prompts.json
-    masks_key: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what its masks depend on
-    assignee: str | None = Field(default=None, index=True)  # whose turn it is, by name
-    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of what a result depends on
-    run_name: str = Field(default="", sa_column_kwargs={"server_default": ""})  # in the last run; empty: as now
+    masks_key: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of all inputs of its masks
+    assignee: str | None = Field(default=None, index=True)  # current assignee, by name
+    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of all inputs of its results
+    run_name: str = Field(default="", sa_column_kwargs={"server_default": ""})  # name in the last run; empty: unchanged
 
     @property
     def result_name(self) -> str:
@@ -302,7 +302,7 @@ class Comment(SQLModel, table=True):
     x: float | None = None
     y: float | None = None
     point_world: list[float] | None = Field(default=None, sa_column=Column(JSON))
-    view: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # how 3D was looked at
+    view: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # schemas.ViewerLook
     text: str
     who: str
     at: float
@@ -311,7 +311,7 @@ class Comment(SQLModel, table=True):
 
 
 class TrueLength(SQLModel, table=True):
-    """A length that somebody measured in the room, and what it is of: an object's side, or between two points."""
+    """A length measured in the room: of an object's side, or between two points."""
 
     __tablename__ = "true_lengths"
     __table_args__ = (Index("ix_true_lengths_project", "project_id"), {"sqlite_autoincrement": True})
@@ -321,15 +321,15 @@ class TrueLength(SQLModel, table=True):
     object_id: int | None = Field(default=None, foreign_key="objects.id", ondelete="CASCADE")
     side: str = ""  # width | depth | height of the object
     points_world: list[list[float]] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))
-    scale: float  # the project's when the points were set: they lie where the world was as large
+    scale: float  # of the project when the points were set, in whose world they are given
     metres: float
-    text: str  # what it is of, in words
+    text: str  # description
     who: str
     at: float
 
 
 class Event(SQLModel, table=True):
-    """Who changed what, when, from what to what. Append-only: undo and redo are events too."""
+    """One change with author, time, old and new values. Append-only: undo and redo are events too."""
 
     __tablename__ = "events"
     __table_args__ = (
@@ -344,18 +344,18 @@ class Event(SQLModel, table=True):
     object_id: int | None = None
     scope: str  # prompts | review | proposals | project | state | comments
     action: str  # add point, rename … | undo | redo
-    text: str  # one line for a person
+    text: str  # one line for display
     frame: int | None = None
     who: str
     at: float
-    before: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))  # only what differs: see db/history.py
+    before: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))  # only differing keys: see db/history.py
     after: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
-    target: int | None = None  # the event an undo or redo is about
+    target: int | None = None  # the event undone or redone
     standing: str | None = None  # of a change of an object: done | undone | gone
 
 
 class Job(SQLModel, table=True):
-    """One piece of heavy work."""
+    """One job: an import, a sample, a run or variants."""
 
     __tablename__ = "jobs"
     __table_args__ = (Index("ix_jobs_state", "state"), Index("ix_jobs_project", "project_id"), {"sqlite_autoincrement": True})
@@ -372,12 +372,12 @@ class Job(SQLModel, table=True):
     message: str = ""
     error: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
     log_path: str | None = None
-    attempts: int = 0  # since it last got further
-    reached: int = Field(default=0, sa_column_kwargs={"server_default": "0"})  # stages it ever finished
+    attempts: int = 0  # since its last progress
+    reached: int = Field(default=0, sa_column_kwargs={"server_default": "0"})  # maximum number of finished stages
     who: str = ""
     owner: str | None = None  # host, process and a random word of the server that runs it
     worker_pid: int | None = None
-    worker_started: float | None = None  # the worker's creation time: its pid alone may be another's by now
+    worker_started: float | None = None  # the worker's creation time, as a pid alone may have been reused
     heartbeat: float | None = None  # last heartbeat of its owner, by the database's clock
     created: float
     started: float | None = None
@@ -385,7 +385,7 @@ class Job(SQLModel, table=True):
 
 
 class Part(SQLModel, table=True):
-    """An object of a stage of a running job, which any seat may compute; there while the stage is shared: jobs/sharing.py."""
+    """An object of a shared stage of a running job, which any seat may compute: jobs/sharing.py."""
 
     __tablename__ = "parts"
     __table_args__ = (UniqueConstraint("job_id", "stage", "name", name="uq_parts_object"), {"sqlite_autoincrement": True})
@@ -393,29 +393,29 @@ class Part(SQLModel, table=True):
     id: int | None = Field(default=None, primary_key=True)
     job_id: int = Field(foreign_key="jobs.id", ondelete="CASCADE")
     stage: str
-    name: str  # of the object, as the job's prompts have it
-    holder: str  # who makes the project's files, as the store has it
+    name: str  # of the object, as in the job's prompts
+    holder: str  # writer of the project's files, as in the store
     state: str  # waiting | running | stopping | done | failed
-    at_least: int  # as many a process takes, where its seat's share is so many: its start takes time too
-    owner: str | None = None  # of the process that computes it, as of a job
+    at_least: int  # minimum number per process, where its seat's share allows, as its start takes time too
+    owner: str | None = None  # of the process that computes it, in the format of Job.owner
     heartbeat: float | None = None  # last heartbeat of its owner for this part, by the database's clock
     attempts: int = 0
-    log: str = ""  # what its process wrote; of several that one process computed, the first has it
+    log: str = ""  # output of its process; stored with the first of several parts of one process
 
 
 class Seat(SQLModel, table=True):
-    """A process that takes jobs from a database that several share, while it lives."""
+    """A running process that takes jobs from a shared database."""
 
     __tablename__ = "seats"
     __table_args__ = (UniqueConstraint("owner", name="uq_seats_owner"),)
 
     id: int | None = Field(default=None, primary_key=True)
-    owner: str  # as of its jobs
+    owner: str  # as in its jobs
     version: str
-    jobs: int  # at a time
+    jobs: int  # maximum at a time
     began: float
     seen: float  # last heartbeat, by the database's clock
-    draining: bool = False  # it takes no further job
+    draining: bool = False  # it takes no further jobs
 
 
 class Message(SQLModel, table=True):
@@ -445,7 +445,7 @@ class JobEvent(SQLModel, table=True):
 
 
 class Computing(SQLModel, table=True):
-    """A time in which a project's live segmenter was at work: preparing, proposing or drawing masks."""
+    """An interval in which a project's live segmenter was working: preparing, proposing or computing masks."""
 
     __tablename__ = "computing"
     __table_args__ = (Index("ix_computing_project", "project_id"),)
@@ -470,4 +470,4 @@ class Bundle(SQLModel, table=True):
     size: int = Field(sa_type=BYTES)
     created: float
     certificate: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON))
-    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # the project's, when the run began
+    inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # of the project at the start of the run

@@ -16,8 +16,8 @@ from app.errors import DatabaseUnusable
 def require_usable(database: Path, *, anew: bool = False, to_write: bool = True) -> str | None:
     """The revision of its tables, None where there are none yet; raises DatabaseUnusable for an unusable file.
 
-    Usable is a sound database of a known revision, or a new one. With existing projects, a new one needs `anew`, i.e. they
-    will be adopted. `to_write`: it must be writable too.
+    Usable is a sound database of a known revision, or a new one. If there are projects already, a new one is refused
+    without `anew`, by which they will be adopted. `to_write`: it must also be writable.
     """
     if database.is_dir():
         raise DatabaseUnusable(f"{database}: a folder, where the database should be", hint="move it away")
