@@ -122,7 +122,7 @@ def verified(engine: Engine, name: str, password: str) -> Account | None:
 
 def person(account: Account) -> Person:
     """The Person of an account."""
-    role: Any = account.role  # the column holds no other
+    role: Any = account.role  # the column has no other values
     return Person(account.name, role, account=True)
 
 

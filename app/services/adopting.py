@@ -43,7 +43,7 @@ CHOSEN = {
     "tags",
     "checklist",
     "archived",
-}  # what people chose about a project
+}  # options of a project chosen by users
 _Said = TypeVar("_Said", Comment, TrueLength)
 _ID = re.compile(r"[0-9a-f]{12}")
 
@@ -182,7 +182,7 @@ def _adopt_said(
     told: list[dict[str, Any]],
     items: dict[int | None, SceneObject],
 ) -> None:
-    """Add rows of user statements whose times are not in the database."""
+    """Add rows of comments or true lengths whose author and time are not in the database."""
     stored = {(row.who, row.at) for row in session.exec(select(table).where(table.project_id == project.id))}
     for entry in told:
         if (entry.get("who"), entry.get("at")) not in stored:

@@ -10,7 +10,7 @@ from app.errors import Unavailable
 
 Work = Literal["sent", "finished", "deleted"]
 
-_WAIT_FOR: dict[Work, tuple[Work, ...]] = {  # an upload may be given up while it is still being sent
+_WAIT_FOR: dict[Work, tuple[Work, ...]] = {  # an upload may be deleted while it is still being sent
     "sent": ("sent", "finished", "deleted"),
     "finished": ("sent", "finished", "deleted"),
     "deleted": ("finished", "deleted"),

@@ -18,7 +18,7 @@ class Pace(NamedTuple):
 
 PACES = {
     "pair": Pace(5, 4.0),  # one account from one address
-    "client": Pace(30, 0.5),  # one address, which may be that of everybody behind a proxy
+    "client": Pace(30, 0.5),  # one address, possibly shared by all users behind a proxy
     "name": Pace(20, 2.0),  # one account, from anywhere
 }
 MOST_WAIT_S = 15.0  # maximum delay of an attempt, after which the correct password is accepted regardless of earlier ones

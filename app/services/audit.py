@@ -11,8 +11,8 @@ from app.db.engine import reading, writing
 from app.db.tables import Account, AuditEntry
 from r2c2r_core.errors import R2C2RError
 
-COMMAND_LINE = "the command line"  # of the machine that serves
-MOST_REFUSALS = 5000  # maximum stored, so that guessing for a month fills no disk
+COMMAND_LINE = "the command line"  # author of changes by `r2c2r user` and `r2c2r token`
+MOST_REFUSALS = 5000  # maximum stored, so that a month of password guessing does not fill the disk
 REFUSED: schemas.AuditAction = "refused"
 
 

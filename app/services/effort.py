@@ -57,7 +57,7 @@ def table(context: Context, project_id: str) -> str:
 
 
 def _really(one: schemas.TrueObject | None) -> list[str]:
-    """Truth columns of a honeypot's object; empty for others."""
+    """Ground-truth columns of a honeypot's object; empty for others."""
     if one is None:
         return ["", "", ""]
     same = "" if one.same_category is None else "yes" if one.same_category else "no"

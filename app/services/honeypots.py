@@ -1,4 +1,4 @@
-"""Honeypots: sample kitchens inserted into a user's queue, scored against truth. Admins only."""
+"""Honeypots: sample kitchens inserted into a user's queue, scored against ground truth. Admins only."""
 
 import json
 from collections.abc import Hashable
@@ -20,7 +20,7 @@ from app.services.overlap import Bits, Overlaps, spread
 from r2c2r_core.evaluate.iou import MIN_TRUTH_PX, read_mask
 from r2c2r_core.geometry.masks import pack_mask
 
-MOST_FRAMES = 30  # each is a picture per object
+MOST_FRAMES = 30  # each has a mask image per object
 FOUND_IOU = 0.5
 TRUTH, MASKS = "truth.json", "truth_masks"
 SOURCE_NAME = "scan.r3d"  # displayed name, like an uploaded recording
@@ -34,7 +34,7 @@ def listed(context: Context) -> list[schemas.Honeypot]:
 
 
 def slip(context: Context, project_id: str, body: schemas.HoneypotIn) -> schemas.Honeypot:
-    """Create a project from a sample kitchen's recording, assigned to a user without access to its truth."""
+    """Create a project from a sample kitchen's recording, assigned to a user without access to its ground truth."""
     with reading(context.engine) as session:
         sample = queries.project_row(session, project_id)
         context.store.fetch(project_id, recording=True)
@@ -100,7 +100,7 @@ def _frames(folder: Path) -> set[int]:
 
 
 def _truth_on(folder: Path, frame: int, width: int) -> dict[Hashable, Bits]:
-    """The true masks of a frame, by object, without those too small to be required."""
+    """Ground-truth masks of a frame, by object, without those too small to be required."""
     found = {path.parent.name: read_mask(path) for path in (folder / MASKS).glob(f"*/{frame:06d}.png")}
     large = {name: mask for name, mask in found.items() if np.count_nonzero(mask) >= MIN_TRUTH_PX}
     return {name: mask_bits(pack_mask(mask), width) for name, mask in large.items()}
@@ -111,6 +111,6 @@ def _shape(session: Session, row: Project) -> schemas.Honeypot:
         project=row.id,
         name=row.name,
         person=queries.account_name(session, row.assignee_id),
-        review_state=row.review_state,  # type: ignore[arg-type]  # the column holds no other
+        review_state=row.review_state,  # type: ignore[arg-type]  # the column has no other values
         made=row.created,
     )

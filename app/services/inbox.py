@@ -59,7 +59,7 @@ def _shape(project: Project, steps: list[Event]) -> schemas.InboxProject:
     return schemas.InboxProject(
         id=project.id,
         name=project.name,
-        review_state=project.review_state,  # type: ignore[arg-type]  # the column holds no other
+        review_state=project.review_state,  # type: ignore[arg-type]  # the column has no other values
         who=last.who if last else "",
         at=last.at if last else project.updated,
         reason=str((last.after or {}).get("reason", "")) if last else "",
@@ -77,7 +77,7 @@ def _objects(context: Context, session: Session, shown: Any) -> list[schemas.Inb
         schemas.InboxObject(
             project=project.id,
             project_name=project.name,
-            review_state=project.review_state,  # type: ignore[arg-type]  # the column holds no other
+            review_state=project.review_state,  # type: ignore[arg-type]  # the column has no other values
             object=item.id or 0,
             name=item.name,
             category=item.category,

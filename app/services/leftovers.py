@@ -1,7 +1,7 @@
 """Files in the data folder without a database row: set aside for an admin, never deleted.
 
 A row may be missing because of a crash, but also because the database was lost or an older one restored. Only files marked
-as incomplete are deleted: a mesh that was being received, the folder of an upload that was given up while it was becoming
+as incomplete are deleted: a mesh that was being received, the folder of an upload that was deleted while it was becoming
 a project.
 """
 

@@ -121,7 +121,7 @@ def segment_again(context: Context, project_id: str, object_id: int, key: str) -
 def tell_objects(context: Context, project: Project, *, starts: bool = False) -> None:
     """Send the current clicks to the live segmenter, as a click on one object may split another's front, or reunite it.
 
-    It is started for this if `starts` is set, and if masks depend on deleted clicks.
+    The segmenter is started if `starts` is set, or if masks depend on deleted clicks.
     """
     with context.live.telling:
         objects = _objects(context, project)
@@ -133,7 +133,7 @@ def tell_objects(context: Context, project: Project, *, starts: bool = False) ->
 def follow(context: Context, project_id: str, object_id: int, *, tells: bool = True) -> None:
     """Compute the masks of changed clicks, unless they exist (e.g. after an undo) or there are no clicks.
 
-    Without `tells` another object follows at once, which sends all objects.
+    Without `tells`, the project's objects are not sent, as a further call that follows at once sends them.
     """
     with reading(context.engine) as session:
         project = queries.project_row(session, project_id)
@@ -314,7 +314,7 @@ def _lane(item: SceneObject, found: Found | None) -> schemas.Lane:
     return schemas.Lane(
         object=item.id or 0,
         state=found.state,
-        source=found.source,  # type: ignore[arg-type]  # it is one of the two
+        source=found.source,  # type: ignore[arg-type]  # "live" or "run"
         complete=found.state == "done",
         frames=seen[:, 0].astype(int).tolist(),
         confidences=(

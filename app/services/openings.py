@@ -16,7 +16,7 @@ from r2c2r_core.synthesize.filmed import is_of
 from r2c2r_core.synthesize.marked import Marks, marks_of, part_of, remarked
 
 States = Mapping[str, Marks]
-"""What people marked of an object, by joint or its part."""
+"""States of an object marked by users, by joint or its part."""
 
 
 def openings(context: Context, project_id: str) -> list[schemas.Opening]:

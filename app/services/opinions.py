@@ -177,7 +177,7 @@ def _shape(session: Session, row: Project) -> schemas.Opinion:
         project=row.id,
         name=row.name,
         assignee=queries.account_name(session, row.assignee_id),
-        review_state=row.review_state,  # type: ignore[arg-type]  # the column holds no other
+        review_state=row.review_state,  # type: ignore[arg-type]  # the column has no other values
         objects=project_shapes.counts_of(session, row.id).objects,
         updated=row.updated,
     )

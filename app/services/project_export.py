@@ -162,7 +162,7 @@ def _length(row: TrueLength, project: Project, places: dict[int | None, int]) ->
     said = schemas.TrueLengthIn(
         metres=row.metres,
         object=places.get(row.object_id),
-        side=row.side or None,  # type: ignore[arg-type]  # the column holds no other
+        side=row.side or None,  # type: ignore[arg-type]  # the column has no other values
         points_world=points_now(row, project.scale),
         text=row.text,
     )

@@ -1,4 +1,4 @@
-"""Idempotent changes with a sender's key: applied once, answered repeatedly."""
+"""Idempotent changes with a sender's key: applied once, with a stored answer to repeated requests."""
 
 import hashlib
 import time

@@ -139,7 +139,7 @@ def _status(context: Context, session: Session, project: Project) -> schemas.Rev
     last = session.exec(query).first()
     moves = [
         schemas.ReviewMove(
-            to=to,  # type: ignore[arg-type]  # the table holds no other
+            to=to,  # type: ignore[arg-type]  # the table has no other values
             text=transition.text,
             role=transition.role,
             unmet=transition.check(context, session, project) if transition.check else [],
@@ -150,7 +150,7 @@ def _status(context: Context, session: Session, project: Project) -> schemas.Rev
         if came == project.review_state
     ]
     return schemas.ReviewStatus(
-        state=project.review_state,  # type: ignore[arg-type]  # the column holds no other
+        state=project.review_state,  # type: ignore[arg-type]  # the column has no other values
         who=last.who if last else "",
         at=last.at if last else None,
         reason=str((last.after or {}).get("reason", "")) if last else "",
