@@ -11,7 +11,7 @@ router = APIRouter(prefix="/api/projects/{project}/elevations", tags=["elevation
 
 @router.get("", operation_id="getElevations")
 def get_elevations(context: Ctx, project: str) -> schemas.Elevations:
-    """The planes to scale, with the lines that edges snap to; none until the live segmenter has drawn them."""
+    """Elevations with the line evidence that edges snap to; none until the live segmenter has rendered them."""
     return elevations.current(context, project)
 
 

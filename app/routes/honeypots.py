@@ -1,4 +1,4 @@
-"""Honeypots: for admins alone."""
+"""Honeypots, for admins only."""
 
 from fastapi import APIRouter
 

@@ -51,7 +51,7 @@ def scan_picture(context: Ctx, request: Request, project: str, side: Literal["pl
 
 @router.get("/elevations/{elevation}.png", operation_id="elevationPicture")
 def elevation_picture(context: Ctx, request: Request, project: str, elevation: RowId, v: str = "") -> Response:
-    """A plane of the scan from the front, a pixel a cell."""
+    """The picture of an elevation, one pixel per cell."""
     return send(request, elevations.picture(context, project, elevation), "image/png", immutable=bool(v))
 
 
@@ -104,7 +104,7 @@ def scene_picture(context: Ctx, request: Request, project: str, v: str = "") -> 
 
 @router.get("/report.html", operation_id="sceneReport")
 def scene_report(context: Ctx, request: Request, project: str) -> Response:
-    """The newest bundle's report, which may run no script; its pictures load from this origin."""
+    """The newest bundle's report, with scripts disabled; its pictures load from this origin."""
     answer = send(request, bundles.member(context, project, "report.html"), "text/html", immutable=False)
     answer.headers["content-security-policy"] = (
         "sandbox allow-same-origin; default-src 'none'; style-src 'unsafe-inline'; img-src data: 'self'; frame-ancestors 'self'"
@@ -114,7 +114,7 @@ def scene_report(context: Ctx, request: Request, project: str) -> Response:
 
 @router.get("/README.txt", operation_id="sceneReadme")
 def scene_readme(context: Ctx, request: Request, project: str) -> Response:
-    """How to load the newest bundle; its report links to it."""
+    """Loading instructions of the newest bundle, linked from its report."""
     return send(request, bundles.member(context, project, "README.txt"), "text/plain; charset=utf-8", immutable=False)
 
 

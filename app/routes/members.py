@@ -26,13 +26,13 @@ _OF_A_VIEW = re.compile(r"/viewer/([^/]+)(?:/.*)?", re.DOTALL)
 
 @router.get("", operation_id="getMembers")
 def get_members(context: Ctx, project: str) -> schemas.ProjectMembers:
-    """Who may see the project."""
+    """Visibility of the project."""
     return project_members.members(context, project)
 
 
 @router.put("", operation_id="setMembers")
 def set_members(context: Ctx, project: str, body: schemas.MembersIn) -> schemas.ProjectMembers:
-    """Open it to everybody who may sign in, or only to its owner and these people; 403 unless you are its owner or an admin."""
+    """Make the project visible to all users, or only to its owner and these; 403 unless you are its owner or an admin."""
     return project_members.set_members(context, project, body)
 
 

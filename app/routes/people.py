@@ -67,7 +67,7 @@ def remove_account(context: AdminCtx, name: str) -> None:
 
 
 def give_cookie(request: Request, response: Response, session_id: str) -> None:
-    """The session, where no script reads it and no other site sends it."""
+    """Set the session cookie, which no script can read and no other site can send."""
     secure = request.url.scheme == "https"
     name = cookie_name(request.scope)
     response.set_cookie(name, session_id, httponly=True, samesite="lax", secure=secure, max_age=KEPT_S, path="/")

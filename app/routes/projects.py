@@ -63,13 +63,13 @@ async def delete_project(context: AdminCtx, project: str) -> schemas.Trashed:
 
 @router.post("/{project}/duplicate", operation_id="duplicateProject", status_code=201)
 async def duplicate_project(context: Ctx, project: str) -> schemas.Project:
-    """A copy of the project, as a draft of yours."""
+    """Copy the project as a draft that you own."""
     return await context.gates.looks.run(context.who, copies.duplicate, context, project)
 
 
 @router.get("/{project}/file", operation_id="offerProjectFile")
 async def offer_project_file(context: Ctx, project: str) -> schemas.ProjectFileOffer:
-    """How large the project would be as one file (/media/{project}/project.zip), and its recording."""
+    """Size of the project as one file (/media/{project}/project.zip), and of its recording."""
     return await context.gates.looks.run(context.who, project_export.offer, context, project)
 
 
@@ -95,5 +95,5 @@ def get_camera(context: Ctx, project: str, frame: FrameNumber) -> schemas.FrameC
 def get_history(
     context: Ctx, project: str, object: OptionalId = None, before: OptionalId = None, limit: Count = 200
 ) -> list[schemas.HistoryEntry]:
-    """Who changed what, newest first."""
+    """Changes of the project with their authors, newest first."""
     return projects.history(context, project, object, before, limit)

@@ -64,19 +64,19 @@ def move_point(
 
 @router.delete("/objects/{object}/points/{point}", operation_id="deletePoint")
 def delete_point(context: Ctx, project: str, object: RowId, point: RowId, infer: bool = True) -> schemas.SceneObject:
-    """Take a click away."""
+    """Delete a click."""
     return prompts.delete_point(context, project, object, point, infer)
 
 
 @router.put("/objects/{object}/frames/{frame}", operation_id="setFrame")
 def set_frame(context: Ctx, project: str, object: RowId, frame: FrameNumber, body: schemas.FrameIn) -> schemas.SceneObject:
-    """Set the object's mask in that frame for good, or mark it as not visible there."""
+    """Correct the object in that frame: set a fixed mask, or mark it as not visible."""
     return prompts.say_of_frame(context, project, object, frame, body)
 
 
 @router.delete("/objects/{object}/frames/{frame}", operation_id="leaveFrame")
 def leave_frame(context: Ctx, project: str, object: RowId, frame: FrameNumber) -> schemas.SceneObject:
-    """Restore the mask found in that frame."""
+    """Remove the correction in that frame, which restores the computed mask."""
     return prompts.say_of_frame(context, project, object, frame, None)
 
 
@@ -106,7 +106,7 @@ def import_prompts(context: Ctx, project: str, body: schemas.PromptsFile) -> lis
 
 @router.get("/live", operation_id="getLive")
 def get_live(context: Ctx, project: str) -> schemas.LiveStatus:
-    """Whether masks can be drawn at once."""
+    """Status of the live segmenter."""
     return masks.status(context, project)
 
 
@@ -130,13 +130,13 @@ def cancel_segment(context: Ctx, project: str, object: RowId) -> schemas.SceneOb
 
 @router.get("/lanes", operation_id="getLanes")
 def get_lanes(context: Ctx, project: str) -> list[schemas.Lane]:
-    """Where each object is seen."""
+    """Frames with a mask of each object."""
     return masks.lanes(context, project)
 
 
 @router.get("/openings", operation_id="getOpenings")
 def get_openings(context: Ctx, project: str) -> list[schemas.Opening]:
-    """How fronts were filmed to move: their states by frame."""
+    """Filmed motion of fronts: joint states by frame."""
     return openings.openings(context, project)
 
 

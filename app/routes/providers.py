@@ -17,7 +17,7 @@ router = APIRouter(include_in_schema=False)
 
 PAGE = "/login/provider"
 BEGUN_S = 600  # time limit of a sign-in at the provider
-LONGEST_NEXT = 1000  # characters: a browser keeps no cookie of more than four thousand
+LONGEST_NEXT = 1000  # characters: browsers limit cookies to some four thousand
 
 
 @router.get(PAGE)
@@ -35,7 +35,7 @@ async def begin(context: OpenCtx, request: Request, next: str = "/") -> Response
 
 @router.get(f"{PAGE}/back")
 async def end(context: OpenCtx, request: Request) -> Response:
-    """Return from the provider: a session for the person it names, then the page asked for first."""
+    """Return from the provider: a session for the person it names, then the page requested first."""
     provider, begun = _provider(context), oidc.begun(cookie_parser(request.headers.get("cookie", "")).get(_name(request), ""))
     try:
         named = await provider.end(f"{_origin(request)}{PAGE}/back", request.query_params, begun)
@@ -53,7 +53,7 @@ async def end(context: OpenCtx, request: Request) -> Response:
 
 @router.get(f"{PAGE}/out")
 async def leave(context: OpenCtx, request: Request) -> Response:
-    """End the provider's own session too: otherwise the next visit is signed in again without a question."""
+    """End the provider's own session too: otherwise the next visit signs in again without asking."""
     back = f"{_origin(request)}/login"
     try:
         return RedirectResponse(await _provider(context).leave(back), status_code=303)

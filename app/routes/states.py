@@ -25,7 +25,7 @@ def step_review(context: Ctx, project: str, body: schemas.ReviewStep) -> schemas
 
 @router.get("/figures", operation_id="getFigures")
 def get_figures(context: Ctx, project: str) -> schemas.Figures:
-    """Clicks an object, automatic choices kept, time from upload to approval."""
+    """Clicks per object, fraction of automatic choices kept, time from upload to approval."""
     return states.figures(context, project)
 
 
@@ -48,7 +48,7 @@ def list_comments(context: Ctx, project: str) -> list[schemas.Comment]:
 
 @router.post("/comments", operation_id="addComment", status_code=201)
 def add_comment(context: Ctx, project: str, body: schemas.CommentIn) -> schemas.Comment:
-    """Say something about the project, an object, a pixel of a frame or a point of the scene."""
+    """Comment on the project, an object, a pixel of a frame or a point of the scene."""
     return comments.add(context, project, body)
 
 

@@ -18,19 +18,19 @@ def list_templates(context: Ctx) -> list[schemas.Template]:
 
 @router.post("/templates", operation_id="addTemplate", status_code=201)
 def add_template(context: Ctx, body: schemas.TemplateIn) -> schemas.Template:
-    """A new one; 409 when the name is taken."""
+    """Add a template; 409 when the name is taken."""
     return templates.add(context, body)
 
 
 @router.put("/templates/{template}", operation_id="changeTemplate")
 def change_template(context: Ctx, template: RowId, body: schemas.TemplateIn) -> schemas.Template:
-    """Change its name or objects; 403 unless it is yours or you are an admin."""
+    """Change a template's name or objects; 403 unless it is yours or you are an admin."""
     return templates.change(context, template, body)
 
 
 @router.delete("/templates/{template}", operation_id="removeTemplate", status_code=204)
 def remove_template(context: Ctx, template: RowId) -> None:
-    """Delete it; projects keep the objects they took over. 403 unless it is yours or you are an admin."""
+    """Delete a template; existing checklists are unchanged. 403 unless it is yours or you are an admin."""
     templates.remove(context, template)
 
 

@@ -17,13 +17,13 @@ def list_unknown(context: AdminCtx) -> list[schemas.UnknownFolder]:
 
 @router.post("/{entry}/adopt", operation_id="adoptUnknown")
 async def adopt_unknown(context: AdminCtx, entry: str) -> schemas.Project:
-    """Make it a project again, with its clicks, verdicts, corrections, comments, recording and bundles."""
+    """Restore a folder as a project, with its clicks, verdicts, corrections, comments, recording and bundles."""
     return await context.gates.looks.run(context.who, unknown.adopt, context, entry)
 
 
 @router.post("/{entry}/leave", operation_id="leaveUnknown")
 def leave_unknown(context: AdminCtx, entry: str) -> schemas.UnknownFolder:
-    """Leave it where it is; it is listed as left in place."""
+    """Leave a folder where it is; it is then listed as left in place."""
     return unknown.leave(context, entry)
 
 

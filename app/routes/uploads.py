@@ -16,7 +16,7 @@ Offset = Annotated[int, Header(alias="Upload-Offset", ge=0, lt=2**53)]
 
 @router.get("", operation_id="listUploads")
 def list_uploads(context: Ctx) -> list[schemas.Upload]:
-    """Your uploads that stopped and may go on."""
+    """Your unfinished uploads, which may be resumed."""
     return uploads.unfinished(context)
 
 
@@ -44,7 +44,7 @@ async def continue_upload(context: Ctx, request: Request, upload: str, offset: O
 
 @router.post("/{upload}/finish", operation_id="finishUpload", status_code=202)
 async def finish_upload(context: Ctx, upload: str) -> schemas.Project:
-    """Turn it into a project and start the import. Idempotent; 429 while others of yours are being checked."""
+    """Make a project of a complete upload and start the import. Idempotent; 429 while others of yours are being checked."""
     return await context.gates.looks.run(context.who, uploads.finish, context, upload)
 
 

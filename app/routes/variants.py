@@ -23,5 +23,5 @@ def make_variants(context: Ctx, project: str, body: schemas.VariantsIn) -> schem
 
 @router.delete("/{variants_name}", operation_id="deleteVariants")
 def delete_variants(context: Ctx, project: str, variants_name: schemas.VariantsName) -> schemas.Variants:
-    """Delete variants that were made; asking twice is the same as once, and the same seed makes them again."""
+    """Delete variants. Idempotent; the same seed makes them again."""
     return variants.delete(context, project, variants_name)

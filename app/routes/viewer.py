@@ -43,7 +43,7 @@ async def get_picked(context: Ctx, request: Request, project: str) -> schemas.Vi
 
 @router.get("/api/projects/{project}/viewer/camera", operation_id="getViewerCamera")
 async def get_viewer_camera(context: Ctx, request: Request, project: str) -> schemas.ViewerCamera:
-    """Where the camera of the 3D view stands."""
+    """Position and target of the 3D view's camera."""
     return await context.gates.views.run(context.who, viewers.camera, context, project, request.state.session)
 
 

@@ -30,7 +30,7 @@ def remove_webhook(context: Ctx, webhook: RowId) -> None:
 
 @router.post("/{webhook}/test", operation_id="testWebhook", status_code=201)
 def test_webhook(context: Ctx, webhook: RowId) -> schemas.Delivery:
-    """Post {"event": "test"} to it, once; the answer stands in its deliveries within seconds."""
+    """Post {"event": "test"} to it, once; the answer appears in its deliveries within seconds."""
     return webhooks.test(context, webhook)
 
 
