@@ -8,7 +8,7 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.foreign import refuse_foreign
 
 MAX_DIRECTORY_BYTES = 64 * 1024 * 1024  # of the archive's own table of contents
-MAX_RATIO = 200.0  # unpacked to packed, over the whole archive; images and depth do not compress like this
+MAX_RATIO = 200.0  # unpacked to packed, over the whole archive; images and depth compress far less
 LONGEST_NAME = 1000  # characters, folders included
 DEEPEST = 32  # folders in folders
 READ_BYTES = 1 << 20  # of the table of contents at once
@@ -29,7 +29,7 @@ def check_archive(path: Path, name: str, *, max_bytes: int, max_files: int) -> N
             members = archive.infolist()
     except (zipfile.BadZipFile, NotImplementedError, ValueError, OSError, OverflowError) as error:
         raise CaptureError(f"{name} is damaged or cut short ({error})", hint="copy it from the phone again") from error
-    if members and min(member.header_offset for member in members) > 0:  # the end is that of a zip inside it
+    if members and min(member.header_offset for member in members) > 0:  # the end record belongs to a zip inside it
         raise CaptureError(f"{name} is cut short: its table of contents is missing", hint="copy it again")
     _refuse_unsafe(members, path.stat().st_size, max_bytes, max_files)
 

@@ -3,15 +3,15 @@
 R2C2RError (r2c2r_core.errors)
 ├── AppError
 │   ├── NotFound            404
-│   ├── Conflict            409   someone else changed it; `current` is what is stored now
+│   ├── Conflict            409   changed by someone else; `current` is the stored state
 │   ├── Unauthorised        401
 │   ├── Forbidden           403
 │   ├── TooLarge            413
-│   ├── TooMany             429   the same was tried too often
-│   ├── NotReady            409   the thing asked for is not made yet
-│   └── Unavailable         503   a helper process is down
+│   ├── TooMany             429   too many attempts or requests
+│   ├── NotReady            409   the requested result does not exist yet
+│   └── Unavailable         503   a helper process, the database or a store is down
 ├── DatabaseUnusable        503   damaged, of a newer r2c2r, not writable (exit 2)
-└── the core's own errors   422 what was given, 507/503 the machine, 500 the work
+└── the core's own errors   422 the input, 507/503 the machine, 500 the work
 """
 
 from typing import Any
@@ -24,11 +24,11 @@ class AppError(core.R2C2RError):
 
 
 class NotFound(AppError):
-    """No such thing."""
+    """The requested resource does not exist."""
 
 
 class Conflict(AppError):
-    """It changed meanwhile; `current` is what is stored now."""
+    """The resource was changed in the meantime; `current` is the stored state."""
 
     def __init__(self, message: str, *, hint: str = "", current: Any = None) -> None:
         super().__init__(message, hint=hint)
@@ -36,11 +36,11 @@ class Conflict(AppError):
 
 
 class Unauthorised(AppError):
-    """No session."""
+    """The request has no valid session."""
 
 
 class Forbidden(AppError):
-    """Not allowed from here."""
+    """The user or the origin of the request lacks the right."""
 
 
 class TooLarge(AppError):
@@ -48,7 +48,7 @@ class TooLarge(AppError):
 
 
 class TooMany(AppError):
-    """The same was tried too often; `retry_s` says when it may be tried again."""
+    """Too many attempts or requests; `retry_s` is the time until the next may succeed."""
 
     def __init__(self, message: str, *, hint: str = "", retry_s: int = 60) -> None:
         super().__init__(message, hint=hint)
@@ -56,15 +56,15 @@ class TooMany(AppError):
 
 
 class NotReady(AppError):
-    """The thing asked for is not made yet."""
+    """The requested result does not exist yet."""
 
 
 class Unavailable(AppError):
-    """A helper process is down."""
+    """A helper process, the database or a store is temporarily unavailable."""
 
 
 class DatabaseUnusable(core.InputError):
-    """The database file is damaged, of a newer r2c2r, not writable, or none."""
+    """The database is damaged, of a newer r2c2r, not writable, missing, or not a database."""
 
 
 class NoSpace(core.EnvironmentProblem):

@@ -114,7 +114,7 @@ class ProjectFiles:
     def write(self, path: Path, content: bytes) -> None:
         """Write a file below the project's folder; raises NotFound where the project was deleted meanwhile.
 
-        A folder that came back after its deletion would be in the way of whoever adopts a copy of the project.
+        A folder recreated after its deletion would block the adoption of a copy of the project.
         """
         folder = self.root
         with explained_io(path):
@@ -133,7 +133,7 @@ class ProjectFiles:
 
     @property
     def awaited_frames(self) -> Path:
-        """The frames of the recording that an imported project was made from (awaited-frames.json): no other may be read."""
+        """Frames of an imported project's recording (awaited-frames.json); another recording is refused."""
         return self.root / "awaited-frames.json"
 
     @property
@@ -231,8 +231,7 @@ def free_bytes(folder: Path) -> int:
 def folder_bytes(folder: Path) -> int:
     """Bytes of all files below the folder; links are not followed.
 
-    Workers write while this walks: a file that is renamed or deleted between
-    its listing and its measuring counts nothing.
+    A file that a worker renames or deletes between listing and measuring is not counted.
     """
     total = 0
     for parent, _, names in os.walk(folder):

@@ -18,7 +18,7 @@ KEPT_BYTES = 16 * 1024 * 1024  # of messages, for reconnecting tabs; a mask is s
 WAITING_BYTES = 8 * 1024 * 1024  # of messages waiting for one tab
 PRESENCE_S = 0.2  # minimum interval of presence updates: 300 tabs that connect at once get a few messages each
 
-Presences = dict[str, list[dict[str, Any]]]  # by project: its tabs' people
+Presences = dict[str, list[dict[str, Any]]]  # by project: users of its tabs
 
 
 @dataclass(frozen=True, slots=True)

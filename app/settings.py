@@ -56,31 +56,31 @@ class Settings:
     store: str = field(default_factory=lambda: os.environ.get("R2C2R_STORE", ""))  # of files; empty: the data folder
     cache_gb: str = field(
         default_factory=lambda: os.environ.get("R2C2R_CACHE_GB", "")
-    )  # of a store's; empty: all that was used
-    log: str = field(default_factory=lambda: os.environ.get("R2C2R_LOG", ""))  # "json": one object a line
+    )  # maximum size of a store's cache; empty: unlimited
+    log: str = field(default_factory=lambda: os.environ.get("R2C2R_LOG", ""))  # "json": one object per line
     traces: str = field(default_factory=lambda: os.environ.get("R2C2R_TRACES", ""))  # "otlp": sent to a collector
     compute: str = field(default_factory=lambda: os.environ.get("R2C2R_COMPUTE", ""))  # ray; empty: this machine
     identity: str = field(default_factory=lambda: os.environ.get("R2C2R_IDENTITY", ""))  # proxy:HEADER or oidc:ISSUER
     oidc_client: str = field(default_factory=lambda: os.environ.get("R2C2R_OIDC_CLIENT", ""))
     oidc_secret: str = field(default_factory=lambda: os.environ.get("R2C2R_OIDC_SECRET", ""), repr=False)
     oidc_roles: str = field(default_factory=lambda: os.environ.get("R2C2R_OIDC_ROLES", ""))  # group=role,…
-    default_role: str = field(default_factory=lambda: os.environ.get("R2C2R_DEFAULT_ROLE", "annotator"))  # at first sight
+    default_role: str = field(default_factory=lambda: os.environ.get("R2C2R_DEFAULT_ROLE", "annotator"))  # on first use
     trusted_proxies: tuple[str, ...] = field(default_factory=lambda: _listed(os.environ.get("R2C2R_TRUSTED_PROXIES", "")))
-    webhooks_to: str = field(default_factory=lambda: os.environ.get("R2C2R_WEBHOOKS_TO", ""))  # networks beside public ones
+    webhooks_to: str = field(default_factory=lambda: os.environ.get("R2C2R_WEBHOOKS_TO", ""))  # allowed private networks
     launch_token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
     host: str = "127.0.0.1"
     allowed_hosts: tuple[str, ...] = LOOPBACK
-    accounts_only: bool = False  # others can reach it: the printed key opens nothing, people sign in
+    accounts_only: bool = False  # reachable by others: users sign in with accounts, there is no printed key
     import_roots: tuple[Path, ...] = ()
     max_upload_bytes: int = MAX_UPLOAD_BYTES
-    upload_kept_s: float = 7 * 24 * 3600.0  # an upload that stopped may go on for this long
+    upload_kept_s: float = 7 * 24 * 3600.0  # time within which an interrupted upload can be resumed
     max_unpacked_bytes: int = 64 * 1024 * MEBIBYTE
     max_unpacked_files: int = 200_000
-    min_free_bytes: int = 512 * MEBIBYTE  # left on the disk when anything starts
-    job_memory_bytes: int = 2048 * MEBIBYTE  # free before a job starts: what a kitchen of a recording of minutes takes
+    min_free_bytes: int = 512 * MEBIBYTE  # minimum left on the disk when anything starts
+    job_memory_bytes: int = 2048 * MEBIBYTE  # minimum free before a job starts: the need of a recording of some minutes
     quotas: Quotas = Quotas()
     heavy_jobs: int = 1
-    workers: int = 0  # objects of a job side by side; 0: as cores, shared by the heavy jobs, and memory allow
+    workers: int = 0  # parallel objects of a job; 0: as many as memory and its share of the cores allow
     job_attempts: int = 3  # tries of a job whose process vanishes without progress
     job_losses: int = 10  # the same when its server vanishes, which is rarely the job's fault
     sharing_costs_s: float = 6.0  # overhead of a stage shared by several seats: two process starts
@@ -89,11 +89,11 @@ class Settings:
     kill_grace_s: float = 2.0  # between asking a worker to stop and killing it
     live_idle_s: float = 600.0
     viewer_idle_s: float = 600.0
-    viewer_answer_s: float = 60.0  # until the 3D view's process must have answered
+    viewer_answer_s: float = 60.0  # timeout of an answer of the 3D view's process
     viewer_page_s: float = 10.0  # the same for a file of its page, and for its connection
-    busy_s: float = BUSY_S  # until a request that waits for another's write is refused
-    run_jobs: bool = True  # tests of other things leave the queue alone
-    prepare_imports: bool = True  # for the live segmenter, once they were read; likewise
+    busy_s: float = BUSY_S  # maximum wait of a request for another writer, before it is refused
+    run_jobs: bool = True  # False in tests that do not need the queue
+    prepare_imports: bool = True  # prepare newly read recordings for the live segmenter; likewise
     preview_width: int = 960
     user: str = field(default_factory=lambda: _user_name())
 

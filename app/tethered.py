@@ -14,7 +14,7 @@ import threading
 def main(command: list[str]) -> int:
     """Run the program and return its exit status."""
     child = subprocess.Popen(command, stdin=subprocess.PIPE)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it is sent to the whole group: the program has it too
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # sent to the whole group, so the program gets it too
     threading.Thread(target=_hand_on, args=(child,), daemon=True).start()
     status = child.wait()
     if status < 0:  # killed by a signal, which is passed on
@@ -29,7 +29,7 @@ def _hand_on(child: "subprocess.Popen[bytes]") -> None:
         try:
             child.stdin.write(said)
             child.stdin.flush()
-        except OSError:  # it has ended, or reads no more
+        except OSError:  # the program has ended, or closed its stdin
             continue
     os.killpg(0, signal.SIGKILL)
 
