@@ -1,4 +1,4 @@
-"""How fronts were filmed to move, as it goes over the wire: schemas.Opening of each leaf, without its object."""
+"""API encoding of filmed motions of leaves: schemas.Opening of each, without its object."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -8,7 +8,7 @@ from r2c2r_core.synthesize.marked import Marks, moved
 
 
 def motion_lines(motions: Iterable[JointMotion]) -> list[dict[str, Any]]:
-    """A line each; states by frame, in rad or m."""
+    """One line per leaf that moves; states by frame, in rad or m."""
     return [
         {
             "part": motion.part,
@@ -27,7 +27,7 @@ def motion_lines(motions: Iterable[JointMotion]) -> list[dict[str, Any]]:
 
 
 def marked_line(line: dict[str, Any], marks: Marks) -> dict[str, Any]:
-    """The line with what a person marked of it (rad or m by frame), and what was measured in other frames moved along."""
+    """The line with a user's marks (rad or m by frame), and measured states of other frames corrected by them."""
     found = JointMotion(
         part=line["part"],
         kind=line["kind"],

@@ -1,8 +1,8 @@
-"""A first look at what was uploaded, in a process of its own: `python -m app.jobs.probe recording|mesh FILE NAME`.
+"""Validation of an uploaded file in a process of its own: `python -m app.jobs.probe recording|mesh FILE NAME`.
 
-It opens a recording as the import will and decodes a few of its frames, or makes a candidate of a mesh as a run will and says
-what it looks like ({"seen": ...}), so that what cannot be used is refused while its sender is still there. NAME is the sender's
-name of it, for messages.
+It opens a recording as the import does and decodes a few of its frames, or makes a candidate of a mesh as a run does and
+reports a preview ({"seen": ...}), so that unusable files are refused during the request. NAME is the sender's file name, for
+messages.
 """
 
 import argparse

@@ -18,7 +18,7 @@ class Order:
     store: str  # empty: all machines share the data folder, at the same path
     cache_gb: str
     cpus: int
-    gpu: bool  # where the cluster has any
+    gpu: bool  # required if the cluster has any
     memory_bytes: int
     grace_s: float
     python: str = sys.executable

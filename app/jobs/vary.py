@@ -1,6 +1,6 @@
 """Variants of a bundle as a job: `python -m app.jobs.vary BUNDLE FOLDER --count 100 --seed 0`.
 
-The folder gets the variants as one zip, the picture wall of the first of them and, last, facts.json.
+The folder gets the variants as one zip, a picture of the first of them and, last, facts.json.
 """
 
 import argparse
@@ -33,7 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def vary(bundle: Path, files: VariantFiles, count: int, seed: int, progress: Progress) -> None:
-    """Variants of the bundle; whatever stops it leaves no facts, and nothing large."""
+    """Make variants of the bundle; if interrupted, neither facts.json nor large files are left."""
     from r2c2r_core.export.archive import write_zip
     from r2c2r_core.variants.stage import make_variants
 
