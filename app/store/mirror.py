@@ -62,7 +62,7 @@ class Held:
 
     names: Names = field(default_factory=dict)
     tag: str | None = None
-    recording: bool = False  # whether its recording was asked for
+    recording: bool = False  # whether its recording was requested
 
 
 class Manifest(NamedTuple):
@@ -81,7 +81,7 @@ class Mirror:
         self._locks: defaultdict[str, threading.RLock] = defaultdict(threading.RLock)
         self._holders: dict[str, str] = {}  # this machine's holder name in manifests, by project
         self._used: dict[str, float] = {}
-        self._seen: set[str] = set()  # since they were last kept
+        self._seen: set[str] = set()  # projects requested since their last upload
         self._swept: dict[str, float] = {}
 
     def fetch(self, project_id: str, *, recording: bool = False) -> None:

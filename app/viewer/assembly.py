@@ -23,7 +23,7 @@ from r2c2r_core.model.scene import ArticulatedScene, Link
 Draw = Literal["meshes", "wireframe", "colliders", "both", "distance", "unobserved"]
 _COLLIDER, _WIRE, _CUT = (86, 180, 233), (120, 130, 145), (230, 60, 150)
 _CUT_M = 0.004  # thickness of cut edges
-_CHOSEN, _CHOSEN_PX = (20, 130, 255), 3  # the box round the chosen object
+_CHOSEN, _CHOSEN_PX = (20, 130, 255), 3  # the box around the chosen object
 
 
 @dataclass(slots=True)
@@ -41,11 +41,11 @@ class Shape(NamedTuple):
 
     vertices: Points
     faces: np.ndarray
-    mesh: TexturedMesh | None  # with its texture; None: in the colour
+    mesh: TexturedMesh | None  # textured; None: in `colour`
     colour: tuple[int, int, int]
     is_wire: bool
     opacity: float | None
-    painted: np.ndarray | None = None  # RGB of each vertex, instead of the texture or the colour
+    painted: np.ndarray | None = None  # RGB of each vertex, instead of texture or colour
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,9 +68,9 @@ class Assembly:
     frames: dict[str, Any] = field(default_factory=dict)
     joints: dict[str, JointValue] = field(default_factory=dict)
     hidden: frozenset[str] = frozenset()
-    boxes: list[Any] = field(default_factory=list)  # round the chosen object
-    ahead: tuple[float, float] = (0.0, -1.0)  # where fronts face, where none opens
-    span: Span = field(init=False)  # of all of it, closed and uncut
+    boxes: list[Any] = field(default_factory=list)  # around the chosen object
+    ahead: tuple[float, float] = (0.0, -1.0)  # direction of the fronts, if none open
+    span: Span = field(init=False)  # of the whole scene, closed and uncut
     parts: dict[str, tuple[Vector3, Vector3]] = field(init=False)  # bounds of each object, as fractions of the span
 
     def __post_init__(self) -> None:

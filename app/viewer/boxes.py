@@ -1,4 +1,4 @@
-"""The edges of a box, to be drawn as lines."""
+"""Edges of a box as line segments."""
 
 import numpy as np
 

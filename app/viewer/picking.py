@@ -9,7 +9,7 @@ import numpy as np
 from r2c2r_core.arrays import Points, Vector3
 
 _FLAT = 1e-12  # m3: a face parallel to the ray
-_NEAR = 0.01  # of the distance: how far beside the ray a point of the scan may lie
+_NEAR = 0.01  # maximum distance of a scan point from the ray, as a fraction of its distance
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class Picked:
     """The last pick, numbered."""
 
     number: int = 0
-    name: str = ""  # of the object; empty where none is
+    name: str = ""  # of the object; empty without one
     point: list[float] | None = None  # in the world
 
 

@@ -42,9 +42,9 @@ class View:
     work: Workspace
     shown: list[Any] = field(default_factory=list)
     cloud: list[Any] = field(default_factory=list)
-    cloud_of: tuple[Any, ...] = ()  # which of its points are shown
+    cloud_of: tuple[Any, ...] = ()  # key of the shown points
     assembly: Assembly | None = None
-    assembled: tuple[Any, ...] = ()  # what the assembly was made from
+    assembled: tuple[Any, ...] = ()  # key of its content
     preview: list[str] = field(default_factory=list)  # names of objects that are not shown as in the last run
     showing: int = 0  # counter for node names, as a replaced node of the same name keeps its text in the browser
     mode: str = ""
@@ -80,7 +80,7 @@ class View:
         try:
             self.text = _MODES[self.mode](self, wish | {"values": values})
         finally:
-            self._show_cloud(wanted, wish.get("clip"))  # also where there is no scene yet
+            self._show_cloud(wanted, wish.get("clip"))  # also without a scene
         for number, mark in enumerate(wish.get("marks", ())):
             self._add_mark(f"/marks/{self.showing}/{number}", mark)
         self._add_tape(np.asarray(wish.get("tape") or (), dtype=np.float64).reshape(-1, 3))
