@@ -321,7 +321,7 @@ class TrueLength(SQLModel, table=True):
     object_id: int | None = Field(default=None, foreign_key="objects.id", ondelete="CASCADE")
     side: str = ""  # width | depth | height of the object
     points_world: list[list[float]] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))
-    scale: float  # of the project when the points were set, in whose world they are given
+    scale: float  # of the project when the points were set; their coordinates are at this scale
     metres: float
     text: str  # description
     who: str

@@ -186,15 +186,15 @@ class LiveSeat:
             self._stop("", {"id": number})
 
     def _run(self, server: str, number: str, project: str, options: tuple[str, ...]) -> None:
-        """One from its start to its end."""
+        """Run one worker from its start to its end."""
         try:
             self._store.fetch(project)
             self._relay(server, number, project, options)
-            self._store.keep(project)  # what it prepared: a run goes on from it, wherever that is
+            self._store.keep(project)  # a run on any machine continues from what it prepared
         except (R2C2RError, OSError) as error:
             said = error if isinstance(error, R2C2RError) else EnvironmentProblem(f"the seat: {error}", hint="see its log")
             self._tell(server, "live-line", id=number, line={"state": "failed", "error": told(said)})
-        except Exception:  # the edge of a thread
+        except Exception:  # the edge of a thread: any failure ends only this worker
             _log.exception("live masks of %s", project)
         with self._lock:
             self._workers.pop(number, None)
