@@ -19,13 +19,6 @@ BETTER = {
     "segment.things.pixel_cut.smooth": "contrast across the borders that are sure in the same recording",
     "segment.planes.cell_m": "the spacing of the fused surface",
     "generate.lathe.bitten": "the likelihood of a profile under depth and masks, neck and body apart",
-    "generate.rear_edge.bin_m": "a change point of pixels, each weighed by the recording's depth noise, rather than of strips",
-    "generate.rear_edge.before_m": "the same",
-    "generate.rear_edge.clearer": "the same: the likelihood of an end against that of none",
-    "generate.rear_edge.flattest": "the same: a ray's weight falls with its slant",
-    "generate.rear_edge.least_gap_m": "the same",
-    "generate.rear_edge.sure": "the same",
-    "generate.rear_edge.widest_m": "the spread of the box's fit",
     "generate.boxed.looked_at": "every frame that shows the front, weighted by what it adds",
     "generate.consistency.judges": "every frame that sees the object, weighted by what it adds",
 }
@@ -37,8 +30,6 @@ WHY = (
     "`generate.lathe.bitten` above 1 called every mask bitten; it is bounded below 1 now.",
     "`segment.things.visual_hull.inside` and `pose_share` choose between a hull and a cylinder for one bottle, and",
     "`generate.consistency.judges` below 8 chooses another candidate; each stands where the choice is the right one.",
-    "The numbers of `generate.rear_edge` turn one event on or off: whether the rear edge of a refrigerator, at the limit of",
-    "what depth shows, is believed.",
 )
 """Of those with the largest effects: what they decide."""
 

@@ -9,7 +9,7 @@ from r2c2r_core.kitchen.categories import every_category
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.box import find_rectangle
-from r2c2r_core.segment.appliances.fit import fit_box
+from r2c2r_core.segment.appliances.fit import FittedBox, fit_box
 from r2c2r_core.segment.appliances.looked_past import looked_past
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, near_plane, nudged
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
@@ -54,8 +54,8 @@ def appliance_front(
     others: Points = NOWHERE,
     *,
     glimpse: bool = False,
-) -> tuple[Front, bool] | None:
-    """Appliance front with its depth, and whether the depth was observed (not the usual one); None where no front is found.
+) -> FittedBox | None:
+    """Appliance front with its depth; None where no front is found.
 
     `others` are clicks on other objects: those on its own plane lie beside it.
 
@@ -83,7 +83,8 @@ def appliance_front(
     front = Front(run, cell, handle, kind.depth.usual)
     wall = depth_behind(front, prepared.scene.capture.room, kind).wall_m
     fitted = fit_box(front, prepared.scene, kind, wall, photographs=not glimpse)
-    return replace(fitted.front, cell=_nudged(fitted.front.cell, on[1:], off, run.grid.cell_m)), fitted.depth_seen
+    cell = _nudged(fitted.front.cell, on[1:], off, run.grid.cell_m)
+    return fitted._replace(front=replace(fitted.front, cell=cell))
 
 
 def _rectangle(

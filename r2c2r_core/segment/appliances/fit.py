@@ -119,6 +119,12 @@ class FittedBox(NamedTuple):
     covariance: np.ndarray  # (7, 7) of x, y, z of the centre (world, m), yaw (rad), width, depth and height (m)
     depth_seen: bool  # depth was observed, not the usual one of its category
 
+    def warnings(self, category: str) -> tuple[str, ...]:
+        """Warning about a depth that was not observed."""
+        if self.depth_seen:
+            return ()
+        return (f"its depth was not seen: {self.front.depth_m:.2f} m is assumed, as for a {category}",)
+
 
 class Evidence(NamedTuple):
     """Evidence that stays constant during the fit, in the front's frame."""

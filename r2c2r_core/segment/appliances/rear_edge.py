@@ -24,6 +24,12 @@ class Params:
     """Tuned parameters of rear-edge detection."""
 
     flattest: float = param(0.08, "cosine", "Minimum cosine between a ray and the face's normal for the ray to count")
+    from_share: float = param(
+        0.3,
+        "share",
+        "Depth behind the front from which a face is examined, relative to the minimum depth: doors end there",
+    )
+    margin: float = param(0.1, "share", "Fraction of a face ignored at either of its edges along the depth", lt=0.5)
     beyond_m: float = param(0.08, "m", "Distance past the greatest possible depth up to which rays count")
     before_m: float = param(0.05, "m", "Distance in front of the face beyond which a point belongs to an occluder")
     bin_m: float = param(0.01, "m", "Width of the bins along the face", gt=0)
@@ -46,7 +52,7 @@ def rear_edge(
         crossings, behind = [np.zeros(0)], [np.zeros(0)]
         for frame in frames:
             y, gap = _continued(box, face, box[list(other)], frame, scene, world_from_front)
-            within = (y > 0.3 * depth.low) & (y < farthest_m + params.beyond_m)
+            within = (y > params.from_share * depth.low) & (y < farthest_m + params.beyond_m)
             y, gap = y[within], gap[within]
             known = y < depth.low
             if known.sum() < params.least or np.count_nonzero(~known) < params.least:
@@ -67,7 +73,7 @@ def _continued(
     axis, side = (2, 1.0) if face == TOP else (0, 1.0 if face == RIGHT else -1.0)
     front_from_camera = world_from_front.inverse @ frame.world_from_camera
     eye = front_from_camera.translation
-    if side * (eye[axis] - box[face]) <= 0.05:
+    if side * (eye[axis] - box[face]) <= 0:
         return np.zeros(0), np.zeros(0)
     depth_m = scene.depth(frame.index)
     hit = front_from_camera.apply(depth_points(depth_m, frame.depth_camera)[depth_m > 0])
@@ -75,7 +81,7 @@ def _continued(
     steep = side * ray[:, axis] < -params.flattest * np.linalg.norm(ray, axis=1)
     share = (box[face] - eye[axis]) / np.where(steep, ray[:, axis], -1.0 * side)
     crossing = eye + share[:, None] * ray
-    margin = 0.1 * (other[1] - other[0])
+    margin = params.margin * (other[1] - other[0])
     inside = steep & (crossing[:, 2 - axis] > other[0] + margin) & (crossing[:, 2 - axis] < other[1] - margin)
     gap = (hit - crossing)[:, 1]
     inside &= (crossing[:, 1] > box[FRONT]) & (gap > -params.before_m) & (ray[:, 1] > 0)

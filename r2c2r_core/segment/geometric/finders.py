@@ -9,7 +9,7 @@ from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.inputs import DrawnFront, ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.find import appliance_front
-from r2c2r_core.segment.appliances.fit import fit_box
+from r2c2r_core.segment.appliances.fit import FittedBox, fit_box
 from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.clicked_dark import dark_beyond, dark_place
@@ -87,7 +87,8 @@ def find_drawn(prepared: PreparedCapture, prompt: ObjectPrompt, drawn: DrawnFron
     front = replace(front, depth_m=behind.depth_m)
     if category.kind == "appliance":
         fitted = fit_box(front, scene, category, behind.wall_m)
-        return _found_appliance(replace(front, depth_m=fitted.front.depth_m), scene, prompt, category, fitted.depth_seen)
+        fitted = fitted._replace(front=replace(front, depth_m=fitted.front.depth_m))
+        return _found_appliance(fitted, scene, prompt, category)
     return FoundDrawn(replace(front, sides=seen_sides(front, scene)), scene, category)
 
 
@@ -152,15 +153,12 @@ def _appliance(
     *,
     glimpse: bool = False,
 ) -> FoundAppliance | None:
-    front, seen = appliance_front(prepared, prompt, category, negatives, others, glimpse=glimpse) or (None, False)
-    if front is None:
-        return None
-    return _found_appliance(front, prepared.scene, prompt, category, seen)
+    fitted = appliance_front(prepared, prompt, category, negatives, others, glimpse=glimpse)
+    return None if fitted is None else _found_appliance(fitted, prepared.scene, prompt, category)
 
 
-def _found_appliance(front: Front, scene: Scene, prompt: ObjectPrompt, category: Category, depth_seen: bool) -> FoundAppliance:
-    assumed = f"its depth was not seen: {front.depth_m:.2f} m is assumed, as for a {prompt.category}"
-    return FoundAppliance(front, scene, category, depth_seen, warnings=() if depth_seen else (assumed,))
+def _found_appliance(fitted: FittedBox, scene: Scene, prompt: ObjectPrompt, category: Category) -> FoundAppliance:
+    return FoundAppliance(fitted.front, scene, category, fitted.depth_seen, warnings=fitted.warnings(prompt.category))
 
 
 def _thing(

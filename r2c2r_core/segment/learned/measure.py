@@ -87,11 +87,9 @@ def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int,
         return Measured(kind="front", front=front_panel(front), motions=leaves.motions)
     fitted = fit_box(front, prepared.scene, category, behind.wall_m)
     front = fitted.front
-    assumed = f"its depth was not seen: {front.depth_m:.2f} m is usual for a {prompt.category}"
-    warnings = () if fitted.depth_seen else (assumed,)
     panel, box = front_panel(front), appliance_box(front, depth_seen=fitted.depth_seen)
     motions = FilmedLeaves(Leaf.of(front.rectangle), category, prepared.scene, front.depth_m).motions
-    return Measured(kind="appliance", front=panel, box=box, warnings=warnings, motions=motions)
+    return Measured(kind="appliance", front=panel, box=box, warnings=fitted.warnings(prompt.category), motions=motions)
 
 
 def _front(
