@@ -33,6 +33,15 @@ def with_drawn_hinges(overrides: Overrides, prompts: Prompts) -> Overrides:
     return replace(overrides, objects={**overrides.objects, **hinges})
 
 
+def unused_corrections(overrides: Overrides, prompts: Prompts) -> list[str]:
+    """A line for every corrected object that the prompts do not name, such as a misspelt one."""
+    names = {item.name for item in prompts.objects}
+    return [
+        f"{name} is corrected but not in the prompts: its correction is ignored"
+        for name in sorted(overrides.objects.keys() - names)
+    ]
+
+
 def _found(candidate: str | None, folder: Path) -> str | None:
     """Path of the mesh file if it exists, else the candidate's id."""
     if candidate is None:

@@ -35,3 +35,8 @@ def identifier(text: str) -> str:
 def shown(text: str) -> str:
     """The text with each such character replaced by its escaped code."""
     return OBEYED.sub(lambda found: f"\\u{ord(found.group()):04x}", text)
+
+
+def fault_of(error: Exception) -> str:
+    """Reason of a failed read as a phrase; a KeyError's own text is only the key."""
+    return f"{error} is missing" if isinstance(error, KeyError) else str(error)

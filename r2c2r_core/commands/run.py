@@ -84,7 +84,7 @@ def write_bundle(
     """
     from r2c2r_core.config import ReconstructConfig
     from r2c2r_core.disk import explained_io
-    from r2c2r_core.overrides import NO_OVERRIDES, read_overrides
+    from r2c2r_core.overrides import NO_OVERRIDES, read_overrides, unused_corrections
     from r2c2r_core.pipeline import Request, Tools, doubts_about, reconstruct, restricted_licences
     from r2c2r_core.segment.prompts import read_prompts
     from r2c2r_core.workspace import Workspace
@@ -99,8 +99,8 @@ def write_bundle(
         tools=Tools(**tools),
         seed=seed,
     )
-    for line in restricted_licences(request):
-        print(f"r2c2r: {line}", file=sys.stderr)
+    for line in (*restricted_licences(request), *unused_corrections(request.overrides, request.prompts)):
+        print(shown(f"r2c2r: {line}"), file=sys.stderr)
     work = Workspace(workdir or destination.with_suffix(".work"))
     with show_progress() as progress:
         doubts = doubts_about(request, work, progress=progress)

@@ -20,6 +20,7 @@ from r2c2r_core.evaluate.records import JointRecord, joint_line, read_bundle
 from r2c2r_core.evaluate.stage import Evaluation, ObjectRow, scene_metrics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.report import Metric
+from r2c2r_core.texts import fault_of
 
 _FARTHEST_M = 1.0  # maximum distance between a true axis and its assigned joint
 _HINT = "give the folder of a raw sequence: rgb/, depth/, odom/ and SEQUENCE.json"
@@ -51,7 +52,7 @@ def read_axes(sequence: Path, world_from_capture: Rigid3) -> tuple[JointRecord, 
         return tuple(_axis(name, entry, world_from_capture) for name, entry in document.items())
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise BundleError(
-            f"{path}: an object is incomplete or invalid ({error})", hint="expected {object: {position, axis}}"
+            f"{path}: an object is incomplete or invalid ({fault_of(error)})", hint="expected {object: {position, axis}}"
         ) from error
 
 

@@ -26,6 +26,7 @@ from r2c2r_core.geometry.boxes import upright_box
 from r2c2r_core.geometry.meshes import face_normals, sample_surface
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.model.report import Metric
+from r2c2r_core.texts import fault_of
 
 _KIND, _VERSION = "r2c2r-dataset", 1
 _SAMPLES = 20_000
@@ -58,7 +59,9 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         version, files = manifest["version"], {str(k): str(v["sha256"]) for k, v in manifest["files"].items()}
         known = [str(name) for name in manifest["objects"]]
     except (KeyError, TypeError, AttributeError) as error:
-        raise BundleError(f"{path}: not a dataset's manifest ({error})", hint="write it with r2c2r dataset") from error
+        raise BundleError(
+            f"{path}: not a dataset's manifest ({fault_of(error)})", hint="write it with r2c2r dataset"
+        ) from error
     if version != _VERSION:
         raise BundleError(f"{path}: version {version}, expected {_VERSION}", hint="write it again with r2c2r dataset")
     for name, sha256 in files.items():

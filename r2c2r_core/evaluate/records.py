@@ -13,6 +13,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.documents import MOST_BYTES, parse_json, read_bounded
 from r2c2r_core.errors import BundleError
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.texts import fault_of
 
 _TRUTH = "give the truth.json that belongs to the recording; r2c2r sample writes one"
 _FARTHEST = 1e6  # metres; beyond any kitchen, and squares of larger numbers overflow
@@ -81,7 +82,7 @@ def read_bundle(path: Path) -> BundleRecord:
         objects = tuple(_object(entry, Rigid3()) for entry in document["objects"])
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise BundleError(
-            f"{path}: manifest.json is incomplete or invalid ({error})", hint="write the bundle again with r2c2r run"
+            f"{path}: manifest.json is incomplete or invalid ({fault_of(error)})", hint="write the bundle again with r2c2r run"
         ) from error
     return BundleRecord(objects=objects, world_from_capture=world_from_capture)
 
@@ -92,7 +93,7 @@ def read_truth(path: Path, world_from_capture: Rigid3) -> tuple[ObjectRecord, ..
     try:
         return tuple(_object(entry, world_from_capture) for entry in document["objects"])
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
-        raise BundleError(f"{path}: an object is incomplete or invalid ({error})", hint=_TRUTH) from error
+        raise BundleError(f"{path}: an object is incomplete or invalid ({fault_of(error)})", hint=_TRUTH) from error
 
 
 def _manifest_bytes(path: Path) -> bytes:

@@ -36,6 +36,7 @@ from r2c2r_core.generate.sampling import Sampling, draw_sampling
 from r2c2r_core.generate.wire import Wish, encode_wish
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.texts import fault_of
 
 OURS, NIM = "/v1/mesh", "/v1/infer"
 
@@ -169,7 +170,7 @@ def _nim_mesh(answer: dict[str, Any], endpoint: Endpoint) -> bytes:
             raise GenerationFailed(f"generator at {endpoint.where}: finished with {reason}")
         return base64.b64decode(artifact["base64"], validate=True)
     except (KeyError, IndexError, TypeError, AttributeError, binascii.Error) as error:
-        raise GenerationFailed(f"generator at {endpoint.where}: no mesh in its answer ({error})") from error
+        raise GenerationFailed(f"generator at {endpoint.where}: no mesh in its answer ({fault_of(error)})") from error
 
 
 def _numbers(entry: Any) -> dict[str, float]:

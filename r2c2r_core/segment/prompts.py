@@ -75,11 +75,7 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
             check_mask_size(f"{prompt.name}: frame {said.frame}", said.mask, (camera.width, camera.height))
     for point in prompt.points:
         if point.frame not in frames:
-            numbers = sorted(frames)
-            raise PromptError(
-                f"{prompt.name}: click on frame {point.frame} found, a frame of {numbers[0]}..{numbers[-1]} expected",
-                hint=f"the nearest frame is {min(numbers, key=lambda number: abs(number - point.frame))}",
-            )
+            raise _no_frame(prompt.name, point.frame, sorted(frames))
         camera = frames[point.frame].rgb_camera
         if not (0 <= point.x < camera.width and 0 <= point.y < camera.height):
             raise PromptError(
@@ -87,6 +83,15 @@ def check_prompt(capture: Capture, prompt: ObjectPrompt) -> None:
                 f"0 <= x < {camera.width} and 0 <= y < {camera.height} expected",
                 hint="click inside the image",
             )
+
+
+def _no_frame(name: str, frame: int, kept: list[int]) -> PromptError:
+    """Error of a click on a frame outside the recording, or on one that ingest left out of a long one."""
+    expected = f"a frame of {kept[0]}..{kept[-1]}"
+    hint = f"the nearest frame is {min(kept, key=lambda number: abs(number - frame))}"
+    if kept[0] < frame < kept[-1]:
+        expected, hint = f"one of the {len(kept)} frames kept", f"{hint}; a larger ingest.most_frames keeps more"
+    return PromptError(f"{name}: click on frame {frame} found, {expected} expected", hint=hint)
 
 
 def check_mask_size(where: str, mask: PackedMask | PromptsFileMask, frame_px: tuple[int, int]) -> None:

@@ -17,6 +17,7 @@ from r2c2r_core.export.lint import lint
 from r2c2r_core.export.rules.table import UNSAFE
 from r2c2r_core.export.simulate import simulate
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.texts import fault_of
 from r2c2r_core.variants.draw import Variation, draw
 from r2c2r_core.variants.judge import colliders_of, start_of, unfit
 from r2c2r_core.variants.overlay import add_start, varied
@@ -93,7 +94,7 @@ def base_of(folder: Path) -> Base:
         scene = ET.fromstring((folder / "scene.xml").read_text(encoding="utf-8"))
         objects = tuple(json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["objects"])
     except (OSError, ValueError, KeyError, ET.ParseError) as error:
-        raise BundleError(f"{folder}: no bundle to vary ({error})", hint="give one that r2c2r run wrote") from error
+        raise BundleError(f"{folder}: no bundle to vary ({fault_of(error)})", hint="give one that r2c2r run wrote") from error
     names = sorted((entry["name"] for entry in objects), key=len, reverse=True)
     links = {}
     for body in scene.iter("body"):

@@ -6,7 +6,7 @@ import pytest
 
 from r2c2r_core.errors import OverrideError
 from r2c2r_core.model.inputs import DrawnFront, ObjectOverride, ObjectPrompt, Overrides, Prompts
-from r2c2r_core.overrides import read_overrides, with_drawn_hinges
+from r2c2r_core.overrides import read_overrides, unused_corrections, with_drawn_hinges
 
 
 def write(tmp_path: Path, document: object) -> Path:
@@ -104,3 +104,10 @@ def test_a_drawn_hinge_counts_where_no_correction_says_otherwise() -> None:
     said = Overrides(objects={"b": ObjectOverride(hinge="right")})
     both = with_drawn_hinges(said, Prompts(objects=tuple(drawn)))
     assert {name: entry.hinge for name, entry in both.objects.items()} == {"a": "left", "b": "right"}
+
+
+def test_a_correction_of_an_object_without_prompts_is_reported() -> None:
+    overrides = Overrides(objects={"cabinet_1": ObjectOverride(), "cabinent_2": ObjectOverride()})
+    clicked = Prompts(objects=(ObjectPrompt(name="cabinet_1", category="cabinet", points=()),))
+    (line,) = unused_corrections(overrides, clicked)
+    assert "cabinent_2" in line

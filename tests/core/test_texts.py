@@ -8,7 +8,7 @@ from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.model.report import ALIKE, Certificate, LoaderResult
 from r2c2r_core.terminal import certificate_text, table
-from r2c2r_core.texts import OBEYED, shown
+from r2c2r_core.texts import OBEYED, fault_of, shown
 from tests.core.export.kitchen import kitchen, reconstruction
 
 EVIL = "\x1b]0;owned\x07\x9b31m\u202e\ud800"
@@ -50,3 +50,8 @@ def test_the_report_holds_nothing_a_page_or_terminal_obeys() -> None:
     page = report_html(manifest, report_of(manifest, certificate(), {"mug_1": EVIL}), {})
     assert not OBEYED.search(page)
     assert "cabinet \\u001b]0;owned" in page
+
+
+def test_a_missing_key_is_said_to_be_missing() -> None:
+    assert fault_of(KeyError("position")) == "'position' is missing"
+    assert fault_of(ValueError("not a number")) == "not a number"
