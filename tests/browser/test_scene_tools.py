@@ -134,6 +134,8 @@ def test_what_geometry_can_show_is_shown_before_the_run_and_older_results_are_ma
     picture(page, "preview")
     page.goto(f"{project}/run")
     expect(page.get_by_role("heading", name="Certificate")).to_contain_text("stale")
+    expect(page.get_by_text("still overlap by 12 mm")).to_be_visible()
+    picture(page, "warnings")
     assert Path(server.data / "projects" / project.split("/p/")[1] / "work" / "bundle.zip").is_file()  # nothing was made anew
 
 

@@ -33,6 +33,14 @@ export function sceneTable(scene) {
           h("ul", {}, ...failures.map(([name, line]) => h("li", {}, h("strong", {}, name), `: ${line}`))),
         )
       : null,
+    scene.warnings.length
+      ? h(
+          "section",
+          {},
+          h("h3", {}, "Warnings about the scene"),
+          h("ul", {}, ...scene.warnings.map((line) => h("li", {}, line))),
+        )
+      : null,
   );
 }
 
