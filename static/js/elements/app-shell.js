@@ -141,7 +141,7 @@ export class AppShell extends LiveElement {
   }
 
   /**
-   * The open project is not there any more for who looks at it: say so, and show those that are.
+   * Leave a project that was deleted or is no longer visible to the user: go to the list and say why.
    * @param {{ project: string, why: string }} gone
    */
   #leave({ project, why }) {
@@ -151,7 +151,7 @@ export class AppShell extends LiveElement {
     say(`${name} ${why}.`, { kind: "bad" });
   }
 
-  /** Lost connections are said, with what still waits; it is sent by itself once the server answers. */
+  /** Draw the banner of a lost connection, with the number of unsent changes; the outbox sends them once the server answers. */
   #drawOnline() {
     const waiting = outbox.stuck
       ? ` ${counted(outbox.waiting, "change")} not stored yet: kept in this browser and sent by ${outbox.waiting === 1 ? "itself" : "themselves"}${outbox.safe ? "" : ", as long as this page stays open"}.`
@@ -171,7 +171,7 @@ export class AppShell extends LiveElement {
     event.preventDefault();
   }
 
-  /** Everything that can be done here, from the one table of keys, the tabs, and what the page adds. */
+  /** Open the command palette with the page's own commands, its key bindings, the tabs and the global pages. */
   #openPalette() {
     const page = /** @type {PageElement | null} */ (this.#main.firstElementChild);
     const route = this.#route;

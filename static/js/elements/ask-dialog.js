@@ -1,13 +1,14 @@
-/** One question with room for an answer. */
+/** Dialog with one text field. */
 
 import { h } from "../dom.js";
 import { mentionBox } from "./mention-box.js";
 
 /**
- * Ask for a text; null when the person thinks better of it.
+ * Ask for a text; resolves to null when cancelled.
  * @param {string} title
  * @param {string} label
- * @param {{ button?: string, notes?: string[], required?: boolean, value?: string, names?: string[] }} [options] names: of people that @ offers
+ * @param {{ button?: string, notes?: string[], required?: boolean, value?: string, names?: string[] }} [options]
+ *   names: people suggested after @
  * @returns {Promise<string | null>}
  */
 export function askForText(title, label, { button = "OK", notes = [], required = true, value = "", names = [] } = {}) {

@@ -1,4 +1,4 @@
-/** Whose turn a project is, and making it somebody else's; nothing where nobody has an account. */
+/** Assignee of a project, with a menu to change it; hidden when there are no accounts. */
 
 import { assignProject, listNames } from "../api.js";
 import { h, LiveElement } from "../dom.js";

@@ -1,4 +1,4 @@
-/** Who came in, who was refused, and who changed whose account: the newest lines first, older ones on demand. */
+/** Audit log of sign-ins, refusals and account changes: newest entries first, older ones on demand. */
 
 import { listAudit } from "../api.js";
 import { h, LiveElement } from "../dom.js";
@@ -11,7 +11,7 @@ export class AuditRecord extends LiveElement {
   #rows = h("tbody", {});
   #older = h("button", { type: "button", onClick: () => this.#load() }, "Show older ones");
   #count = h("p", { class: "muted", role: "status" });
-  /** @type {number | null} the last line shown */
+  /** @type {number | null} id of the last entry shown */
   #last = null;
 
   connected() {

@@ -1,4 +1,4 @@
-/** Who does a stage of a project's work, under which licence, and what is missing for the others. Emits "choose" {seam, name}. */
+/** Choice of the backend for one stage, with licences and why others are unavailable. Emits "choose" {seam, name}. */
 
 import { h, LiveElement } from "../dom.js";
 
@@ -6,7 +6,7 @@ import { h, LiveElement } from "../dom.js";
 
 /** @typedef {"segmenter" | "generator" | "matcher" | "arm"} Seam */
 
-/** @type {Record<Seam, [string, string]>} title and what to know */
+/** @type {Record<Seam, [string, string]>} title and description */
 const TITLES = {
   segmenter: ["Masks", "The method that segments the objects; the masks of both are kept when you switch"],
   generator: ["Candidates", "The method that generates the meshes; the next run uses it"],

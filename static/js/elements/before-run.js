@@ -1,4 +1,4 @@
-/** Beside the button that starts a run: objects that contradict each other or were not found, and what is unsure, each with the way there. */
+/** Warnings beside the run button: contradicting, missing and doubtful objects, each with a link to its frame. */
 
 import { getLanes, getMasks, listFrames, listObjects } from "../api.js";
 import { h } from "../dom.js";
@@ -13,7 +13,7 @@ import { isComing } from "../lib/listing.js";
 export class BeforeRun {
   element = h("section", { class: "card stack", hidden: true, "aria-label": "Before the run" });
 
-  /** Look at the project's masks as they are now. @param {string} project @param {AbortSignal} signal */
+  /** Check the project's current masks and draw the warnings. @param {string} project @param {AbortSignal} signal */
   async look(project, signal) {
     const [objects, lanes, frames] = await Promise.all([listObjects(project), getLanes(project), listFrames(project)]);
     const widths = new Map(frames.map(({ index, width }) => [index, width]));

@@ -1,4 +1,4 @@
-/** What a bundle holds for robots: each object alone, what robots did in it, and each simulator's lines. */
+/** Contents of a bundle for robotics: single objects, results of robot trials, and code for each simulator. */
 
 import { h } from "../dom.js";
 import { counted } from "../lib/format.js";
@@ -9,7 +9,7 @@ import { say, sayError } from "./toasts.js";
 /** @typedef {import("../api-types").Bundle} Bundle */
 
 /**
- * Objects to be downloaded alone.
+ * Card of objects to download one by one.
  * @param {BundleInside} inside
  * @param {Bundle} bundle
  */
@@ -23,7 +23,7 @@ export function assetCard(inside, bundle) {
   );
 }
 
-/** What lets an arm try a bundle that none has tried. @param {Bundle} bundle */
+/** Instructions to test a bundle with an arm, for bundles without a trial. @param {Bundle} bundle */
 function armLines(bundle) {
   return [
     h("h3", {}, "Where an arm may stand"),
@@ -52,7 +52,7 @@ function assetTable(inside) {
 }
 
 /**
- * What each robot did, with its pictures and the places where it stands.
+ * Card of one robot: its result for each grip, pictures, and base positions.
  * @param {BundleInside["robots"][number]} robot
  */
 export function robotCard(robot) {
@@ -136,7 +136,7 @@ function simulator({ simulator: name, install, code, note, loader }, certificate
 }
 
 /**
- * Lines and a button that copies them.
+ * Code block with a copy button.
  * @param {string} text
  * @param {string} what
  */
@@ -151,7 +151,7 @@ function copyable(text, what) {
 }
 
 /**
- * A picture that opens by itself when it is clicked.
+ * Picture that links to its full-size image.
  * @param {string} address
  * @param {string} text
  */
@@ -170,7 +170,7 @@ function table(titles, rows) {
 }
 
 /**
- * Something wide that scrolls by itself.
+ * Scrollable region for wide content.
  * @param {string} label
  * @param {HTMLElement} content
  */

@@ -1,4 +1,4 @@
-/** The capture doctor's report: verdict, what is wrong and what to do, the scan drawn, and plots over the frames. */
+/** Capture quality report: verdict, problems with advice, pictures of the scan, and plots over the frames. */
 
 import { h, shape } from "../dom.js";
 import { strips } from "../lib/strips.js";
@@ -11,7 +11,7 @@ const HEIGHT = 28;
 /**
  * The verdict with its remarks, worst first.
  * @param {CaptureFacts} capture
- * @param {number} notices that are told below it
+ * @param {number} notices number of notices listed below the card
  */
 export function verdictCard(capture, notices) {
   return h(
@@ -41,7 +41,7 @@ function remarkLine(remark) {
 }
 
 /**
- * The fused scan from above and from where it was filmed.
+ * Pictures of the fused scan, from above and from the camera's viewpoint.
  * @param {string} project
  * @param {string} version
  */
@@ -58,7 +58,7 @@ export function scanPictures(project, version) {
       const src = `/media/${encodeURIComponent(project)}/scan/${side}.png?v=${version}`;
       const image = h("img", { src, alt, width: 960, height: 640, loading: "lazy" });
       const figure = h("figure", {}, image, h("figcaption", { class: "muted" }, caption));
-      image.addEventListener("error", () => figure.remove()); // a project from before scans were drawn
+      image.addEventListener("error", () => figure.remove()); // projects imported by older versions have no pictures
       return figure;
     }),
     h(
@@ -73,7 +73,7 @@ export function scanPictures(project, version) {
 }
 
 /**
- * Sharpness, depth, brightness and disagreement over the frames.
+ * Plots of sharpness, depth, brightness and disagreement over the frames.
  * @param {CaptureFacts} capture
  */
 export function momentStrips(capture) {
@@ -89,7 +89,7 @@ export function momentStrips(capture) {
 }
 
 /**
- * Every figure that was measured, folded away.
+ * Collapsed table of all measured figures.
  * @param {CaptureFacts} capture
  */
 export function allFigures(capture) {

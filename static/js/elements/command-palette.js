@@ -1,4 +1,4 @@
-/** Ctrl+K: every action of the page, the pages themselves, and what the page offers besides, found by typing. */
+/** Command palette (Ctrl+K): search over all actions and pages. */
 
 import { h } from "../dom.js";
 import { ranked } from "../lib/commands.js";

@@ -1,4 +1,4 @@
-/** What people said about a spot. Emits "show-comment" Comment, "comments" Comment[] (open ones) whenever they change. */
+/** Comments of a project. Emits "show-comment" Comment, and "comments" Comment[] (open ones) whenever they change. */
 
 import { listComments, listNames, resolveComment } from "../api.js";
 import { addComment } from "../changes.js";
@@ -48,12 +48,12 @@ export class CommentList extends LiveElement {
   }
 
   /**
-   * Ask for the words, then store them with where they belong.
+   * Ask for a comment's text, then store it at a pin.
    * @param {Partial<CommentIn>} pin
    * @param {string} about
    */
   async ask(pin, about) {
-    const names = await listNames(this.project).catch(() => []); // a comment can be written without
+    const names = await listNames(this.project).catch(() => []); // comments work without mentions
     const label = names.length ? "What should change? @ mentions somebody" : "What should change?";
     const text = await askForText(`Comment on ${about}`, label, { button: "Comment", names });
     if (!text) return;

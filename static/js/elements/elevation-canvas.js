@@ -1,7 +1,7 @@
 /**
- * A plane of the scan with the fronts on it. Emits "draw" Rect, "enclose" Rect (Shift-drag), "pick" {key, side, also}, "move-edge" {key, side, at},
- * "move-front" {key, dx, dy}, "use-tool" {x, y}, all in metres from the plane's top left corner.
- * Zoom with the wheel or two fingers, pan with the middle button, Space-drag or two fingers; Alt leaves edges where they are put.
+ * Canvas of a plane of the scan with its fronts. Emits "draw" Rect, "enclose" Rect (Shift-drag), "pick" {key, side, also},
+ * "move" {key, rect} and "use-tool" {x, y}, all in metres from the plane's top left corner.
+ * Zoom with the wheel or a pinch, pan with the middle button, Space-drag or two fingers; Alt turns snapping off.
  */
 
 import { h, LiveElement, wire } from "../dom.js";
@@ -26,7 +26,7 @@ import { fit, pinch, toImage, toScreen, zoom } from "../lib/view.js";
 
 const STILL_PX = 3;
 const STILL_TOUCH_PX = 10;
-const EDGE_PX = 7; // from an edge that is still on it
+const EDGE_PX = 7; // hit distance of an edge
 const SNAP_PX = 9;
 const ASKED_PX = 9;
 
@@ -45,15 +45,15 @@ export class ElevationCanvas extends LiveElement {
   #cut = [];
   /** @type {Gestures<Held>} */
   #gestures = new Gestures();
-  /** What is being drawn or carried, as it would be stored. @type {{ key: string | null, rect: Rect } | null} */
+  /** The front being drawn (key null) or dragged, as it would be stored. @type {{ key: string | null, rect: Rect } | null} */
   #preview = null;
   #from = { x: 0, y: 0 };
   #space = false;
-  /** Where the pointer is, in metres; null outside. @type {{ x: number, y: number } | null} */
+  /** Pointer position in metres; null outside the canvas. @type {{ x: number, y: number } | null} */
   pointer = null;
-  /** The edge that arrow keys move; null: the whole front. @type {Side | null} */
+  /** The edge moved by the arrow keys; null: the whole front. @type {Side | null} */
   edge = null;
-  /** Whether a click does what a tool does. */
+  /** Whether a click applies the active tool. */
   tooled = false;
   /** @type {Snap} */
   snap = (_side, at) => at;
@@ -79,7 +79,7 @@ export class ElevationCanvas extends LiveElement {
 
   /**
    * @param {HTMLImageElement} image
-   * @param {number} cell metres a pixel
+   * @param {number} cell metres per pixel
    * @param {string} label
    */
   setPlane(image, cell, label) {
@@ -90,14 +90,14 @@ export class ElevationCanvas extends LiveElement {
     this.fit();
   }
 
-  /** @param {Shown[]} fronts @param {Rect[]} cut panels that no front is on */
+  /** @param {Shown[]} fronts @param {Rect[]} cut panels without a front */
   setFronts(fronts, cut) {
     this.#fronts = fronts;
     this.#cut = cut;
     this.draw();
   }
 
-  /** Nothing is being drawn any more. */
+  /** Clear the preview of a drawing or drag. */
   stop() {
     this.#preview = null;
     this.draw();
@@ -120,7 +120,7 @@ export class ElevationCanvas extends LiveElement {
     this.#see(zoom(this.#view, factor, { x: this.clientWidth / 2, y: this.clientHeight / 2 }, this.#least));
   }
 
-  /** What the middle of the window shows, in metres. */
+  /** Centre of the viewport, in metres. */
   get middle() {
     return toImage(this.#view, { x: this.clientWidth / 2, y: this.clientHeight / 2 });
   }
@@ -165,7 +165,7 @@ export class ElevationCanvas extends LiveElement {
     this.#drawLabel(context, rect, front.name);
   }
 
-  /** An edge that is asked about. @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side */
+  /** Draw the question mark of an edge. @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side */
   #drawAsked(context, rect, side) {
     const [x, y] = edgeMiddle(this.#onScreen(rect), side);
     context.beginPath();
@@ -320,7 +320,7 @@ export class ElevationCanvas extends LiveElement {
     this.draw();
   }
 
-  /** The cursor says what a press would take hold of. @param {At} at */
+  /** Set the cursor to match what a press would drag. @param {At} at */
   #point(at) {
     const held = this.tooled ? null : this.#heldAt(at, 1);
     const level = held?.side === "top" || held?.side === "bottom";
@@ -334,12 +334,16 @@ export class ElevationCanvas extends LiveElement {
     return front ? { key, rect: carried(front.rect, side, this.#from, toImage(this.#view, at), snap) } : null;
   }
 
-  /** Where a new front of that size settles: on the lines that are near. @param {Rect} rect */
+  /** Snap a new front of this size to nearby lines. @param {Rect} rect */
   settled(rect) {
     return settled(rect, this.#snapOf(null));
   }
 
-  /** How the edges of a front snap, of a new one for null. @param {string | null} key @returns {import("../lib/front-hits.js").Snap} */
+  /**
+   * Snap function of a front's edges.
+   * @param {string | null} key null: a new front
+   * @returns {import("../lib/front-hits.js").Snap}
+   */
   #snapOf(key) {
     return (side, at, rect) => this.snap(side, at, rect, key, this.reach);
   }
@@ -349,7 +353,7 @@ export class ElevationCanvas extends LiveElement {
     return heldAt(this.#fronts, toImage(this.#view, at), (fingers * EDGE_PX) / this.#view.scale);
   }
 
-  /** How near an edge or a tool's click snaps, in metres. */
+  /** Snapping distance of edges and tool clicks, in metres. */
   get reach() {
     return SNAP_PX / this.#view.scale;
   }

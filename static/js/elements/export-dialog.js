@@ -1,4 +1,4 @@
-/** A project as one file, with its recording or without. */
+/** Dialog to export a project as one file, with or without its recording. */
 
 import { offerProjectFile } from "../api.js";
 import { h, icon } from "../dom.js";
@@ -10,7 +10,7 @@ const NOT_WITHIN =
   "Masks and results are computed again after the import. Members, verdicts and approvals are not exported: the imported project is a draft.";
 
 /**
- * Offer the download; the dialog closes with it.
+ * Open the dialog; it closes once the download starts.
  * @param {{ id: string, name: string }} project
  */
 export async function offerExport({ id, name }) {
@@ -38,7 +38,7 @@ export async function offerExport({ id, name }) {
     total.textContent = `Download, ${bytes(size + (box.checked ? (recording ?? 0) : 0))}`;
   };
   box.addEventListener("change", draw);
-  link.addEventListener("click", () => setTimeout(() => dialog.close())); // once the browser took the address
+  link.addEventListener("click", () => setTimeout(() => dialog.close())); // after the browser has read the link's address
   dialog.addEventListener("close", () => dialog.remove());
   draw();
   document.body.append(dialog);

@@ -1,4 +1,7 @@
-/** Frames to scrub, with a lane per object, and above it one for each of its fronts that was filmed open. Emits "seek" with a position in the list of frames, "play", "pick-object" id. */
+/**
+ * Timeline of the frames, with a lane per object and, above it, a lane for each of its fronts filmed open.
+ * Emits "seek" with a position in the list of frames, "play", "pick-object" id.
+ */
 
 import { h, icon, LiveElement, renew } from "../dom.js";
 import { jointValue } from "../lib/format.js";
@@ -28,7 +31,7 @@ export class FilmStrip extends LiveElement {
   #lanes = h("div", { class: "lanes" });
   #slider = h("input", { type: "range", min: "0", max: "0", value: "0", "aria-label": "Frame" });
   #text = h("output", { class: "mono" });
-  /** What stands beside the number of the frame: how things are, at a width of its own. */
+  /** Slot for a status, of its own width, beside the frame number. */
   status = h("div");
   #play = h("button", { type: "button", class: "quiet", "aria-label": "Play or pause" }, icon("play"));
 
@@ -42,7 +45,7 @@ export class FilmStrip extends LiveElement {
       });
     const page = document.documentElement.style;
     const observer = new ResizeObserver(() => {
-      page.setProperty("--strip-height", `${this.offsetHeight}px`); // messages stand above it
+      page.setProperty("--strip-height", `${this.offsetHeight}px`); // toasts are placed above it
       this.#measure();
     });
     observer.observe(this);
@@ -92,7 +95,7 @@ export class FilmStrip extends LiveElement {
   }
 
   /**
-   * Show the frame under a pressed mouse or a finger.
+   * Seek to the frame under a pressed pointer.
    * @param {PointerEvent} event
    * @param {HTMLElement} over
    */
@@ -110,7 +113,7 @@ export class FilmStrip extends LiveElement {
     this.#play.setAttribute("aria-pressed", String(playing));
   }
 
-  /** All lanes are as large as the first. */
+  /** Measure the first lane of each kind; the others have the same size. */
   #measure() {
     const { clientWidth: width = 0, clientHeight: height = 0 } = this.#drawn.keys().next().value ?? {};
     this.#size = { width, height };

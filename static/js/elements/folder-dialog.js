@@ -1,4 +1,7 @@
-/** Import a recording on the server's machine: a refused path stays as it was typed, with the reason. Emits "imported" with the project. */
+/**
+ * Dialog to import a recording from the server's machine. A refused path stays in the field, with the reason.
+ * Emits "imported" with the project.
+ */
 
 import { ApiError, browse, importPath } from "../api.js";
 import { h, LiveElement } from "../dom.js";
@@ -59,7 +62,7 @@ export class FolderDialog extends LiveElement {
     }
   }
 
-  /** @param {unknown} error why the path cannot be imported; null: nothing is wrong */
+  /** @param {unknown} error why the path cannot be imported; null clears the message */
   #refuse(error) {
     this.#refusal.hidden = error === null;
     const hint = error instanceof ApiError ? error.hint : "";

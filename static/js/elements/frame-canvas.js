@@ -1,8 +1,9 @@
 /**
- * One frame with masks, clicks and comments. Emits "click-point" {x, y, label, hold}, "draw-box" {from, to, hold},
- * "move-point" {id, x, y}, "remove-point" {id}, "pick-pin" id, "view" when it is drawn otherwise; while a brush is set "paint" path instead of boxes.
- * Zoom with the wheel or two fingers, pan with the middle button, Space- or Alt-drag or two fingers; a crosshair moved by arrows
- * replaces the mouse. Each mask carries its object's number, the chosen one and the one under the pointer their names.
+ * Canvas of one frame with masks, clicks and comments. Emits "click-point" {x, y, label, hold}, "draw-box" {from, to, hold},
+ * "move-point" {id, x, y}, "remove-point" {id}, "pick-pin" id, and "view" after each redraw; while a brush is set, "paint" path
+ * instead of boxes. Zoom with the wheel or a pinch, pan with the middle button, Space- or Alt-drag or two fingers; a crosshair
+ * moved by arrow keys replaces the mouse. Masks are tagged with their object's number, the current and the hovered one also
+ * with its name.
  */
 
 import { h, LiveElement, wire } from "../dom.js";
@@ -31,7 +32,7 @@ import { clamped, fit, isInside, pinch, toImage, toScreen, zoom } from "../lib/v
 /** @typedef {{ id: number, x: number, y: number, text: string }} Pin */
 /** @typedef {{ points: number[][], handle: number[][], label: string, current: boolean }} Outline */
 
-const STILL_PX = 3; // a press that wanders less is a click
+const STILL_PX = 3; // a press that moves less is a click
 const STILL_TOUCH_PX = 10; // a finger is less steady
 
 export class FrameCanvas extends LiveElement {
@@ -55,15 +56,15 @@ export class FrameCanvas extends LiveElement {
   #raw = false;
   /** The object under the pointer. @type {number | null} */
   #hovered = null;
-  /** Whether Space is held, so that a drag pans, and whether one did. */
+  /** Whether Space is down, so that a drag pans, and whether a drag has panned since. */
   #space = { held: false, panned: false };
   /** @type {{ tool: string, px: number } | null} */
   #brush = null;
-  /** A stroke being drawn, or the corners of a polygon, in the frame. @type {At[]} */
+  /** The stroke being drawn, or the corners of a polygon, in frame pixels. @type {At[]} */
   #path = [];
   /** @type {Gestures<Marker>} */
   #gestures = new Gestures();
-  /** What a click says: 1 adds, 0 takes away; the right button and Shift say the opposite. @type {0 | 1} */
+  /** Label of a click: 1 adds, 0 subtracts; the right button and Shift invert it. @type {0 | 1} */
   sign = 1;
   opacity = 0.42;
 
@@ -83,10 +84,10 @@ export class FrameCanvas extends LiveElement {
     this.#canvas.focus();
   }
 
-  // What is shown
+  // Display
 
   /**
-   * The frame to show; its size is that of the stored frame, whatever the preview's.
+   * Set the frame; the size is that of the stored frame, not of the preview.
    * @param {HTMLImageElement} image
    * @param {{ width: number, height: number }} size
    * @param {string} label
@@ -100,7 +101,7 @@ export class FrameCanvas extends LiveElement {
     else this.#draw();
   }
 
-  /** Whether more pixels of the frame would show than its picture has. */
+  /** Whether the zoom needs a larger picture than the one loaded. */
   get wantsMore() {
     const held = this.#image?.naturalWidth ?? 0;
     return held > 0 && held < this.#size.width && this.#size.width * this.#view.scale * devicePixelRatio > held;
@@ -118,7 +119,7 @@ export class FrameCanvas extends LiveElement {
     this.#draw();
   }
 
-  /** @param {Outline[]} outlines of what is proposed */
+  /** @param {Outline[]} outlines of the proposals */
   setOutlines(outlines) {
     this.#outlines = outlines;
     this.#draw();
@@ -130,13 +131,13 @@ export class FrameCanvas extends LiveElement {
     this.#draw();
   }
 
-  /** The frame alone, or with all that lies over it. @param {boolean} on */
+  /** Show the frame alone, or with its overlays. @param {boolean} on */
   showRaw(on) {
     this.#raw = on;
     this.#draw();
   }
 
-  /** What a drag paints with, so wide on the screen; null: it draws a box. @param {string | null} tool @param {number} px */
+  /** Set the brush, `px` wide on the screen; null: a drag draws a box. @param {string | null} tool @param {number} px */
   setBrush(tool, px) {
     this.#brush = tool === null ? null : { tool, px };
     this.#draw();
@@ -148,24 +149,24 @@ export class FrameCanvas extends LiveElement {
     this.#draw();
   }
 
-  /** Pixels of the screen a pixel of the frame. */
+  /** Screen pixels per frame pixel. */
   get scale() {
     return this.#view.scale;
   }
 
-  /** Where the frame is on the screen. */
+  /** Position and scale of the frame on the screen. */
   get view() {
     return this.#view;
   }
 
-  /** Space is held, or was let go. @param {boolean} held @returns {boolean} whether a drag panned meanwhile */
+  /** Set whether Space is down. @param {boolean} held @returns {boolean} whether a drag panned while it was */
   holdSpace(held) {
     const { panned } = this.#space;
     if (held !== this.#space.held) this.#space = { held, panned: false };
     return panned;
   }
 
-  /** The objects whose masks are at a position of the frame, the uppermost first. @param {At} at @returns {number[]} */
+  /** Ids of the objects whose masks cover a position of the frame, topmost first. @param {At} at @returns {number[]} */
   objectsAt({ x, y }) {
     const there = this.#painted.held.filter(({ box, pixels }) => {
       const step = box.width / this.#size.width;
@@ -221,7 +222,7 @@ export class FrameCanvas extends LiveElement {
   #drawOver(context) {
     const { scale, x, y } = this.#view;
     for (const { box, bitmap } of this.#painted.held) {
-      const step = (this.#size.width / box.width) * scale; // masks come at preview size
+      const step = (this.#size.width / box.width) * scale; // masks have the preview's size
       context.drawImage(bitmap, x + box.left * step, y + box.top * step, box.box_width * step, box.box_height * step);
     }
     for (const { layer, box } of this.#painted.held) this.#drawTag(context, layer, box);
@@ -247,7 +248,7 @@ export class FrameCanvas extends LiveElement {
     drawTag(context, toScreen(this.#view, middle), named ? `${number} ${name}` : String(number), colour);
   }
 
-  // What is pressed
+  // Pointer events
 
   /** @param {PointerEvent} event */
   #down(event) {
@@ -332,13 +333,13 @@ export class FrameCanvas extends LiveElement {
     this.#draw();
   }
 
-  /** @param {import("../lib/view.js").View} view that a person wants */
+  /** @param {import("../lib/view.js").View} view set by the user */
   #see(view) {
     this.#view = view;
     this.#fitted = false;
   }
 
-  // Where things are
+  // Coordinates
 
   /** @param {MouseEvent} event */
   #at({ clientX, clientY }) {
@@ -351,7 +352,7 @@ export class FrameCanvas extends LiveElement {
     return clamped(toImage(this.#view, at), this.#size);
   }
 
-  /** A click of the chosen object, which may be dragged or removed. @param {At} at on the screen */
+  /** The current object's click at a position, to drag or remove; null if none. @param {At} at on the screen */
   #markerAt(at) {
     return this.#markers.findLast((one) => one.current && isOnClick(toScreen(this.#view, one), at)) ?? null;
   }
@@ -360,7 +361,7 @@ export class FrameCanvas extends LiveElement {
     return { width: Math.max(this.clientWidth, 1), height: Math.max(this.clientHeight, 1) };
   }
 
-  /** The smallest scale worth having. */
+  /** Smallest scale allowed. */
   get #least() {
     return 0.8 * fit(this.#size, this.#room).scale;
   }
@@ -375,7 +376,7 @@ export class FrameCanvas extends LiveElement {
 
 /**
  * @param {Layer} layer
- * @param {number} opacity of the current object's
+ * @param {number} opacity of the current object's mask
  * @returns {Promise<Painted>}
  */
 async function paint(layer, opacity) {

@@ -1,4 +1,4 @@
-/** An object's mask on many frames at once, worst first. Emits "seek-frame" with a frame's index. */
+/** Mosaic of an object's masks on many frames, worst first. Emits "seek-frame" with a frame's index. */
 
 import { getMasks } from "../api.js";
 import { h, LiveElement } from "../dom.js";

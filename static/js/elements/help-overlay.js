@@ -1,4 +1,4 @@
-/** The `?` overlay, printed from the keymap the code uses. */
+/** Help overlay (`?`), generated from the keymap. */
 
 import { h, icon } from "../dom.js";
 import { plainKeys, setPlainKeys } from "../keyboard.js";

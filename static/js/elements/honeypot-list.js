@@ -1,4 +1,4 @@
-/** Sample kitchens that were slipped into people's queues, how each was done, and slipping another one in: for admins. */
+/** Honeypots for admins: sample kitchens added to people's inboxes, their scores, and a form to add another. */
 
 import { listAccounts, listHoneypots, listProjects, scoreHoneypot, slipHoneypot } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
@@ -11,7 +11,7 @@ import { say, sayError } from "./toasts.js";
 
 const WHAT =
   "The recording of a sample kitchen waits in somebody's inbox like any other. Only admins know, and see how the person's objects compare with the ground truth. An object counts as found where its masks and the true ones have an IoU of 0.5 and more. The table of effort of such a project gives the result for each object. Nobody else sees a sample whose only member is you (Overview).";
-const SAMPLE = "sample"; // what a synthetic kitchen names as its source
+const SAMPLE = "sample"; // source name of a synthetic kitchen
 const HEAD = ["Person", "Project", "Found", "On nothing", "Mask IoU", "Categories", "Effort"];
 
 export class HoneypotList extends LiveElement {

@@ -1,4 +1,4 @@
-/** One job: stages, progress, time left, cancel, retry, log. */
+/** Panel of one job: stages, progress, time left, cancel, retry, log. */
 
 import { cancelJob, getJobEvents, getJobLog, retryJob } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
@@ -84,7 +84,7 @@ export class JobPanel extends LiveElement {
     return h("p", { role: "alert", class: "failure" }, h("strong", {}, error.message), h("span", {}, error.hint ?? ""));
   }
 
-  /** What its processes wrote; before they wrote anything, what it did. @param {number} job */
+  /** Load the output of the job's processes, or its events while there is no output. @param {number} job */
   async #readLog(job) {
     const text = await getJobLog(job);
     const events = text ? [] : await getJobEvents(job);

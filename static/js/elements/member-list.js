@@ -1,4 +1,4 @@
-/** Who sees a project: everybody, or its owner and the people named here. A change holds at once. */
+/** Members of a project: visible to everybody, or only to its owner and the listed people. Changes apply at once. */
 
 import { getMembers, setMembers } from "../api.js";
 import { h, icon, LiveElement, renew } from "../dom.js";
@@ -73,7 +73,7 @@ export class MemberList extends LiveElement {
   /** @param {Members} now */
   #form({ accounts, members }) {
     const others = accounts.filter((name) => !members.includes(name));
-    const { value } = this.#name; // what is being typed
+    const { value } = this.#name; // keep what is being typed
     this.#name = h("input", { required: true, list: "others", autocomplete: "off", "data-at": "member:", value });
     const form = h(
       "form",
@@ -91,9 +91,9 @@ export class MemberList extends LiveElement {
   }
 
   /**
-   * One after the other, each from what the server holds then; a refused one is drawn back.
+   * Apply changes one at a time, each to the server's current members; a refused change is reverted on screen.
    * @param {(members: string[]) => import("../api-types").MembersIn} edit
-   * @returns {Promise<boolean>} whether it was done
+   * @returns {Promise<boolean>} whether it succeeded
    */
   #change(edit) {
     const done = this.#turn.then(async () => {
@@ -112,7 +112,7 @@ export class MemberList extends LiveElement {
 /** @param {string[]} members @returns {import("../api-types").MembersIn} */
 const kept = (members) => ({ members_only: true, members });
 
-/** Whether there is nobody to keep it from. @param {Members} now */
+/** Whether there is no owner or account, so that access cannot be restricted. @param {Members} now */
 function alone({ may_change, members_only, owner, accounts }) {
   return may_change && !members_only && owner === null && !accounts.length;
 }

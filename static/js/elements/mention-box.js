@@ -1,14 +1,14 @@
-/** Names to choose from while one is typed after @ in a field: arrows choose, Enter or Tab takes, Esc leaves it. */
+/** Autocomplete of names after @ in a text field: arrows select, Enter or Tab accepts, Esc closes. */
 
 import { h } from "../dom.js";
 import { typedName, withName } from "../lib/mentions.js";
 
-const SHOWN = 8; // names at once
+const SHOWN = 8; // most names listed
 
 /**
  * @param {HTMLTextAreaElement} field
  * @param {string[]} names
- * @returns {HTMLElement} the list, to stand below the field
+ * @returns {HTMLElement} the list, to be placed below the field
  */
 export function mentionBox(field, names) {
   const list = h("ul", { class: "mentions", role: "listbox", id: "mentions", "aria-label": "People", hidden: true });
@@ -28,7 +28,7 @@ export function mentionBox(field, names) {
   const option = (name, k) => {
     const made = h("li", { role: "option", id: `mention-${k}`, "aria-selected": String(k === chosen) }, name);
     made.addEventListener("pointerdown", (event) => {
-      event.preventDefault(); // the field keeps the focus
+      event.preventDefault(); // keep the focus in the field
       take(name);
     });
     return made;

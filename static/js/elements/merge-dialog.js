@@ -1,14 +1,14 @@
-/** Two people changed the same thing: both are shown, field by field, and one is chosen. */
+/** Dialog for conflicting edits: both values of each field are shown, and one is chosen. */
 
 import { h } from "../dom.js";
 
 /** @typedef {{ name: string, label: string, mine: string, theirs: string }} Disagreement */
 
 /**
- * Ask which of the two is kept, for every field; null when the person lets the other's change stand as it is.
+ * Ask which value to keep for each field; resolves to null when the other person's values all stay.
  * @param {string} title
  * @param {Disagreement[]} fields
- * @returns {Promise<Set<string> | null>} names of the fields whose own value is kept
+ * @returns {Promise<Set<string> | null>} names of the fields that keep the user's own value
  */
 export function askToMerge(title, fields) {
   return new Promise((resolve) => {

@@ -1,4 +1,4 @@
-/** A mesh of one's own before it is used: what it looks like, its size beside the object's, and what was done to it. */
+/** Preview of an uploaded mesh before use: picture, size beside the object's, and repairs made. */
 
 import { ApiError } from "../api.js";
 import { h } from "../dom.js";
@@ -7,7 +7,7 @@ import { sides } from "../lib/format.js";
 /** @typedef {import("../api-types").MeshLook} MeshLook */
 
 /**
- * Show the mesh and ask whether it is to be used.
+ * Show the mesh and ask whether to use it.
  * @param {File} file
  * @param {string} name of the object
  * @param {(signal: AbortSignal) => Promise<MeshLook>} look

@@ -1,4 +1,4 @@
-/** What others did to a project since the person last was there; it stays until it is said to be read. */
+/** List of other people's changes since the last visit, kept until marked as read. */
 
 import { getNews, markSeen } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
@@ -28,7 +28,7 @@ export class NewsList extends LiveElement {
     }
   }
 
-  /** Who is here for the first time has nothing to catch up with: from now on there is. @param {News} news */
+  /** Draw the news; on a first visit, everything so far is marked as read. @param {News} news */
   #show(news) {
     this.hidden = !news.entries.length;
     if (news.since === null) markSeen(this.project, news.last).catch(sayError);
@@ -68,7 +68,7 @@ export class NewsList extends LiveElement {
 }
 
 /**
- * One line of a project's history.
+ * Row of a project's history.
  * @param {import("../api-types").HistoryEntry} entry
  * @param {number} now
  */

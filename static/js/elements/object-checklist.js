@@ -1,4 +1,4 @@
-/** The objects that a project is to click: how many are, taking over those of a template, and keeping its own as one. */
+/** Checklist of the objects to click: progress, taking the list from a template, and saving the project's objects as one. */
 
 import { addTemplate, listObjects, listTemplates, setChecklist } from "../api.js";
 import { h, LiveElement } from "../dom.js";
@@ -15,7 +15,7 @@ export class ObjectChecklist extends LiveElement {
   project = "";
   #answers = new Answers();
   #name = "";
-  /** @type {ListedObject[]} what is clicked */
+  /** @type {ListedObject[]} objects already clicked */
   #made = [];
   #state = h("p", { role: "status" });
   #choice = h("select");
@@ -43,7 +43,7 @@ export class ObjectChecklist extends LiveElement {
     this.#offer();
   }
 
-  /** Of the project as it is now. @param {Project} project */
+  /** Load and show the project's progress. @param {Project} project */
   async show(project) {
     try {
       await this.#answers.take(listObjects(project.id), (objects) => {

@@ -1,4 +1,4 @@
-/** The object's points in 3D, growing while its masks arrive. Drag turns it, arrow keys as well. */
+/** Point cloud of an object, growing as its masks arrive. A drag or the arrow keys rotate it. */
 
 import { getObjectPoints } from "../api.js";
 import { h, LiveElement } from "../dom.js";
@@ -53,7 +53,7 @@ export class ObjectCloud extends LiveElement {
     this.refresh();
   }
 
-  /** Its masks changed: ask for its points, at most every so often. */
+  /** Reload the points after the masks changed, throttled. */
   refresh() {
     if (this.#timer || this.#object === null) return;
     this.#timer = window.setTimeout(() => {

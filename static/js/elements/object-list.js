@@ -1,7 +1,8 @@
 /**
- * The objects of a project. Emits "pick-object" id|null (null: a new one), "choose-several" ids, "rename" {id, name, version},
- * "categorise" {id, category, version}, "rename-all" {ids, name}, "categorise-all" {ids, category}, "assign" {ids, name}, "hide" ids,
- * "lock" ids, "delete" ids, "stop" id, "merge" {id, other}. A line is made anew when what it shows has changed, and painted once it is in sight.
+ * List of a project's objects. Emits "pick-object" id|null (null: a new one), "choose-several" ids, "find-alike" id,
+ * "rename" {id, name, version}, "categorise" {id, category, version}, "rename-all" {ids, name},
+ * "categorise-all" {ids, category}, "assign" {ids, name}, "hide" ids, "lock" ids, "delete" ids, "stop" id,
+ * "merge" {id, other}. A row is rebuilt only when its content changes, and painted once it is visible.
  */
 
 import { h, icon, LiveElement, renew, reveal } from "../dom.js";
@@ -16,7 +17,7 @@ import { SelectionBar } from "./selection-bar.js";
 /** @typedef {import("../lib/listing.js").Entry<SceneObject> & { colour: string, said: Said[], selected: boolean }} Listed */
 /** @typedef {Listed & { notices: string[] }} Entry */
 
-const MANY = 9; // objects, from which they are searched through
+const MANY = 9; // objects from which the search is shown
 
 export class ObjectList extends LiveElement {
   new = h("button", { type: "button", class: "primary" }, icon("plus"), "New object");
@@ -31,19 +32,19 @@ export class ObjectList extends LiveElement {
   #state = options("Which objects", STATES);
   #find = h("div", { class: "find", hidden: true }, this.#search, this.#found, this.#order, this.#state);
   #bar = new SelectionBar();
-  /** What stands above the list and stays there while it scrolls. */
+  /** Sticky header above the list. */
   head = h("div", { class: "list-head" }, this.#find, this.#bar.element);
   /** @type {Entry[]} */
   #entries = [];
-  /** @type {Map<string, { said: string, line: HTMLElement }>} lines by what they are of */
+  /** @type {Map<string, { said: string, line: HTMLElement }>} rows by key, each with its serialised content */
   #lines = new Map();
-  /** @type {string[]} whom objects may be assigned to; empty where nobody has an account */
+  /** @type {string[]} possible assignees; empty when there are no accounts */
   #names = [];
-  /** @type {number | null} whose line was brought into sight */
+  /** @type {number | null} object whose row was last scrolled into view */
   #shown = null;
-  /** @type {number | null} whose line was selected last: Shift selects from there */
+  /** @type {number | null} object selected last: Shift selects the range from there */
   #from = null;
-  /** Whether to draw once the person has finished typing. */
+  /** Whether a redraw is deferred until the user has finished typing. */
   #waiting = false;
 
   connected() {
@@ -51,7 +52,7 @@ export class ObjectList extends LiveElement {
     this.replaceChildren(this.#list, this.#categories);
     const again = () => {
       this.#draw();
-      this.parentElement?.scrollTo(0, 0); // to what was found
+      this.parentElement?.scrollTo(0, 0); // to the first result
     };
     for (const field of [this.#search, this.#order, this.#state]) field.addEventListener("input", again, { signal });
     this.new.addEventListener("click", () => this.emit("pick-object", null), { signal });
@@ -67,7 +68,7 @@ export class ObjectList extends LiveElement {
     this.#offer();
   }
 
-  /** What is used here is offered first. */
+  /** Fill the category suggestions, those in use first. */
   #offer() {
     const used = this.#entries.map(({ object }) => object.category);
     const names = usedFirst(this.#known, used);
@@ -77,17 +78,17 @@ export class ObjectList extends LiveElement {
     this.#categories.replaceChildren(...names.map(({ name, label }) => h("option", { value: name }, label)));
   }
 
-  /** Whom objects may be assigned to. @param {string[]} names */
+  /** Set the possible assignees. @param {string[]} names */
   setNames(names) {
     this.#names = names;
     this.#bar.names = names;
     for (const option of this.#state.options)
       if (OF_PEOPLE.includes(option.value)) option.hidden = option.disabled = !names.length;
-    this.#lines.clear(); // each says whom it may be assigned to
+    this.#lines.clear(); // every row lists the assignees
     this.#draw();
   }
 
-  /** @param {Listed[]} entries in the order they were made */
+  /** @param {Listed[]} entries in order of creation */
   setObjects(entries) {
     this.#entries = toldOnce(entries);
     this.#offer();
@@ -120,7 +121,13 @@ export class ObjectList extends LiveElement {
     this.#shown = current;
   }
 
-  /** The line that is there where it says the same, else a new one. @param {string} key @param {unknown} says @param {() => HTMLElement} made @returns {[string, { said: string, line: HTMLElement }]} */
+  /**
+   * Entry of the row cache: the existing row if its content is unchanged, else a new one.
+   * @param {string} key
+   * @param {unknown} says content of the row
+   * @param {() => HTMLElement} made
+   * @returns {[string, { said: string, line: HTMLElement }]}
+   */
   #line(key, says, made) {
     const said = JSON.stringify(says);
     const there = this.#lines.get(key);
@@ -138,12 +145,12 @@ export class ObjectList extends LiveElement {
     );
   }
 
-  /** Those shown, from the top down. */
+  /** Ids of the objects shown, from top to bottom. */
   get #ids() {
     return this.#groups.flatMap(({ entries }) => entries.map(({ object }) => object.id));
   }
 
-  /** One line is a stop of the Tab key: where the keyboard is, else the current one, else the first; arrows reach the others. */
+  /** Roving tab stop: the focused row, else the current one, else the first; arrow keys reach the others. */
   #rove() {
     const lines = /** @type {HTMLElement[]} */ ([...this.#list.children]).filter((line) => line.querySelector(".pick"));
     const stop =
@@ -165,7 +172,7 @@ export class ObjectList extends LiveElement {
   }
 
   /**
-   * Whether a field of the current object is being typed in: masks that stream in must not take it away.
+   * Whether the user is typing in a field of the current object; a redraw for incoming masks must not remove it.
    * @param {number | null} current
    */
   #isTyping(current) {
@@ -177,7 +184,7 @@ export class ObjectList extends LiveElement {
     );
   }
 
-  /** With Ctrl one more or one less, with Shift all from the last one on. @param {number} id @param {{ shiftKey: boolean }} held */
+  /** Toggle an object; with Shift, select the range from the last. @param {number} id @param {{ shiftKey: boolean }} held */
   #select(id, { shiftKey }) {
     const selected = this.#entries.flatMap(({ object, selected }) => (selected ? [object.id] : []));
     const more = shiftKey ? span(this.#ids, this.#from, id) : [id];
@@ -255,7 +262,7 @@ export class ObjectList extends LiveElement {
       input.dataset.at = `${name}:${object.id}`;
       input.addEventListener("change", () => {
         input.value = name === "name" ? usableName(input.value) : input.value.trim();
-        input.value ||= value; // of what was typed nothing can be in a name
+        input.value ||= value; // nothing typed can be part of a name
         if (input.value === value) return;
         const type = name === "name" ? "rename" : "categorise";
         this.emit(type, { id: object.id, [name]: input.value, version: object.version });
@@ -296,7 +303,11 @@ export class ObjectList extends LiveElement {
   }
 }
 
-/** With what is to know of each object, which the current one says, and one of several for which it is the same. @param {Listed[]} entries @returns {Entry[]} */
+/**
+ * Entries with their notices: all of them on the current object; a notice shared by several others is listed once.
+ * @param {Listed[]} entries
+ * @returns {Entry[]}
+ */
 function toldOnce(entries) {
   const told = new Set();
   return entries.map((entry) => {
@@ -311,7 +322,7 @@ function groupHeading(heading, count) {
   return h("li", { class: "group" }, h("h2", {}, heading, h("span", { class: "muted" }, ` ${count}`)));
 }
 
-/** A button of an object's line. @param {string} what @param {string} label @param {number} id @param {Node | string} shown */
+/** Button in an object's row. @param {string} what @param {string} label @param {number} id @param {Node | string} shown */
 function button(what, label, id, shown) {
   const made = h("button", { type: "button", class: "quiet", "aria-label": label, title: label }, shown);
   made.dataset.at = `${what}:${id}`;
@@ -332,7 +343,7 @@ function assigned({ assignee }) {
   return assignee ? h("span", { class: "chip", title: "assigned to" }, `@${assignee}`) : null;
 }
 
-/** How far its masks are; what is in `.detail` stands in the line of the current object only. @param {Entry} entry */
+/** State of an object's masks; `.detail` is shown in the current object's row only. @param {Entry} entry */
 function state({ object, current, sure }) {
   if (!object.points.length && !object.front) return "no click yet";
   const clicks = object.front ? "drawn" : counted(object.points.length, "click");

@@ -1,7 +1,7 @@
 /**
- * How far each leaf of an object stands open in a photo: what was measured or marked, and what a person says instead.
- * Says "turn" while a leaf is turned and nothing is said yet, "mark" {leaf, value} when that is to be stored (null: the mark goes),
- * "seek" {frame} where its plot is pressed.
+ * Opening of each leaf of an object in a photo: the measured or marked value, and controls to mark another.
+ * Emits "turn" while a leaf is dragged, before anything is stored, "mark" {leaf, value} to store a value (null removes the
+ * mark), and "seek" {frame} when its plot is pressed.
  */
 
 import { h, renew } from "../dom.js";
@@ -16,20 +16,20 @@ import { sourceChip, sourceWord } from "../source-chip.js";
 /** @typedef {{ leaf: Leaf, element: HTMLElement, canvas: HTMLCanvasElement, set: (value: number) => void }} Row */
 
 const DEGREE = Math.PI / 180;
-/** Of the slider, and of a key. */
+/** Step of the slider, in radians or metres; a key moves by KEY_STEPS of them. */
 const STEP = { revolute: DEGREE, prismatic: 0.005 };
 const KEY_STEPS = 2;
 
 export class OpeningMarks extends EventTarget {
   element = h("div", { class: "opening-marks", role: "group", "aria-label": "How far it stands open in this photo" });
-  /** Why nothing may be marked; empty where it may. */
+  /** Why marking is not allowed; empty if it is. */
   refusal = "";
   /** @type {Row[]} */
   #rows = [];
   /** @type {Photo | undefined} */
   #photo;
   #at = 0;
-  /** What leaves were turned to and nobody stored. @type {Map<string, number>} */
+  /** Unsaved values of dragged leaves, by joint. @type {Map<string, number>} */
   #turned = new Map();
   #shown = "";
 
@@ -49,7 +49,7 @@ export class OpeningMarks extends EventTarget {
     this.draw();
   }
 
-  /** The plots, at the size that they have. */
+  /** Draw the plots at their current size. */
   draw() {
     const { color: ink } = getComputedStyle(this.element);
     for (const { leaf, canvas } of this.#rows) {
@@ -62,7 +62,7 @@ export class OpeningMarks extends EventTarget {
     }
   }
 
-  /** Leaves as they are drawn over the photo. @returns {{ leaf: Leaf, value: number, turned: boolean }[]} */
+  /** Leaves as drawn over the photo. @returns {{ leaf: Leaf, value: number, turned: boolean }[]} */
   get leaves() {
     return this.#rows.map(({ leaf }) => ({ leaf, value: this.#value(leaf), turned: this.#turned.has(leaf.joint) }));
   }
@@ -75,7 +75,7 @@ export class OpeningMarks extends EventTarget {
     this.dispatchEvent(new Event("turn"));
   }
 
-  /** What was turned and not stored is as it was. */
+  /** Discard unsaved values. */
   drop() {
     const turned = this.#rows.filter(({ leaf }) => this.#turned.delete(leaf.joint));
     for (const { leaf, set } of turned) set(this.#value(leaf));

@@ -1,4 +1,4 @@
-/** Projects in which others work on the same recording apart, and asking somebody to. */
+/** Second opinions: independent projects of the same recording, and a button to ask for another. */
 
 import { askOpinion, listNames, listOpinions } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";

@@ -1,7 +1,7 @@
 /**
- * The object's mesh over the photos it was seen in: outline, ghost, distance to the measured depth, before and after the fit; where
- * it was filmed open, as open as it was. Comments of the photo are pins; the object fills the picture, or the photo does.
- * Emits "pin-point" {frame, x, y} on a double click, "mark" {leaf, frame, value} where a person says how far a leaf stands open.
+ * Overlay of an object's mesh on the photos it was seen in: outline, ghost, distance to the measured depth, before and after
+ * the fit, opened as far as it was filmed open. The photo's comments are pins; the view zooms to the object or the whole photo.
+ * Emits "pin-point" {frame, x, y} on a double click, "mark" {leaf, frame, value} when the user marks a leaf's opening.
  */
 
 import { getPhotos } from "../api.js";
@@ -27,8 +27,8 @@ const LEGENDS = {
 };
 /** @type {Record<Look, string>} */
 const LOOKS = { outline: "Outline", ghost: "Ghost", residual: "Distance" };
-const PIN_R = 0.008; // of the photo's width
-const HOLD_PX = 9; // on the screen
+const PIN_R = 0.008; // fraction of the photo's width
+const HOLD_PX = 9; // radius on the screen
 
 export class PhotoCheck extends LiveElement {
   project = "";
@@ -41,12 +41,12 @@ export class PhotoCheck extends LiveElement {
   #of = "fitted";
   /** @type {Look} */
   #look = "outline";
-  /** Whether the object fills the picture, rather than the photo. */
+  /** Whether the view is zoomed to the object instead of the whole photo. */
   #near = true;
   /** @type {import("../api-types").Comment[]} */
   #comments = [];
-  #pinned = ""; // which comments are drawn
-  /** @type {{ pose: number[][], size: number[] } | null} what a correction would make of the box */
+  #pinned = ""; // key of the comments drawn
+  /** @type {{ pose: number[][], size: number[] } | null} box with a correction applied */
   #preview = null;
   #photo = h("img", { alt: "" });
   #under = h("img", { class: "over", alt: "" });
@@ -56,7 +56,7 @@ export class PhotoCheck extends LiveElement {
   #pins = shape("g");
   #leaves = shape("g");
   marks = new OpeningMarks();
-  #said = ""; // what people marked of the object
+  #said = ""; // key of the object's marks
   #opacity = h("input", { type: "range", min: "0", max: "100", value: "75", "aria-label": "Opacity over the photo" });
   #split = h("input", { type: "range", min: "0", max: "100", value: "100", "aria-label": "Before and after the fit" });
   #tools = h("div", { class: "bar" });
@@ -96,7 +96,7 @@ export class PhotoCheck extends LiveElement {
         if (this.#object !== object) return;
         const { frame } = this;
         this.#all = found;
-        if (frame !== null) this.#at = nearest(found.photos, frame); // marks bring others in
+        if (frame !== null) this.#at = nearest(found.photos, frame); // marks can add photos
         if (!found.of.includes(this.#of)) this.#of = found.of.at(-1) ?? "placed";
         this.#draw();
       });
@@ -106,7 +106,7 @@ export class PhotoCheck extends LiveElement {
   }
 
   /**
-   * What people marked of the object, and why nothing more may be marked (empty where it may).
+   * Set the object's marks, and why marking is not allowed (empty if it is).
    * @param {number} object
    * @param {import("../lib/opening-marks.js").States} states
    * @param {string} refusal
@@ -122,19 +122,19 @@ export class PhotoCheck extends LiveElement {
     if (again) this.show(object);
   }
 
-  /** An object's box of the finished scene; null where there is none, or while it is not known. @param {number} object */
+  /** An object's box in the finished scene; null if there is none or it is not loaded yet. @param {number} object */
   boxOf(object) {
     const { world_from_object: pose, dimensions_m: size } = (object === this.#object && this.#all) || {};
     return pose && size ? { pose, size } : null;
   }
 
-  /** Draw the box as a correction would have it; null draws the stored one. @param {{ pose: number[][], size: number[] } | null} box */
+  /** Draw a corrected box; null draws the stored one. @param {{ pose: number[][], size: number[] } | null} box */
   preview(box) {
     this.#preview = box;
     this.#drawBox();
   }
 
-  /** @param {import("../api-types").Comment[]} comments that are open */
+  /** @param {import("../api-types").Comment[]} comments open ones */
   setComments(comments) {
     this.#comments = comments;
     this.#drawPins();
@@ -147,23 +147,23 @@ export class PhotoCheck extends LiveElement {
     this.#draw();
   }
 
-  /** The photo of a frame, or the one nearest to it. @param {number} frame */
+  /** Show the photo of a frame, or of the nearest one. @param {number} frame */
   seek(frame) {
     this.#at = nearest(this.#all?.photos ?? [], frame);
     this.#draw();
   }
 
-  /** @param {boolean} on whether the mesh is hidden for as long as a key is held */
+  /** @param {boolean} on whether to hide the mesh while a key is down */
   blink(on) {
     this.#pictures.classList.toggle("blink", on);
   }
 
-  /** Of the photo that is shown; null where there is none. */
+  /** Frame of the photo shown; null if there is none. */
   get frame() {
     return this.#current?.frame ?? null;
   }
 
-  /** Whether it knows no photo: masks may have come before anybody listened. */
+  /** Whether no photo is loaded; masks may have arrived before the page listened. */
   get isEmpty() {
     return !this.#all?.photos.length;
   }
@@ -201,7 +201,7 @@ export class PhotoCheck extends LiveElement {
     this.#strip.replaceChildren(...all.photos.map((other, k) => this.#thumb(other, k)));
   }
 
-  /** The photo on the screen. */
+  /** Place the photo on the screen. */
   #place() {
     const photo = this.#current;
     const room = { width: this.#pictures.clientWidth, height: this.#pictures.clientHeight };
@@ -267,11 +267,11 @@ export class PhotoCheck extends LiveElement {
     this.#box.replaceChildren(...(photo && box ? boxLines(box.pose, box.size, photo) : []));
   }
 
-  /** Where each leaf is taken hold of, and those that are turned as they would stand. */
+  /** Draw the drag handle of each leaf, and the outline of leaves with unsaved values. */
   #drawLeaves() {
     const photo = this.#current;
     const leaves = photo && !this.marks.element.hidden ? this.marks.leaves : [];
-    const held = this.#leaves.querySelector(":scope > .hold.held"); // a finger or the mouse is on it: it stays
+    const held = this.#leaves.querySelector(":scope > .hold.held"); // reuse the handle being dragged
     const parts = leaves.flatMap(({ leaf, value, turned }) => {
       const lines = photo && turned ? boxLines(leafAt(leaf, value), leaf.size_m, photo) : [];
       const at = photo && !this.marks.refusal ? holdAt(leaf, value, photo) : null;
@@ -299,7 +299,7 @@ export class PhotoCheck extends LiveElement {
   }
 
   /**
-   * Turn a leaf by its edge; where it is let go of, it stands in this photo.
+   * Drag a leaf by its edge; on release, its opening in this photo is marked.
    * @param {PointerEvent} event
    * @param {SVGElement} hold
    * @param {import("../api-types").Leaf} leaf
@@ -324,7 +324,7 @@ export class PhotoCheck extends LiveElement {
     this.signal.addEventListener("abort", end, { signal: ends.signal });
   }
 
-  /** The comments of the photo. Who points at one goes on reading it while others are said: what is there stays the same. */
+  /** Draw the photo's comments, only when they change, so that a tooltip being read stays open. */
   #drawPins() {
     const photo = this.#current;
     const here = this.#comments.filter(({ frame, object }) => frame === photo?.frame && object === this.#object);
@@ -375,14 +375,14 @@ export class PhotoCheck extends LiveElement {
   }
 }
 
-/** Why there is nothing to look at. @param {ObjectPhotos} all */
+/** Message for a missing overlay. @param {ObjectPhotos} all */
 function missing({ of }) {
   return of.length
     ? "No mask yet: the photos appear once the object is found."
     : "No model to lay over the photos yet: run the pipeline first.";
 }
 
-/** Which photo is of a frame, or of the one nearest to it. @param {Photo[]} photos @param {number} frame */
+/** Index of the photo of a frame, or of the nearest one. @param {Photo[]} photos @param {number} frame */
 function nearest(photos, frame) {
   const away = photos.map((photo) => Math.abs(photo.frame - frame));
   return Math.max(away.indexOf(Math.min(...away)), 0);

@@ -1,4 +1,4 @@
-/** One project in the list of all: what it shows, where it stands, what can be done with it. */
+/** Card of a project in the list: thumbnail, state and actions. */
 
 import { h } from "../dom.js";
 import { ago, bytes, counted } from "../lib/format.js";
@@ -74,7 +74,7 @@ function stateChip(project) {
   return h("span", { class: "chip" }, project.counts.objects ? "annotating" : "new");
 }
 
-/** Where it stands between annotator and reviewer, and what waits for an answer. @param {Project} project */
+/** Chip of the review state and the open comments. @param {Project} project */
 function reviewChip(project) {
   const open = project.counts.open_comments;
   return h(

@@ -1,6 +1,7 @@
 /**
- * What the segmenter found by itself, to confirm or dismiss. Emits "proposals-changed" (draw them anew), "show-frame" frame,
- * "confirming" (objects are on their way), "objects-made" SceneObject[]. The page asks for the outlines of a frame with `outlinesOn`.
+ * List of the segmenter's proposals, to confirm or dismiss. Emits "proposals-changed" (redraw the outlines), "show-frame"
+ * frame, "confirming" (objects are about to be created), "objects-made" SceneObject[]. The page reads a frame's outlines with
+ * `outlinesOn`.
  */
 
 import { getFoundFronts, getProposals, restoreProposals } from "../api.js";
@@ -27,7 +28,10 @@ export class ProposalList extends LiveElement {
   #all = { state: "none", fraction: 0, items: [], dismissed: 0 };
   /** @type {string | null} */
   #current = null;
-  /** The object whose like are shown alone. @type {{ id: number, name: string, kind: import("../lib/likeness.js").Kind } | null} */
+  /**
+   * The object that the list is filtered by.
+   * @type {{ id: number, name: string, kind: import("../lib/likeness.js").Kind } | null}
+   */
   #like = null;
   #heading = h("h2", {}, "Proposals");
   #progress = h("progress", { max: 1, value: 0, "aria-label": "Looking for objects" });
@@ -103,7 +107,7 @@ export class ProposalList extends LiveElement {
       }));
   }
 
-  /** What a person may do now, in one line; null when nothing is highlighted. */
+  /** One-line hint of the available actions; null when nothing is highlighted. */
   get tip() {
     const chosen = this.#chosen;
     if (!this.#like || !chosen)
@@ -112,13 +116,13 @@ export class ProposalList extends LiveElement {
     return `Like ${name}? Enter makes this a ${kind.category}, X dismisses it, N goes on, Esc ends.`;
   }
 
-  /** Whether only those like one object are shown. */
+  /** Whether the list is filtered by likeness to an object. */
   get likeOne() {
     return this.#like !== null;
   }
 
   /**
-   * Show those alone that are like an object, the most alike first, and highlight the first; null: all again.
+   * Filter by likeness to an object, the most alike first, and highlight the first; null shows all.
    * @param {SceneObject | null} object
    */
   async findLike(object) {
@@ -138,7 +142,7 @@ export class ProposalList extends LiveElement {
     }
   }
 
-  /** Those shown: all, or those like one object, by their likeness. */
+  /** Proposals shown: all, or those like one object, sorted by likeness. */
   get #items() {
     return this.#like ? alike(this.#like.kind, this.#all.items) : this.#all.items;
   }
@@ -148,7 +152,7 @@ export class ProposalList extends LiveElement {
     this.#show(neighbour(this.#items, this.#current, step));
   }
 
-  /** Confirm the highlighted one and go to the next; with none highlighted, show the first: nobody confirms what they have not seen. */
+  /** Confirm the highlighted proposal and go to the next; if none is highlighted, only show the first. */
   confirm() {
     if (!this.#chosen) return this.move(1);
     return this.#confirm([this.#chosen.id]);
@@ -188,7 +192,7 @@ export class ProposalList extends LiveElement {
   }
 
   /**
-   * Take proposals off the list and go to the next at once; storing follows, one change after the other.
+   * Remove proposals from the list and go to the next at once; changes are then stored one at a time.
    * @param {string[]} ids
    * @param {() => Promise<void>} change
    */
@@ -238,7 +242,7 @@ export class ProposalList extends LiveElement {
     this.#drawState();
   }
 
-  /** Objects change by the dozen while masks arrive: ask once. */
+  /** Reload, debounced: many objects change while masks arrive. */
   #soon() {
     clearTimeout(this.#timer);
     this.#timer = window.setTimeout(() => this.load(), SOON_MS);

@@ -47,7 +47,7 @@ export function sceneTable(scene) {
 /** @param {SceneSummary["items"][number]} item */
 function row(item) {
   const joints = item.joints.map((joint) => {
-    const source = joint.sources.limits ?? ""; // it stands beside the limit
+    const source = joint.sources.limits ?? ""; // shown beside the limit
     return h(
       "div",
       {},
@@ -74,7 +74,7 @@ function row(item) {
   );
 }
 
-/** Where each of its numbers comes from. @param {import("../api-types").SceneItem["joints"][number]} joint */
+/** Sources of a joint's numbers. @param {import("../api-types").SceneItem["joints"][number]} joint */
 function said(joint) {
   return Object.entries(joint.sources)
     .map(([what, source]) => `${what}: ${sourceWord(source)}`)
@@ -82,7 +82,7 @@ function said(joint) {
 }
 
 /**
- * What the certificate says about places of the scene.
+ * Findings of the certificate, with their places in the scene.
  * @param {Certificate["findings"]} findings
  */
 export function findingList(findings) {
@@ -92,7 +92,7 @@ export function findingList(findings) {
   return h("ul", { class: "findings", "aria-label": "Findings of the certificate" }, ...lines);
 }
 
-/** Whether the scene can be what was filmed, and where to look. @param {NonNullable<Certificate["likeness"]>} likeness */
+/** Likeness of the scene to the recording, with the doubts to check. @param {NonNullable<Certificate["likeness"]>} likeness */
 function likenessLine({ state, doubts }) {
   const tone = state === "passed" ? "good" : state === "failed" ? "bad" : "warn";
   const names = doubts.flatMap(({ object, why }, at) => [

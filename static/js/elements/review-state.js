@@ -1,4 +1,4 @@
-/** Where the project stands, who brought it there, and the steps it may take from here with what each still lacks. */
+/** Review state of a project: who set it, and the possible transitions with their unmet conditions. */
 
 import { ApiError, getFigures, getReview, stepReview } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
@@ -14,7 +14,7 @@ import { say, sayError } from "./toasts.js";
 /** @typedef {import("../api-types").ReviewMove} ReviewMove */
 /** @typedef {import("../api-types").Figures} Figures */
 
-/** How far on the way to approval each is. */
+/** Progress of each state towards approval. */
 const PLACES = { draft: 0, "changes requested": 0, ready: 1, "in review": 2, approved: 3 };
 
 export class ReviewState extends LiveElement {
@@ -69,13 +69,13 @@ export class ReviewState extends LiveElement {
   }
 
   /**
-   * Take a step once everything said before it is stored: what is unmet is counted anew then.
+   * Make a transition once all pending edits are stored; unmet conditions are checked again then.
    * @param {ReviewStatus} seen
    * @param {ReviewMove} wanted
    */
   async #step(seen, wanted) {
     await outbox.settled;
-    const status = await getReview(this.project).catch(() => seen); // whether it can be reached is said below
+    const status = await getReview(this.project).catch(() => seen); // a connection error is reported below
     const move = (status.state === seen.state && status.moves.find(({ to }) => to === wanted.to)) || wanted;
     let reason = "";
     if (move.unmet.length || move.needs_reason) {

@@ -1,4 +1,4 @@
-/** Where jobs run: each seat, what it does, what waits for one; an admin drains one before its machine is stopped. */
+/** Seats (server processes that run jobs): current work and queue; an admin drains a seat before its machine is stopped. */
 
 import { drainSeat, listSeats } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
@@ -11,7 +11,7 @@ import { say, sayError } from "./toasts.js";
 /** @typedef {import("../api-types").Seats} Seats */
 /** @typedef {import("../api-types").SeatJob} SeatJob */
 
-const LOOK_MS = 5000; // a seat that starts or ends tells no tab
+const LOOK_MS = 5000; // polling: no event is sent when a seat starts or ends
 
 export class SeatList extends LiveElement {
   #answers = new Answers();

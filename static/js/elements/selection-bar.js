@@ -1,9 +1,12 @@
-/** What is done to several objects at once. Tells "categorise-all" {ids, category}, "rename-all" {ids, name}, "assign" {ids, name}, "hide", "lock", "delete", "choose-several" ids. */
+/**
+ * Toolbar for the selected objects. Calls `tell` with "categorise-all" {ids, category}, "rename-all" {ids, name},
+ * "assign" {ids, name}, and "hide", "lock", "delete" or "choose-several" ids.
+ */
 
 import { h } from "../dom.js";
 import { counted, usableName } from "../lib/format.js";
 
-const NOBODY = "nobody "; // no account's name: those have no space
+const NOBODY = "nobody "; // trailing space: no account can have this name
 
 export class SelectionBar {
   /** @type {(type: string, detail: unknown) => void} */
@@ -50,7 +53,7 @@ export class SelectionBar {
     });
   }
 
-  /** Whom objects may be assigned to; nobody: that is not offered. @param {string[]} names */
+  /** Possible assignees; an empty list hides the menu. @param {string[]} names */
   set names(names) {
     this.#assign.hidden = !names.length;
     this.#assign.replaceChildren(

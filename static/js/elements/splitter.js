@@ -1,11 +1,14 @@
-/** A bar between two panels: a drag or the arrow keys make one of them larger, Enter or a double click folds it away. Kept in this browser. */
+/**
+ * Splitter between two panels: a drag or the arrow keys resize one of them, Enter or a double click folds it.
+ * The size is kept in local storage.
+ */
 
 import { h } from "../dom.js";
 import { moved, read } from "../lib/panels.js";
 
 /** @typedef {import("../lib/panels.js").Panel} Panel */
 
-const STEP = 16; // pixels a key
+const STEP = 16; // pixels per key press
 
 export class Splitter {
   /** @type {Panel} */
@@ -16,7 +19,7 @@ export class Splitter {
   element = h("div", { class: "splitter", role: "separator", tabIndex: 0 });
 
   /**
-   * @param {HTMLElement} grid whose style says how large the panel is, as `--NAME`
+   * @param {HTMLElement} grid whose custom property `--NAME` sets the panel's size
    * @param {Panel} panel
    */
   constructor(grid, panel) {
@@ -71,7 +74,7 @@ export class Splitter {
     event.stopPropagation();
   }
 
-  /** How large the panel is, in pixels: what the style sheet says where nobody has moved the bar. */
+  /** Size of the panel in pixels; the style sheet's value until the bar is moved. */
   get #shown() {
     if (this.folded) return 0;
     return this.#size.px ?? Number.parseFloat(getComputedStyle(this.#grid).getPropertyValue(`--${this.#panel.name}`));

@@ -1,4 +1,4 @@
-/** Short messages in the corner; errors stay until closed or until another page is opened. Announced to assistive technology. */
+/** Toasts in the corner, announced to assistive technology; errors stay until closed or another page is opened. */
 
 import { ApiError } from "../api.js";
 import { h, icon } from "../dom.js";
@@ -35,13 +35,13 @@ export class Toasts extends HTMLElement {
   }
 }
 
-/** It goes when its time is over, but not from under a pointer or a person at its buttons. @param {HTMLElement} toast @param {number} ms */
+/** Remove a toast after a delay, but not while it is hovered or focused. @param {HTMLElement} toast @param {number} ms */
 function leaveAfter(toast, ms) {
   setTimeout(() => (toast.matches(":hover, :focus-within") ? leaveAfter(toast, SHOWN_MS) : toast.remove()), ms);
 }
 
 /**
- * Say something in the corner of the page.
+ * Show a toast.
  * @param {string} text
  * @param {Options} [options]
  */
@@ -51,7 +51,7 @@ export function say(text, options) {
 }
 
 /**
- * Say that something goes on by itself when the server has time for it.
+ * Show that a request is retried automatically once the server has capacity.
  * @param {ApiError} error
  */
 export function sayWaiting(error) {
@@ -59,13 +59,13 @@ export function sayWaiting(error) {
 }
 
 /**
- * Say what went wrong; a cancelled request is not news.
+ * Show an error; cancelled requests are ignored.
  * @param {unknown} error
  */
 export function sayError(error) {
   if (error instanceof DOMException && error.name === "AbortError") return;
   if (error instanceof ApiError && error.unreachable)
-    say(error.message); // the banner stays until it is back
+    say(error.message); // the offline banner stays until the server is back
   else if (error instanceof ApiError) say(error.message, { kind: "bad", hint: error.hint });
   else {
     say(error instanceof Error ? error.message : String(error), { kind: "bad", hint: "reload the page" });

@@ -1,4 +1,4 @@
-/** Projects that were deleted, for admins: each is restored, or deleted for good. Says "trash" when what is in it changed. */
+/** Trash for admins: deleted projects, to restore or delete permanently. Emits "trash" after each load. */
 
 import { deleteForGood, listTrash, restoreProject } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
@@ -12,7 +12,7 @@ import { say, sayError } from "./toasts.js";
 export class TrashList extends LiveElement {
   #answers = new Answers();
   #list = h("ul", { class: "trash-list", "aria-label": "Trash" });
-  /** How many projects are in it. */
+  /** Number of projects in the trash. */
   size = 0;
 
   connected() {
@@ -20,7 +20,7 @@ export class TrashList extends LiveElement {
     this.replaceChildren(this.#list);
   }
 
-  /** Show what is in it from now on. */
+  /** Load the list and keep it up to date. */
   open() {
     live.addEventListener("projects", () => this.#load(), { signal: this.signal });
     this.#load();

@@ -1,6 +1,6 @@
 /**
- * Lengths that people measured in the room, beside what the scan says of them; the recording is rescaled by them if a person wants.
- * Says "rescaled" with the project that is read again.
+ * Lengths measured in the room, compared with the scan; the recording can be rescaled to match them.
+ * Emits "rescaled" with the project being read again.
  */
 
 import { addLength, getScene, listLengths, readAgain, removeLength } from "../api.js";
@@ -15,7 +15,7 @@ import { say, sayError } from "./toasts.js";
 /** @typedef {import("../api-types").SceneItem} SceneItem */
 
 const SIDES = /** @type {const} */ (["width", "depth", "height"]);
-const ALIKE = 0.0005; // relative: a rescale by less is none
+const ALIKE = 0.0005; // relative; smaller rescales are ignored
 
 export class TrueLengthList extends LiveElement {
   project = "";
@@ -24,7 +24,7 @@ export class TrueLengthList extends LiveElement {
   #all = null;
   /** @type {SceneItem[]} */
   #items = [];
-  /** @type {TrueLength | null} what was removed last */
+  /** @type {TrueLength | null} the length removed last */
   #removed = null;
   #list = h("div");
   #object = h("select", { "aria-label": "Object" });
@@ -183,7 +183,7 @@ export class TrueLengthList extends LiveElement {
     }
   }
 
-  /** Say what it does before it is done. @param {number} wanted */
+  /** Confirm a rescale, listing its effects. @param {number} wanted */
   #ask(wanted) {
     if (!this.#all) return;
     const notes = rescaleNotes(this.#all, this.#items).map((note) => h("li", {}, note));

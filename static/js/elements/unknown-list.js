@@ -1,4 +1,4 @@
-/** What lay in the data folder without a row in the database: an admin sees what is in it and adopts, leaves or discards it. */
+/** Folders in the data directory without a database row; an admin adopts, leaves or discards each. */
 
 import { adoptUnknown, discardUnknown, leaveUnknown, listUnknown } from "../api.js";
 import { h } from "../dom.js";
@@ -11,7 +11,7 @@ import { say, sayError } from "./toasts.js";
 export class UnknownList extends HTMLElement {
   #answers = new Answers();
 
-  /** Ask the server again; hidden while nothing was set aside. */
+  /** Reload the list; hidden while it is empty. */
   async load() {
     try {
       await this.#answers.take(listUnknown(), (all) => this.#draw(all));

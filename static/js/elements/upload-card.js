@@ -1,4 +1,4 @@
-/** A file on its way to the server: how far it is, and a button that stops it; what arrived stays, to go on with. */
+/** Progress of an upload, with a stop button; the part already received is kept, to resume from. */
 
 import { uploadRecording } from "../api.js";
 import { h, LiveElement } from "../dom.js";
@@ -6,7 +6,7 @@ import { bytes } from "../lib/format.js";
 import { say, sayError } from "./toasts.js";
 
 export class UploadCard extends LiveElement {
-  limit = Infinity; // bytes that the server takes
+  limit = Infinity; // most bytes the server accepts
 
   connected() {
     this.className = "card";
@@ -14,9 +14,9 @@ export class UploadCard extends LiveElement {
   }
 
   /**
-   * Send it; null where it was refused or stopped, which is said here.
-   * @param {File} file a recording, or a project's file
-   * @param {string} [project] that the recording is for; else it becomes one
+   * Upload a file; null if it was refused, with a message, or stopped.
+   * @param {File} file a recording or an exported project
+   * @param {string} [project] project to attach the recording to; else a new one is created
    */
   async send(file, project) {
     if (file.size > this.limit) {

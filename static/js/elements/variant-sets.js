@@ -1,4 +1,4 @@
-/** Variants of bundles for training: how many of which seed, what they take, the job that makes them, and those that were made. */
+/** Variants of bundles for training: count and seed, their cost, the job that makes them, and the existing sets. */
 
 import { deleteVariants, listJobs, listVariants, makeVariants } from "../api.js";
 import { detailOf, h, icon, LiveElement, renew } from "../dom.js";
@@ -76,7 +76,7 @@ export class VariantSets extends LiveElement {
     if (job.project === this.project && job.kind === "vary") this.#follow(job);
   }
 
-  /** What is under way, or came to no end: what is done is among the sets. @param {Job | null} job */
+  /** Show a job until it is done; its result is then listed with the sets. @param {Job | null} job */
   #follow(job) {
     this.#job.job = job?.state === "done" ? null : job;
   }
@@ -106,7 +106,7 @@ export class VariantSets extends LiveElement {
     renew(this.#sets, ...all.sets.map((made) => this.#set(made)));
   }
 
-  /** What the wish takes, before it is made. */
+  /** Show the cost of the requested variants. */
   #tell() {
     const { offer, sets } = this.#all;
     if (!offer) return;
@@ -149,7 +149,7 @@ export class VariantSets extends LiveElement {
     );
   }
 
-  /** The same seed makes them again. @param {string} name */
+  /** Delete a set; the same seed recreates it. @param {string} name */
   async #delete(name) {
     try {
       await this.#answers.take(deleteVariants(this.project, name), (all) => this.#show(all));

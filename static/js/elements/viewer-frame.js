@@ -1,6 +1,6 @@
 /**
- * The 3D view: viser in an iframe of our own origin; the bundle's own 3D page, or a picture, and a retry when it is down.
- * Emits "shown" ViewerShown, "not-ready" message, "dragging" while somebody drags in it, "clicked".
+ * 3D view: viser in a same-origin iframe; when viser is down, the bundle's own 3D page or a picture, and a retry button.
+ * Emits "shown" ViewerShown, "not-ready" message, "dragging" during a drag in the view, "clicked".
  */
 
 import { ApiError, openViewer, showInViewer } from "../api.js";
@@ -14,20 +14,20 @@ import { sayError } from "./toasts.js";
 
 const CAMERA_KEYS = new Set(["w", "a", "s", "d", "q", "e", "arrowleft", "arrowright", "arrowup", "arrowdown", "tab"]);
 const CLICK_PX = 4; // a press that moved further was a drag
-const LAST_MS = 250; // where a drag ended is told a moment after it did
+const LAST_MS = 250; // the end of a drag is emitted after this delay
 
 export class ViewerFrame extends LiveElement {
   #project = "";
   /** @type {Partial<ViewerShow>} */
   #wanted = {};
   #url = "";
-  /** @type {Promise<void>} one request after the other, so that the last wish wins */
+  /** @type {Promise<void>} serialises requests, so that the last one wins */
   #queue = Promise.resolve();
 
   connected() {
     const again = (/** @type {Event} */ event) =>
       detailOf(event).reset && this.#url && this.open(this.#project, this.#wanted);
-    live.addEventListener("hello", again, { signal: this.signal }); // the server was started anew, without our view
+    live.addEventListener("hello", again, { signal: this.signal }); // the server restarted and lost our view
   }
 
   /**
@@ -40,16 +40,19 @@ export class ViewerFrame extends LiveElement {
     if (!this.#url) this.replaceChildren(h("div", { class: "fallback muted" }, "Opening the 3D view…"));
     try {
       const session = await openViewer(project);
-      if (!this.isConnected) return; // the page was left meanwhile
+      if (!this.isConnected) return; // the user left the page
       if (session.state === "down" || !session.url) return this.#down(session.message, session);
       if (session.url !== this.#url) this.#embed(session.url);
-      this.show(this.#wanted); // it may have changed while the view opened
+      this.show(this.#wanted); // the request may have changed while the view opened
     } catch (error) {
       if (this.isConnected) this.#down(error instanceof Error ? error.message : String(error), null);
     }
   }
 
-  /** The last wish wins; where to look or stand is asked once and must not be lost to it. @param {Partial<ViewerShow>} what */
+  /**
+   * Request a view. The last request wins, but one with `look` or `camera` is never skipped.
+   * @param {Partial<ViewerShow>} what
+   */
   show(what) {
     this.#want(what);
     if (!this.#url) return;
@@ -58,14 +61,14 @@ export class ViewerFrame extends LiveElement {
     );
   }
 
-  /** What was asked once while the view opens is asked when it is there. @param {Partial<ViewerShow>} what */
+  /** Merge a request made while the view opens into the pending one. @param {Partial<ViewerShow>} what */
   #want(what) {
     this.#wanted = this.#url || what.mode !== this.#wanted.mode ? what : { ...this.#wanted, ...what };
   }
 
   /**
    * @param {Partial<ViewerShow>} what
-   * @param {boolean} again whether to try once more with a view started anew
+   * @param {boolean} again whether to retry once with a restarted view
    * @returns {Promise<void>}
    */
   async #ask(what, again) {
@@ -90,7 +93,7 @@ export class ViewerFrame extends LiveElement {
     this.replaceChildren(frame);
   }
 
-  /** Drags and keys inside the frame, which is of our own origin. @param {HTMLIFrameElement} frame */
+  /** Listen to drags, clicks and keys inside the same-origin frame. @param {HTMLIFrameElement} frame */
   #listen(frame) {
     const inside = frame.contentWindow;
     const dragging = (/** @type {PointerEvent} */ event) => event.buttons && this.emit("dragging");
@@ -132,10 +135,10 @@ export class ViewerFrame extends LiveElement {
   }
 }
 
-/** A key pressed in the frame is one of the page's, but for those that move viser's camera. @param {KeyboardEvent} event */
+/** Forward keys pressed in the frame to the page, except those that move viser's camera. @param {KeyboardEvent} event */
 function passOn(event) {
   if (CAMERA_KEYS.has(event.key.toLowerCase()) && !event.ctrlKey && !event.metaKey) return;
-  event.stopPropagation(); // viser has a palette of its own
+  event.stopPropagation(); // viser has its own palette
   event.preventDefault();
   document.body.dispatchEvent(new KeyboardEvent(event.type, { ...keyOf(event), bubbles: true, cancelable: true }));
 }

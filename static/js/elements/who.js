@@ -1,4 +1,4 @@
-/** Who is signed in, and the way out; nothing for who opened the printed address. */
+/** Signed-in user, inbox and sign-out button; empty for the printed address, which has no account. */
 
 import { getInbox, getSystem, signOut } from "../api.js";
 import { h, LiveElement } from "../dom.js";
@@ -35,7 +35,7 @@ export class WhoIsIn extends LiveElement {
     }
   }
 
-  /** How much waits for the person. */
+  /** Update the number of items in the inbox. */
   async #count() {
     try {
       await this.#answers.take(getInbox(this.signal), ({ returned, assigned, objects, mentions }) => {
@@ -47,7 +47,7 @@ export class WhoIsIn extends LiveElement {
     }
   }
 
-  /** @param {string | null} next the page that follows */
+  /** @param {string | null} next page to open afterwards */
   async #leave(next) {
     await signOut().catch(sayError);
     location.assign(next ?? "/login");
