@@ -1,4 +1,4 @@
-/** Candidates from the same camera, each with its evidence; the one that is used says why. */
+/** Cards of the candidates, rendered from the same camera, each with its evidence; and the reason for the one in use. */
 
 import { h, icon } from "../dom.js";
 import { counted } from "../lib/format.js";
@@ -9,7 +9,7 @@ import { counted } from "../lib/format.js";
 /** @typedef {{ show: (candidate: Candidate) => void, verdict: (candidate: Candidate, verdict: "accepted" | "rejected") => void, judges: boolean }} Told */
 
 /**
- * A card of each, the one that is used first.
+ * Card of each candidate, the one in use first.
  * @param {CandidateGroup} group
  * @param {string} current the one shown in 3D
  * @param {Told} told
@@ -19,7 +19,7 @@ export function cards(group, current, told) {
 }
 
 /**
- * Why this one, and which came second.
+ * Reason for the candidate in use, and the runner-up.
  * @param {CandidateGroup} group
  */
 export function choice(group) {
@@ -34,13 +34,13 @@ export function choice(group) {
   );
 }
 
-/** The next best that nobody rejected. @param {CandidateGroup} group */
+/** Next best candidate that is not rejected. @param {CandidateGroup} group */
 function runnerUp(group) {
   const rejected = new Set(group.candidates.filter(({ verdict }) => verdict === "rejected").map(({ id }) => id));
   return group.ranking.find((id) => id !== group.chosen && !rejected.has(id));
 }
 
-/** Its candidates, the one that is used first. @param {CandidateGroup} group */
+/** Candidates by rank, the one in use first. @param {CandidateGroup} group */
 export function ranked(group) {
   const place = new Map(group.ranking.map((id, k) => [id, k]));
   /** @type {(candidate: Candidate) => number} */
@@ -86,7 +86,7 @@ function card(group, candidate, current, told) {
   );
 }
 
-/** The figures in a line; those that are doubtful stand out. @param {Candidate} candidate */
+/** Line of figures; doubtful ones are highlighted. @param {Candidate} candidate */
 export function evidence({ metrics, watertight, faces, generator }) {
   /** @type {[string, boolean][]} text, and whether it is a warning */
   const figures = [];

@@ -1,7 +1,7 @@
 /**
- * The middle of the review: the object over its photos, or in the 3D view with its joints and the handles that move it.
- * Says "pin" {frame, x, y} where a comment is wanted, "mark" {leaf, frame, value} where a leaf was said to stand so far open, "store" {patch} when the object is to stay where it was moved, "about" when
- * it is known whether it can be moved.
+ * Centre of the review page: the object over its photos, or in the 3D view with its joints and the handles that move it.
+ * Emits "pin" {frame, x, y} to comment on a point, "mark" {leaf, frame, value} to mark a leaf's opening, "store" patch to store
+ * the moved object, and "about" once it is known whether the object can be moved.
  */
 
 import { addLength, getPicked, getViewerCamera, moveJoints, placeInViewer } from "../api.js";
@@ -36,11 +36,11 @@ export class Centre extends EventTarget {
   #objects;
   #turn = new Paced(MOVE_MS, (/** @type {Record<string, number>} */ values) => moveJoints(this.#project, values));
   #place = new Paced(MOVE_MS, (/** @type {{ pose?: number[][] }} */ { pose }) => this.#drag(pose ?? null));
-  #open = false; // nothing is shown before it is known what there is
+  #open = false; // whether the objects are loaded; nothing is shown before
   /** @type {number[][]} */
   #tape = [];
-  #picked = 0; // clicks in the 3D view that were answered
-  #handles = false; // whether the 3D view has them
+  #picked = 0; // number of the last click in the 3D view that was handled
+  #handles = false; // whether the 3D view shows handles
   element = h(
     "div",
     { class: "centre" },
@@ -81,14 +81,14 @@ export class Centre extends EventTarget {
     signal.addEventListener("abort", () => [this.joints, this.#turn, this.#place].forEach((part) => part.stop()));
   }
 
-  /** Show what is looked at, now that it is known. */
+  /** Show the chosen object, once the objects are loaded. */
   open() {
     this.#open = true;
     this.show();
     this.#viewer.open(this.#project, this.#wanted);
   }
 
-  /** Another object is looked at, as the one before was; what was made from the scan has no photos and no candidates. */
+  /** Show another object in the same mode; objects made from the scan have no photos or candidates, so use the scene. */
   turnTo() {
     this.bar.moving = false;
     const onlyInScene = this.#objects.madeName && !["scene", "cloud"].includes(this.bar.mode);
@@ -116,7 +116,7 @@ export class Centre extends EventTarget {
     this.compare.show(this.#objects.group);
   }
 
-  /** What is known of the object changed: its box may be moved, once there is one. */
+  /** Update after the object's data changed: it can be moved once it has a box. */
   aboutObject() {
     const { group, object } = this.#objects;
     if (this.#open && this.bar.mode === "compare") this.#compare();
@@ -127,7 +127,7 @@ export class Centre extends EventTarget {
     this.dispatchEvent(new Event("about"));
   }
 
-  /** What the click in the 3D view was on is looked at. */
+  /** Choose the object clicked in the 3D view, or add the point to the tape. */
   async #pick() {
     for (let tries = 0; tries < PICK_TRIES; tries++) {
       const { number, object, name, point } = await getPicked(this.#project);
@@ -139,18 +139,18 @@ export class Centre extends EventTarget {
         else if (name) this.#objects.chooseMade(name);
         return;
       }
-      await new Promise((after) => setTimeout(after, PICK_MS)); // the click goes to the 3D view on a way of its own
+      await new Promise((after) => setTimeout(after, PICK_MS)); // the click reaches the server over the viewer's own connection
     }
   }
 
-  /** @param {number[][]} points that the tape goes between */
+  /** @param {number[][]} points ends of the tape */
   #measure(points) {
     this.#tape = points;
     this.bar.read(reading(points), points.length === 2);
     this.show();
   }
 
-  /** What a tape says in the room of the length between the two points. */
+  /** Ask for the true length between the two points, measured in the room, and store it. */
   async #keepLength() {
     const [points, typed] = [
       this.#tape,
@@ -170,7 +170,7 @@ export class Centre extends EventTarget {
     });
   }
 
-  /** Turn the camera to the chosen object, or back to where all of the scene is seen. @param {NonNullable<ViewerShow["look"]>} look */
+  /** Turn the camera to the chosen object, or to the whole scene. @param {NonNullable<ViewerShow["look"]>} look */
   look(look) {
     if (!this.bar.isSolid) return;
     const frame = this.photos.frame;
@@ -178,14 +178,17 @@ export class Centre extends EventTarget {
     this.#viewer.show({ ...this.#wanted, look, frame });
   }
 
-  /** How the 3D view is looked at now, for a comment; null where it is a photo. @returns {Promise<import("../api-types").ViewerLookInput | null>} */
+  /**
+   * Current settings and camera of the 3D view, to store with a comment; null while a photo is shown.
+   * @returns {Promise<import("../api-types").ViewerLookInput | null>}
+   */
   async kept() {
     if (!this.bar.isSolid) return null;
     const camera = await getViewerCamera(this.#project);
     return { ...this.bar.kept, hidden: this.#wanted.hidden, camera };
   }
 
-  /** As somebody looked at it who said something. @param {import("../api-types").ViewerLookOutput} look */
+  /** Restore the 3D view stored with a comment. @param {import("../api-types").ViewerLookOutput} look */
   restore(look) {
     this.#objects.hideOnly(look.hidden);
     this.bar.restore(look);
@@ -202,7 +205,10 @@ export class Centre extends EventTarget {
     this.mover.nudge(key, fine);
   }
 
-  /** Say something of the leaves over the photo; where no photo is shown, it is shown first. @param {(marks: import("../elements/opening-marks.js").OpeningMarks) => void} act */
+  /**
+   * Act on the leaves' marks over the photo; if no photo is shown, only switch to it.
+   * @param {(marks: import("../elements/opening-marks.js").OpeningMarks) => void} act
+   */
   mark(act) {
     if (this.bar.mode !== "photo") return this.bar.set("photo");
     if (!this.photos.marks.leaves.length) return say("Nothing of it opens: there is nothing to mark");
@@ -213,7 +219,7 @@ export class Centre extends EventTarget {
     return this.#objects.project;
   }
 
-  /** What is asked of the 3D view. */
+  /** Request to the 3D view. */
   get #wanted() {
     const { mode, ...look } = this.bar.wish;
     const { number, candidate } = this.#objects;
@@ -244,13 +250,13 @@ export class Centre extends EventTarget {
     this.photos.preview(moving ? (this.mover.wanted ?? this.mover.box) : null);
   }
 
-  /** The handles in the 3D view go where a number or a key moved the object. */
+  /** Move the handles in the 3D view to the object's current pose. */
   #follow() {
     const { box, wanted } = this.mover;
     if (this.#handles && box) this.#place.add({ pose: (wanted ?? box).pose });
   }
 
-  /** Put the handles somewhere, or learn where they were dragged. @param {number[][] | null} pose */
+  /** Place the handles at a pose; null reads where they were dragged. @param {number[][] | null} pose */
   async #drag(pose) {
     const { object } = this.#objects;
     const placed = await placeInViewer(this.#project, pose);

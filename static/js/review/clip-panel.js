@@ -1,6 +1,5 @@
 /**
- * A box outside which nothing of the scene and the scan is shown: six sides to move, and what is often wanted at a press.
- * Says "change" when another part is to be shown.
+ * Clip box of the scene and the scan: six sliders for its sides, and presets. Emits "change" when the box changes.
  */
 
 import { h } from "../dom.js";
@@ -15,14 +14,14 @@ const ENDS = [
   ["bottom", "top"],
 ];
 const STEPS = 100;
-const ABOUT = 0.02; // of the scene, around the chosen object
+const ABOUT = 0.02; // margin around the chosen object, as a fraction of the scene
 const HALF = 0.5;
 
 export class ClipPanel extends EventTarget {
   on = false;
-  /** @type {number[] | null} width, depth and height of what is cut, metres */
+  /** @type {number[] | null} width, depth and height of the clipped content, metres */
   #span = null;
-  /** @type {ViewerClip | null} what the chosen object reaches */
+  /** @type {ViewerClip | null} extent of the chosen object */
   #part = null;
   #sides = AXES.map((name, axis) =>
     [0, 1].map((end) => {
@@ -66,20 +65,20 @@ export class ClipPanel extends EventTarget {
     this.#draw();
   }
 
-  /** What is asked of the 3D view; null shows all. @returns {ViewerClip | null} */
+  /** Clip box to request from the 3D view, in fractions of the scene; null shows all. @returns {ViewerClip | null} */
   get wish() {
     const box = this.#box;
     return this.on && (box.low.some((side) => side > 0) || box.high.some((side) => side < 1)) ? box : null;
   }
 
-  /** Where the first cut is half way through from the front: a section that cuts nothing teaches nothing. */
+  /** Turn clipping on or off; a box that clips nothing is first set to cut off the front half. */
   toggle() {
     this.on = !this.on;
     if (this.on && !this.wish) this.#set({ low: [0, HALF, 0], high: [1, 1, 1] });
     this.#changed();
   }
 
-  /** A view that somebody kept. @param {ViewerClip | null | undefined} box */
+  /** Restore a stored clip box. @param {ViewerClip | null | undefined} box */
   restore(box) {
     this.on = Boolean(box);
     if (box) this.#set(box);
@@ -116,7 +115,7 @@ export class ClipPanel extends EventTarget {
         input.value = String(Math.round(STEPS * ((end ? high : low)[axis] ?? end)));
   }
 
-  /** Two sides do not pass each other. @param {number} axis @param {number} end */
+  /** Keep opposite sides from crossing. @param {number} axis @param {number} end */
   #moved(axis, end) {
     const [low, high] = this.#sides[axis] ?? [];
     if (!low || !high) return;

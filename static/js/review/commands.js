@@ -1,6 +1,6 @@
-/** What can be done in the review by a key or from the palette, by the names of the keymap. */
+/** Actions of the review page for keys and the command palette, by their names in the keymap. */
 
-/** What a key held down must not do again and again. */
+/** Actions that do not repeat while a key is held down. */
 export const ONE_A_PRESS = ["comment", "more", "accept", "reject", "mark-closed", "mark-open", "unmark"];
 
 /**

@@ -1,6 +1,6 @@
 /**
- * All candidates of an object side by side, turned together; where each lies off one of them, and the crops they were made from.
- * Emits "show-candidate" and "judge" {candidate, said}, "seek-photo" with a frame.
+ * Side-by-side view of an object's candidates, rotated together, with the differences of each from one of them and their source
+ * crops. Emits "show-candidate" with a candidate, "judge" {candidate, said}, "seek-photo" with a frame.
  */
 
 import { getDifferences } from "../api.js";
@@ -27,8 +27,8 @@ export class CandidateCompare extends LiveElement {
   #against = "";
   /** @type {Differences | null} */
   #found = null;
-  #drawn = ""; // of what the cards are
-  #spin = 0; // the timer; 0 while nothing turns by itself
+  #drawn = ""; // key of the cards drawn
+  #spin = 0; // timer of the rotation; 0 while stopped
   #turn = h("input", {
     type: "range",
     min: "0",
@@ -72,7 +72,7 @@ export class CandidateCompare extends LiveElement {
     else this.#draw();
   }
 
-  /** Turn all by themselves, or stop. */
+  /** Start or stop the automatic rotation. */
   spin() {
     if (this.#spin) return this.#stop();
     this.#spinning.setAttribute("aria-pressed", "true");
@@ -138,7 +138,7 @@ export class CandidateCompare extends LiveElement {
       v: new URL(candidate.thumbnail, location.href).searchParams.get("v") ?? "",
     });
     const picture = h("div", { class: "turntable waiting", role: "img", "aria-label": `${id} from ${TURNS} sides` });
-    picture.style.backgroundImage = `url("${candidate.thumbnail}")`; // until it is drawn from all sides
+    picture.style.backgroundImage = `url("${candidate.thumbnail}")`; // until the turntable images are loaded
     const strip = Object.assign(new Image(), { src: `${candidate.thumbnail.split(".png")[0]}/turns.png?${query}` });
     strip.onload = () => {
       picture.style.backgroundImage = `url("${strip.src}")`;
@@ -203,14 +203,14 @@ export class CandidateCompare extends LiveElement {
     this.#face();
   }
 
-  /** The side that all of them show. */
+  /** Show the same side of all candidates. */
   #face() {
     const share = Number(this.#turn.value) / (TURNS - 1);
     this.#turn.setAttribute("aria-valuetext", `${Math.round((360 * Number(this.#turn.value)) / TURNS)} degrees`);
     this.style.setProperty("--side", `${100 * share}%`);
   }
 
-  /** A drag on any of the pictures turns all. @param {PointerEvent} event */
+  /** Rotate all candidates by a drag on one picture. @param {PointerEvent} event */
   #drag(event) {
     const picture = event.target;
     if (!(picture instanceof HTMLElement) || !picture.classList.contains("turntable")) return;

@@ -1,4 +1,4 @@
-/** What is done to several objects of the review at once: they take over what was said of the chosen one. */
+/** Toolbar for several selected objects: copies the chosen object's corrections to them. */
 
 import { h } from "../dom.js";
 import { copied, copiedWords } from "../lib/copied.js";

@@ -1,4 +1,4 @@
-/** What a person may correct about one object: hinge, limits, size, place. Each is an override; what depends on it runs again. */
+/** Form of the corrections to one object: hinge, limits, size, place. Each is stored as an override; dependent stages rerun. */
 
 import { h, numberField } from "../dom.js";
 import { byOpening, usedFirst } from "../lib/categories.js";
@@ -9,7 +9,7 @@ import { slidesSideways } from "../lib/joints.js";
 /** @typedef {import("../api-types").SceneItem} SceneItem */
 
 /**
- * @typedef {object} Kinds what it may be
+ * @typedef {object} Kinds categories, and handlers to change them
  * @property {import("../api-types").Category[]} categories
  * @property {(category: string) => void} categorise
  * @property {(template: string | null) => void} buildAs
@@ -21,7 +21,8 @@ const DEGREES = Math.PI / 180;
 /**
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item
- * @param {{ move: (() => void) | null, open: boolean, judges: boolean } & Kinds} how `move` begins to move it: null where there is no box yet
+ * @param {{ move: (() => void) | null, open: boolean, judges: boolean } & Kinds} how `move` starts moving the object; null
+ *   if it has no box yet
  * @param {(patch: Partial<OverridePatch>) => void} change
  */
 export function corrections(group, item, { move, open, judges, ...ask }, change) {
@@ -55,7 +56,7 @@ function hasCorrection({ override }) {
 }
 
 /**
- * What it is called, and whose body and joints it takes: a drawer's, whatever it is called.
+ * Fields for the category, and for the category whose body and joints it is built with, such as a drawer's.
  * @param {CandidateGroup} group
  * @param {Kinds} kinds
  */
@@ -87,7 +88,7 @@ function kind(group, { categories, categorise, buildAs }) {
 }
 
 /**
- * The side it turns on, or slides to.
+ * Menu for the side of the hinge, or the side it slides to.
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item
  * @param {(patch: Partial<OverridePatch>) => void} change
@@ -109,7 +110,7 @@ function side(group, item, change) {
 }
 
 /**
- * How far each joint opens. The only joint of an object needs no name; one of several is named.
+ * Fields for the opening limit of each joint. Joints are named only if there are several.
  *
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item

@@ -1,6 +1,6 @@
 /**
- * What a person says about an object, sent through the outbox: verdicts, corrections, another mesh, taking it back.
- * Says "stored" {object, job} for every answer, job being the run that follows from it, and "undone" when something was taken back.
+ * Decisions about an object, sent through the outbox: verdicts, corrections, mesh uploads, undo and redo.
+ * Emits "stored" {object, job} for every response, `job` being the run it started, and "undone" after an undo or redo.
  */
 
 import { lookAtMesh, startRun, uploadCandidate } from "../api.js";
@@ -30,7 +30,7 @@ export class Decisions extends EventTarget {
     this.#objects = objects;
   }
 
-  /** Accept what is looked at, or go on where it is accepted: the key pressed twice takes nothing back, the button does. */
+  /** Accept the shown candidate, or go on if already accepted: unlike the button, a second key press clears nothing. */
   accept() {
     const { group, candidate } = this.#objects;
     if (group?.accepted && group.accepted === candidate) this.#objects.stepToReview();
@@ -42,7 +42,7 @@ export class Decisions extends EventTarget {
   }
 
   /**
-   * Said again, it is taken back.
+   * Give a verdict; giving the same one again clears it.
    * @param {Candidate} candidate
    * @param {Verdict} said
    */
@@ -57,11 +57,11 @@ export class Decisions extends EventTarget {
     const answer = outbox.send(change);
     if (verdict === "accepted") this.#objects.accepting(group, candidate.id, answer);
     if ((await this.#report(answer)) || verdict !== "accepted") return;
-    this.#objects.choose(group.object); // it was not stored: back to it
+    this.#objects.choose(group.object); // not stored: return to the object
     await this.#objects.load();
   }
 
-  /** Whether who looks may decide; says who may. */
+  /** Whether the user may decide; shows a message if not. */
   #may() {
     if (!this.#objects.judges) say(REVIEWERS);
     return this.#objects.judges;
@@ -74,7 +74,7 @@ export class Decisions extends EventTarget {
   }
 
   /**
-   * How far a leaf stands open in a frame; null takes the mark back. One after the other: each adds to those before it.
+   * Mark how far a leaf is open in a frame; null removes the mark. Marks are stored one at a time, as each adds to the others.
    * @param {{ leaf: import("../api-types").Leaf, frame: number, value: number | null }} mark
    */
   mark({ leaf, frame, value }) {
@@ -90,7 +90,7 @@ export class Decisions extends EventTarget {
   }
 
   /**
-   * Others take over what was said of the chosen one, in one run; each can be undone at that object.
+   * Copy a correction of the chosen object to others, in one run; each copy can be undone at its object.
    * @param {Partial<OverridePatch>} patch
    * @param {number[]} to
    */
@@ -114,7 +114,7 @@ export class Decisions extends EventTarget {
     await this.#objects.load();
   }
 
-  /** What it is; results stay until the run that follows. @param {string} category */
+  /** Change the category and start a run; results stay until that run is done. @param {string} category */
   async categorise(category) {
     const { group } = this.#objects;
     if (!group || !this.#may()) return;
@@ -131,7 +131,10 @@ export class Decisions extends EventTarget {
     }
   }
 
-  /** Whose body and joints it takes, and so do all of its category where that is one of a person's own. @param {string | null} template */
+  /**
+   * Set the category whose body and joints to use; with a custom category, for all objects of that category.
+   * @param {string | null} template
+   */
   async buildAs(template) {
     const { group, groups, categories } = this.#objects;
     if (!group || !this.#may()) return;
@@ -144,14 +147,14 @@ export class Decisions extends EventTarget {
   }
 
   /**
-   * @param {{ run_name: string, override?: import("../api-types").OverrideData }} item that was made from the scan
+   * @param {{ run_name: string, override?: import("../api-types").OverrideData }} item made from the scan
    * @param {Partial<OverridePatch>} patch
    */
   correctMade(item, patch) {
     if (this.#may()) this.#report(outbox.send(changeMade(this.#project, item, patch)));
   }
 
-  /** Another draw of candidates beside those that are there. */
+  /** Generate further candidates, in addition to the existing ones. */
   more() {
     const { group } = this.#objects;
     if (!group) return;
@@ -159,7 +162,7 @@ export class Decisions extends EventTarget {
     else say(`No further candidates of ${group.name} are made: choose among these or upload a mesh`);
   }
 
-  /** A mesh of one's own, used once it was looked at. @param {File} file */
+  /** Upload a mesh, after the user has seen and confirmed it. @param {File} file */
   async upload(file) {
     const { group } = this.#objects;
     if (!group || !this.#may()) return;
@@ -168,12 +171,12 @@ export class Decisions extends EventTarget {
   }
 
   /**
-   * Of what was said here or seen here: where somebody else said something since, that is shown instead.
+   * Undo or redo a change of the version shown here; if somebody changed the object since, reload it instead.
    * @param {"undo" | "redo"} which
    */
   async undoRedo(which) {
     const { object } = this.#objects;
-    await outbox.settled; // what was said before is what it takes back
+    await outbox.settled; // undo applies to the last edit, which must be stored first
     const version = this.#objects.groups.find((group) => group.object === object)?.version;
     if (version === undefined) return;
     try {
@@ -201,7 +204,7 @@ export class Decisions extends EventTarget {
 
   /**
    * @param {Promise<Reviewed>} answer
-   * @returns {Promise<boolean>} whether it was stored; not where somebody else's is left as it is
+   * @returns {Promise<boolean>} whether it was stored; false if another person's value was kept
    */
   async #report(answer) {
     try {
@@ -218,7 +221,7 @@ export class Decisions extends EventTarget {
   }
 }
 
-/** Whether something of it is not said of the object yet. @param {CandidateGroup} group @param {Partial<OverridePatch>} patch */
+/** Whether a patch would change the object's override. @param {CandidateGroup} group @param {Partial<OverridePatch>} patch */
 function differs({ override }, patch) {
   const said = new Map(Object.entries(override));
   return Object.entries(patch).some(([key, value]) => JSON.stringify(said.get(key)) !== JSON.stringify(value));

@@ -1,4 +1,4 @@
-/** What speaks for and against an object's place: figures of the alignment and the fit, findings of the certificate. */
+/** Evidence for an object's placement: figures of the alignment and the fit, and findings of the certificate. */
 
 import { h } from "../dom.js";
 import { findingList } from "../elements/results.js";
@@ -39,21 +39,21 @@ export function placement(placement, item) {
   );
 }
 
-/** By how much the pose may be off, at the usual 95 %. @param {Placement["spread"]} spread */
+/** Uncertainty of the pose at 95 %. @param {Placement["spread"]} spread */
 function held(spread) {
   if (!spread) return "not measured";
   const { shift_m, turn_deg, scale } = spread;
   return `± ${(2000 * shift_m).toFixed(0)} mm, ± ${(2 * turn_deg).toFixed(1)}°, ± ${(200 * scale).toFixed(1)} %`;
 }
 
-/** How near the best other orientation came. @param {Placement} placement */
+/** Score of the next best orientation. @param {Placement} placement */
 function nextOrientation({ runner_up, runner_up_turn_deg }) {
   if (runner_up === null) return "no other one fits";
   const turned = runner_up_turn_deg === null ? "" : `, turned ${runner_up_turn_deg.toFixed(0)}°`;
   return `${(100 * runner_up).toFixed(0)} % as good${turned}`;
 }
 
-/** Each number of a joint with where it comes from. @param {SceneItem | undefined} item */
+/** Sources of the numbers of each joint. @param {SceneItem | undefined} item */
 function joints(item) {
   return (item?.joints ?? []).map((joint) => {
     const chips = Object.entries(joint.sources).map(([what, source]) => sourceChip(source, { of: what }));
@@ -62,7 +62,7 @@ function joints(item) {
 }
 
 /**
- * What the certificate says about one object: links and joints begin with their object's name.
+ * Findings of the certificate about one object, whose links and joints begin with the object's name.
  * @param {Certificate | null} certificate
  * @param {string} name
  * @param {string[]} names of all objects

@@ -1,8 +1,8 @@
-/** What the colours of a scene's surfaces mean. */
+/** Legend for the colours of a scene's surfaces. */
 
 import { h } from "../dom.js";
 
-/** By what is drawn: its class, the ends of its scale, and what is to be known of it. @type {Record<string, [string, string, string, string]>} */
+/** CSS class, ends of the scale and a note for each layer. @type {Record<string, [string, string, string, string]>} */
 const SCALES = {
   distance: ["viridis", "0 mm", "30 mm from the scan", "Grey: nothing was measured within 60 mm."],
   unobserved: [

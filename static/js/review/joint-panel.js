@@ -1,4 +1,4 @@
-/** Joints of the scene in the 3D view: where each number comes from, a slider each, a sweep, open and close all. */
+/** Joint panel of the 3D view: a slider and the sources of each joint, a sweep, and open and close all. */
 
 import { h } from "../dom.js";
 import { counted, jointValue } from "../lib/format.js";
@@ -48,7 +48,7 @@ export class JointPanel {
     );
   }
 
-  /** Open and close again; one object's joints, or all with null. @param {string | null} object */
+  /** Open and close the joints of one object, or all with null. @param {string | null} object */
   sweep(object) {
     clearInterval(this.#timer);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) return this.#place(1, object);
@@ -71,7 +71,7 @@ export class JointPanel {
   }
 
   /**
-   * @param {number} share of the travel
+   * @param {number} share fraction of the travel
    * @param {string | null} object
    */
   #place(share, object) {
@@ -113,7 +113,7 @@ export class JointPanel {
     };
     const worst = check ? "default" : (sources.find(([, s]) => s === "inferred")?.[1] ?? sources[0]?.[1] ?? "");
     const badge = sourceChip(worst, { title: sources.map(([what, s]) => `${what} ${sourceWord(s)}`).join(", ") });
-    const alone = known?.item.joints.length === 1; // then the object's name says enough
+    const alone = known?.item.joints.length === 1; // then the object's name is enough
     const title = known ? `${joint.name}: ${motionOf(known.joint).toLowerCase()}` : joint.name;
     const name = h("span", { class: "name", title }, alone ? known.item.name : joint.name);
     return { joint, object: known?.item.name ?? "", set, check, element: h("label", {}, name, badge, input, value) };

@@ -1,4 +1,4 @@
-/** The right of the review for what a run made from the scan: its size, its colour, and whether it is to be there. */
+/** Right panel of the review page for an object made from the scan: size, colour, and a button to leave it out. */
 
 import { h, numberField } from "../dom.js";
 import { hexOf } from "../lib/colour.js";

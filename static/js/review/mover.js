@@ -1,6 +1,6 @@
 /**
- * An object being moved and sized: by numbers, by keys, by the handles in the 3D view. What is wanted is shown at once and
- * stored only when that is asked for. Says "moved" (by a number or a key), "shown" (by anything), "store" {patch}.
+ * Form to move and resize an object: by numbers, by keys, or by the handles in the 3D view. Changes are shown at once and
+ * stored on submit. Emits "moved" (after a number, a key or a reset), "shown" (after any change), "store" patch.
  */
 
 import { h, numberField } from "../dom.js";
@@ -18,7 +18,7 @@ const FIELDS = /** @type {const} */ ([
   ["up", "Up (mm)", 1e-3],
   ["turn", "Turn (°)", DEGREES],
 ]);
-/** What a key moves, in metres and radians. @type {Record<string, Partial<Shift>>} */
+/** Step of each key, in metres and radians. @type {Record<string, Partial<Shift>>} */
 const STEPS = {
   j: { right: -0.005 },
   l: { right: 0.005 },
@@ -37,7 +37,7 @@ export class Mover extends EventTarget {
   #use = h("button", { type: "submit", class: "primary" }, "Use this place and size");
   #drop = h("button", { type: "button" }, "Put it back");
   #again = h("button", { type: "button", class: "quiet" }, "Compute it again");
-  /** @type {Box | null} as it stands in the finished scene */
+  /** @type {Box | null} box in the finished scene */
   box = null;
   #object = -1;
   #shift = NOWHERE;
@@ -54,7 +54,7 @@ export class Mover extends EventTarget {
   }
 
   /**
-   * The object to move and where it stands; what was being moved stays when it is still the same.
+   * Set the object and its box; unsaved changes are kept if both are the same.
    * @param {CandidateGroup | undefined} group
    * @param {Box | null} box
    */
@@ -66,13 +66,13 @@ export class Mover extends EventTarget {
     if (!same) this.#set(NOWHERE, box?.size ?? [0, 0, 0]);
   }
 
-  /** What is wanted; null while nothing was changed. @returns {Box | null} */
+  /** Box with the unsaved changes; null if there are none. @returns {Box | null} */
   get wanted() {
     if (!this.box || !this.open) return null;
     return { pose: moved(this.box.pose, this.#shift), size: this.#size };
   }
 
-  /** Whether something waits to be stored or put back. */
+  /** Whether there are unsaved changes. */
   get open() {
     return this.#isMoved || this.#isResized;
   }
@@ -86,7 +86,7 @@ export class Mover extends EventTarget {
   }
 
   /**
-   * A key moves it; with Shift a fifth of the way.
+   * Move the object by a key's step, or a fifth of it with Shift.
    * @param {string} key
    * @param {boolean} fine
    */
@@ -100,7 +100,7 @@ export class Mover extends EventTarget {
     this.#say("moved");
   }
 
-  /** The handles in the 3D view were dragged there. @param {number[][]} pose world_from_object */
+  /** Apply a drag of the handles in the 3D view. @param {number[][]} pose world_from_object */
   dragged(pose) {
     if (this.box) this.#set(shiftBetween(this.box.pose, pose), this.#size);
   }

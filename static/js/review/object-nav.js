@@ -1,4 +1,4 @@
-/** The objects to review, with how each stands. */
+/** List of the objects to review, with the state of each. */
 
 import { h } from "../dom.js";
 import { counted } from "../lib/format.js";
@@ -66,7 +66,7 @@ function order(objects) {
 }
 
 /**
- * A press chooses it; with Ctrl it is selected beside others, with Shift all from the chosen one to it are.
+ * Choose an object on a click; Ctrl toggles its selection, Shift selects the range from the chosen object to it.
  * @param {import("./objects.js").ReviewObjects} objects
  * @param {number} object
  * @param {MouseEvent} event
@@ -80,7 +80,7 @@ function press(objects, object, { ctrlKey, metaKey, shiftKey }) {
 
 /**
  * @param {CandidateGroup} group
- * @returns {[string, string]} text and tone; nothing where it only waits to be looked at
+ * @returns {[string, string]} text and tone; empty if the object only awaits review
  */
 function standing(group) {
   if (group.accepted) return ["accepted", "good"];

@@ -1,6 +1,6 @@
 /**
- * What there is to review: the objects with their candidates, the scene, the certificate; which of them is looked at.
- * Says "change" when any of it is to be drawn anew, "choose" when another object is looked at.
+ * State of the review page: objects with their candidates, scene, certificate, and the chosen object.
+ * Emits "change" when anything must be redrawn, "choose" when another object is chosen, "hide" when hidden objects change.
  */
 
 import { getCertificate, getScene, getSystem, listCandidates } from "../api.js";
@@ -17,22 +17,22 @@ const NONE = -1;
 
 export class ReviewObjects extends EventTarget {
   project = "";
-  /** The object that is looked at, and which of its candidates. */
+  /** The chosen object, and the candidate shown. */
   object = NONE;
   candidate = "";
-  /** Of what was made from the scan, the one that is looked at instead, by its name in the scene; empty where none is. */
+  /** Name in the scene of the object made from the scan that is chosen instead; empty if none is. */
   madeName = "";
-  /** Whether those come first that something speaks against. */
+  /** Whether the riskiest objects come first. */
   byRisk = false;
-  /** What speaks against each object. @type {Map<number, import("../lib/risk.js").Risk>} */
+  /** Risk of each object. @type {Map<number, import("../lib/risk.js").Risk>} */
   risks = new Map();
-  /** Objects that take over together what is said of the chosen one. @type {Set<number>} */
+  /** Objects selected to copy the chosen one's corrections to. @type {Set<number>} */
   selected = new Set();
-  /** What is hidden in the scene, by names there. @type {Set<string>} */
+  /** Names of the objects hidden in the scene. @type {Set<string>} */
   hidden = new Set();
   /** @type {import("../api-types").SceneSummary["left_out"]} */
   leftOut = [];
-  /** Corrected, but not made by the last run. @type {import("../api-types").SceneSummary["unused"]} */
+  /** Corrected objects that the last run did not make. @type {import("../api-types").SceneSummary["unused"]} */
   unused = [];
   /** @type {CandidateGroup[]} */
   groups = [];
@@ -42,13 +42,13 @@ export class ReviewObjects extends EventTarget {
   certificate = null;
   /** @type {import("../api-types").Category[]} */
   categories = [];
-  /** Whether who looks may accept, reject and correct. */
+  /** Whether the user may accept, reject and correct. */
   judges = true;
-  /** Objects that were accepted here and are not stored yet, with the candidate. @type {Map<number, string>} */
+  /** Candidates accepted here but not stored yet, by object. @type {Map<number, string>} */
   #accepting = new Map();
   #answers = new Answers();
 
-  /** @param {number} [first] the object to look at when none is */
+  /** @param {number} [first] object to choose if none is chosen */
   async load(first = this.object) {
     try {
       const orNone = (/** @type {unknown} */ _) => null; // there is no scene or certificate before the first run
@@ -77,7 +77,7 @@ export class ReviewObjects extends EventTarget {
     }
   }
 
-  /** The objects in the order in which they are reviewed. */
+  /** Objects in review order. */
   get ordered() {
     return this.byRisk ? riskiestFirst(this.groups, this.risks) : this.groups;
   }
@@ -108,18 +108,18 @@ export class ReviewObjects extends EventTarget {
     return this.items.find(({ object }) => object === this.object);
   }
 
-  /** What a run made from the scan, but for what is left out of it. */
+  /** Objects made from the scan, except those left out. */
   get made() {
     const clicked = new Set(this.groups.map(({ object }) => object));
     return this.items.filter(({ object, override }) => (object === null || !clicked.has(object)) && !override.left_out);
   }
 
-  /** The object's number; null when there is none. */
+  /** Id of the chosen object; null if none, or one made from the scan, is chosen. */
   get number() {
     return this.madeName || this.object === NONE ? null : this.object;
   }
 
-  /** @param {string} name of what was made from the scan, in the scene */
+  /** @param {string} name in the scene of an object made from the scan */
   chooseMade(name) {
     this.madeName = name;
     this.#say("choose");
@@ -143,19 +143,19 @@ export class ReviewObjects extends EventTarget {
     this.#say("change");
   }
 
-  /** @param {number} object that is selected, or no longer */
+  /** @param {number} object */
   toggleSelected(object) {
     const without = [...this.selected].filter((one) => one !== object);
     this.select(this.selected.has(object) ? without : [...without, object]);
   }
 
-  /** @param {string[]} names of all that are hidden in the scene */
+  /** @param {string[]} names in the scene of all objects to hide */
   hideOnly(names) {
     this.hidden = new Set(names);
     this.#say("change");
   }
 
-  /** Only the chosen one is shown in the scene; all are again where that is so already. */
+  /** Show only the chosen object in the scene; if it is alone already, show all. */
   solo() {
     const others = this.items.map(({ run_name }) => run_name).filter((name) => name !== this.shownName);
     const alone = others.every((name) => this.hidden.has(name)) && !this.hidden.has(this.shownName);
@@ -164,7 +164,7 @@ export class ReviewObjects extends EventTarget {
     this.#say("change");
   }
 
-  /** What the chosen one is called in the scene; empty where none is chosen. */
+  /** Name of the chosen object in the scene; empty if none is chosen. */
   get shownName() {
     return this.madeName || this.group?.run_name || "";
   }
@@ -184,7 +184,7 @@ export class ReviewObjects extends EventTarget {
     this.#say("change");
   }
 
-  /** To the next one or the one before. @param {1 | -1} by */
+  /** Choose the next or the previous object. @param {1 | -1} by */
   step(by) {
     const all = this.ordered;
     const at = all.findIndex(({ object }) => object === this.object);
@@ -192,7 +192,7 @@ export class ReviewObjects extends EventTarget {
     if (next) this.choose(next.object);
   }
 
-  /** To the next one that nobody accepted yet; stays when all are. */
+  /** Choose the next object not accepted yet; stay if all are. */
   stepToReview() {
     const all = this.ordered;
     const at = all.findIndex(({ object }) => object === this.object);
@@ -201,7 +201,8 @@ export class ReviewObjects extends EventTarget {
   }
 
   /**
-   * Take it as accepted and go on at once: the outbox keeps what was said, and the next key is meant for what comes next.
+   * Treat an object as accepted and go on to the next at once, while the outbox stores the verdict, so that the next key press
+   * applies to the next object.
    * @param {CandidateGroup} group
    * @param {string} candidate
    * @param {Promise<unknown>} answer
@@ -216,7 +217,7 @@ export class ReviewObjects extends EventTarget {
   }
 
   /**
-   * What was said here is stored: what is said next is about that version.
+   * Record the version stored by an edit made here, on which the next edit is based.
    * @param {number} object
    * @param {number} version
    */
@@ -224,7 +225,7 @@ export class ReviewObjects extends EventTarget {
     this.groups = this.groups.map((one) => (one.object === object ? { ...one, version } : one));
   }
 
-  /** With what was said here after it was asked for. @param {CandidateGroup} group */
+  /** Group with verdicts and versions from here that are newer than the response. @param {CandidateGroup} group */
   #asSaid(group) {
     const known = this.groups.find(({ object }) => object === group.object)?.version ?? 0;
     const accepted = this.#accepting.get(group.object) ?? group.accepted;

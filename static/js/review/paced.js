@@ -1,4 +1,4 @@
-/** What comes faster than it should be sent: the latest of it, at most so often, one request after the other. */
+/** Throttle for requests: sends the latest values, merged, at most once per interval and one request at a time. */
 
 import { sayError } from "../elements/toasts.js";
 
@@ -19,7 +19,7 @@ export class Paced {
     this.#send = send;
   }
 
-  /** @param {T} wish what it says is added to what waits */
+  /** @param {T} wish values merged into the pending request */
   add(wish) {
     this.#next = Object.assign(this.#next ?? {}, wish);
     this.#timer ||= window.setTimeout(() => this.#go(), this.#ms);

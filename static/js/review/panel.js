@@ -1,4 +1,4 @@
-/** The right of the review: the chosen object, what speaks for and against it, its candidates, what may be corrected. */
+/** Right panel of the review page: the chosen object, its evidence, candidates and corrections. */
 
 import { h, icon } from "../dom.js";
 import { counted } from "../lib/format.js";
@@ -13,9 +13,9 @@ import { madePanel } from "./made-panel.js";
 /** @typedef {import("./decisions.js").Decisions} Decisions */
 /** @typedef {import("./objects.js").ReviewObjects} ReviewObjects */
 /**
- * @typedef {object} Asked what a press may ask of the page
+ * @typedef {object} Asked handlers of the page
  * @property {(candidate: Candidate) => void} show
- * @property {(() => void) | null} move null where there is no box to move
+ * @property {(() => void) | null} move null if there is no box to move
  * @property {() => void} comment
  */
 
@@ -23,7 +23,7 @@ import { madePanel } from "./made-panel.js";
  * @param {ReviewObjects} objects
  * @param {Decisions} decisions
  * @param {Asked} asked
- * @param {boolean} correcting whether what may be corrected is to be seen
+ * @param {boolean} correcting whether the corrections are unfolded
  * @returns {(Node | string)[]}
  */
 export function panel(objects, decisions, asked, correcting) {
@@ -84,7 +84,7 @@ function heading(group, decisions, judges) {
 }
 
 /**
- * Other candidates than these, and words about them.
+ * Buttons for more candidates, a mesh upload and a comment.
  * @param {CandidateGroup} group
  * @param {Decisions} decisions
  * @param {Asked} asked
@@ -94,7 +94,7 @@ function others(group, decisions, { comment }, judges) {
   const mesh = h("input", { type: "file", accept: ".glb,.obj,.ply,.stl", hidden: true, "aria-label": "Mesh file" });
   mesh.addEventListener("change", () => {
     const [file] = mesh.files ?? [];
-    mesh.value = ""; // the same file may be chosen again
+    mesh.value = ""; // allow choosing the same file again
     if (file) decisions.upload(file);
   });
   /** @type {[string, string, () => void, string][]} */

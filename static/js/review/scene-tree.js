@@ -1,4 +1,4 @@
-/** What stands in the scene beside the objects that were clicked: an eye each, and what a person left out. */
+/** Objects in the scene that nobody clicked: visibility buttons, and those left out. */
 
 import { h, icon } from "../dom.js";
 
@@ -6,7 +6,7 @@ import { h, icon } from "../dom.js";
 /** @typedef {import("./objects.js").ReviewObjects} ReviewObjects */
 
 /**
- * An eye that hides an object in the scene, and shows it again.
+ * Button that hides or shows an object in the scene.
  * @param {ReviewObjects} objects
  * @param {{ name: string, run_name: string }} item
  */
@@ -21,7 +21,7 @@ export function eye(objects, { name, run_name }) {
 }
 
 /**
- * What a run made from the scan, such as worktops, what was left out of it, and what it did not make though it was corrected.
+ * List of objects made from the scan, such as worktops, those left out, and corrected ones that the last run did not make.
  * @param {ReviewObjects} objects
  * @param {(item: { name: string, run_name: string }) => void} bringBack
  */

@@ -1,9 +1,9 @@
-/** A tape between two points that were clicked in the 3D view: how long, how far along each axis, how high above the floor. */
+/** Tape measure between two points clicked in the 3D view: length, level and upright parts, slope, heights above the floor. */
 
 /** @typedef {number[]} Point in the world: metres, z up from the floor */
 
 /**
- * With one more point; a third one begins anew.
+ * Points with one added; a third point starts a new measurement.
  * @param {Point[]} points
  * @param {Point} point
  */
@@ -11,7 +11,7 @@ export function withPoint(points, point) {
   return points.length === 2 ? [point] : [...points, point];
 }
 
-/** What it says. @param {Point[]} points */
+/** Text of the measurement. @param {Point[]} points */
 export function reading(points) {
   const [from, to] = points;
   if (!from) return "Click the first point";

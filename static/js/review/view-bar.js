@@ -1,4 +1,7 @@
-/** What the middle of the review shows, and how. Says "change" when the person wants another view or another setting of it. */
+/**
+ * Toolbar of the review's centre: view mode and settings. Emits "change" when the mode or a setting changes, "look" with a
+ * viewpoint, "measure" when measuring is toggled, and "keep-length" to store the measured length.
+ */
 
 import { h, segments, slider } from "../dom.js";
 import { ClipPanel } from "./clip-panel.js";
@@ -48,13 +51,13 @@ export class ViewBar extends EventTarget {
   #draw_as = h("select", { "aria-label": "Layers of the scene" });
   #look = h("select", { "aria-label": "Look from" });
   #measure = toggle("Measure", () => this.toggleMeasure());
-  /** What the tape says. */
+  /** Reading of the tape measure. */
   #reading = h("span", { class: "chip", role: "status", hidden: true });
   #keep = toggle("Keep as true length…", () => this.dispatchEvent(new Event("keep-length")));
   measuring = false;
   clip = new ClipPanel();
   #section = toggle("Section", () => this.clip.toggle());
-  /** What colours mean, and the box that is shown. */
+  /** Colour legend and clip box, below the toolbar. */
   below = h("div", { class: "below" }, this.clip.element);
   #parallel = toggle("Parallel", () => this.toggleParallel());
   #preview = h("span", { class: "chip warn", role: "status", hidden: true });
@@ -104,23 +107,23 @@ export class ViewBar extends EventTarget {
     this.#draw();
   }
 
-  /** Whether the middle is the 3D view. */
+  /** Whether the 3D view is shown. */
   get isSolid() {
     return this.mode !== "photo" && this.mode !== "compare";
   }
 
-  /** Whether what is shown has an inside. */
+  /** Whether the mode has an inside, so that it can be clipped. */
   get #inside() {
     return this.mode === "scene" || this.mode === "cloud";
   }
 
-  /** What a comment keeps of how it is looked at. @returns {Omit<import("../api-types").ViewerLookInput, "camera" | "hidden">} */
+  /** View settings to store with a comment. @returns {Omit<import("../api-types").ViewerLookInput, "camera" | "hidden">} */
   get kept() {
     const { mode, cloud, opacity, draw, parallel, clip } = this.wish;
     return { mode, cloud, opacity, draw: draw ?? "meshes", parallel, clip };
   }
 
-  /** As somebody looked at it. @param {import("../api-types").ViewerLookOutput} look */
+  /** Restore the view settings stored with a comment. @param {import("../api-types").ViewerLookOutput} look */
   restore({ mode, draw, cloud, opacity, parallel, clip }) {
     this.mode = mode;
     this.#draw_as.value = draw;
@@ -131,7 +134,7 @@ export class ViewBar extends EventTarget {
     this.#draw();
   }
 
-  /** What is asked of the 3D view. */
+  /** Settings to request from the 3D view. */
   get wish() {
     return {
       mode: this.mode === "photo" || this.mode === "compare" ? /** @type {const} */ ("aligned") : this.mode,
@@ -174,7 +177,7 @@ export class ViewBar extends EventTarget {
     this.#say();
   }
 
-  /** @param {string} text of the tape @param {boolean} whole whether it has both ends */
+  /** @param {string} text of the tape measure @param {boolean} whole whether both ends are set */
   read(text, whole) {
     this.#reading.textContent = text;
     this.#keep.dataset.whole = String(whole);
@@ -185,7 +188,7 @@ export class ViewBar extends EventTarget {
     this.#say();
   }
 
-  /** @param {import("../api-types").ViewerShown} shown whether something was left out, and what no run has seen yet */
+  /** @param {import("../api-types").ViewerShown} shown whether it is simplified, and previews no run has certified yet */
   told(shown) {
     const { reduced, preview, mode } = shown;
     this.clip.told(shown);
@@ -209,7 +212,7 @@ export class ViewBar extends EventTarget {
     this.#section.hidden = !this.#inside;
     this.clip.element.hidden = !this.#inside || !this.clip.on;
     const legend = mode === "scene" ? heatLegend(this.wish.draw) : null;
-    this.below.querySelector(".heat-legend")?.remove(); // the box stays where it is: somebody may be at a side of it
+    this.below.querySelector(".heat-legend")?.remove(); // keep the clip box in place: a slider may be in use
     if (legend) this.below.prepend(legend);
     this.below.hidden = this.clip.element.hidden && !legend;
     const inWorld = this.isSolid && mode !== "candidate";
