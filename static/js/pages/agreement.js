@@ -1,4 +1,4 @@
-/** How far what two people made of one recording agrees, object by object; what disagrees most comes first. */
+/** Page of the agreement between two people's annotations of one recording, object by object, the largest differences first. */
 
 import { agreementTable, getAgreement } from "../api.js";
 import { h, LiveElement } from "../dom.js";
@@ -9,7 +9,7 @@ import { counted } from "../lib/format.js";
 /** @typedef {import("../api-types").Agreed} Agreed */
 /** @typedef {import("../api-types").AgreedObject} AgreedObject */
 
-const GOOD = 0.8; // IoU below which two masks are worth a look
+const GOOD = 0.8; // IoU below which two masks are highlighted
 
 export class AgreementPage extends LiveElement {
   project = "";

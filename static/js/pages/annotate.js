@@ -1,4 +1,4 @@
-/** The main screen: click things in the frames, see their masks grow, name them. Every click is saved before it shows as saved. */
+/** Annotation page: click objects in the frames, see their masks grow, name them. A click shows as saved only once stored. */
 
 import * as api from "../api.js";
 import { actionsOf, offers, ONE_A_PRESS } from "../annotate/commands.js";
@@ -36,7 +36,7 @@ import { offerToSkip } from "../skip.js";
 export class AnnotatePage extends LiveElement {
   project = "";
   query = new URLSearchParams();
-  // What is known
+  // State
   #objects = new SceneObjects();
   #masks = new LiveMasks();
   #meanwhile = new Meanwhile();
@@ -44,9 +44,9 @@ export class AnnotatePage extends LiveElement {
   #edits = new Edits(this.#objects);
   /** @type {string[]} */
   #categories = [];
-  /** @type {string[]} whom objects may be assigned to */
+  /** @type {string[]} possible assignees */
   #names = [];
-  // What is seen
+  // Views
   #canvas = new FrameCanvas();
   #strip = new FilmStrip();
   #tools = new StageTools();
@@ -55,7 +55,7 @@ export class AnnotatePage extends LiveElement {
   #evidence = new EvidencePane();
   #mosaic = new FrameMosaic();
   #layout = new Layout();
-  // What ties them together
+  // Controllers
   #player = new Player(this.#canvas, this.#strip);
   #presses = new Presses(
     this.#objects,
@@ -122,7 +122,7 @@ export class AnnotatePage extends LiveElement {
     this.#commands.act(action);
   }
 
-  /** What the palette offers on this page besides its keys. @param {string} typed */
+  /** Commands of this page for the command palette, besides its keys. @param {string} typed */
   commands(typed) {
     const { checklist } = this.#pane;
     const listed = checklist.left.map(({ name }) => ({
@@ -196,7 +196,7 @@ export class AnnotatePage extends LiveElement {
     this.#on(list, "categorise", ({ id, category }) => this.#categorise(category, id));
     this.#on(proposals, "proposals-changed", () => (this.#picture.drawProposals(), this.#drawTip()));
     this.#on(proposals, "show-frame", (index) => this.#player.seekFrame(index));
-    this.#on(proposals, "confirming", () => this.#objects.choose(null)); // at once: undo is of them, not of the one before
+    this.#on(proposals, "confirming", () => this.#objects.choose(null)); // at once, so that undo applies to the new objects
     this.#on(proposals, "objects-made", (objects) => this.#adopt(objects));
     this.#on(comments, "comments", () => this.#picture.drawPins());
     this.#on(comments, "show-comment", (comment) => this.#showComment(comment));
@@ -206,7 +206,7 @@ export class AnnotatePage extends LiveElement {
     this.#on(this.#evidence, "open", () => this.#tools.showEvidence(this.#evidence.open));
   }
 
-  /** What the server, other people and one's own changes on their way say of the objects. */
+  /** Listen to changes of the objects: from the server, from other people, and the user's own pending edits. */
   #listenToTheOthers() {
     this.#on(this.#objects, "change", () => this.#drawObjects());
     this.#on(this.#objects, "choose", () => this.#chosen());
@@ -274,13 +274,13 @@ export class AnnotatePage extends LiveElement {
     this.#fetchMasks();
   }
 
-  /** Another list of objects to click may have been chosen. */
+  /** Reload the checklist, which may have changed. */
   async #relist() {
     const { checklist } = await api.getProject(this.project, this.signal);
     this.#pane.checklist.listed = checklist;
   }
 
-  /** The server was started again: its segmenter is to be opened anew. */
+  /** Reload and reopen the segmenter after a restart of the server. */
   #begunAnew() {
     this.#reload().catch(sayError);
     this.#tools.segmenter.open(api.openLive(this.project)).catch(sayError);
@@ -291,13 +291,13 @@ export class AnnotatePage extends LiveElement {
     if (frame) this.#masks.fetch(frame.index, this.signal);
   }
 
-  /** A frame was stopped at: its masks and its depth are worth fetching. */
+  /** Fetch masks and depth once the timeline rests on a frame. */
   #settled() {
     this.#fetchMasks();
     this.#evidence.showDepth(this.#player.depthUrl);
   }
 
-  /** @param {number} object that is seen on other frames now */
+  /** @param {number} object whose frames changed */
   #grown(object) {
     if (object === this.#objects.current) this.#evidence.cloud.refresh();
     this.#drawList();
@@ -318,7 +318,7 @@ export class AnnotatePage extends LiveElement {
   }
 
   /**
-   * An object's category, else the next one's.
+   * Set an object's category; null sets that of the next object.
    * @param {string} category
    * @param {number | null} id
    */

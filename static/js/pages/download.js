@@ -1,4 +1,4 @@
-/** The bundle: formats, certificate, versions with checksums. */
+/** Download page: formats of the bundle, certificate, versions with checksums. */
 
 import { ApiError, bundleInside, checkBundle, compareBundles, getCertificate, getSystem, listBundles } from "../api.js";
 import { h, icon, LiveElement } from "../dom.js";
@@ -62,8 +62,8 @@ export class DownloadPage extends LiveElement {
   }
 
   /**
-   * The page drawn anew but for the variants: somebody may type there. What is unfolded stays so, and who is at it by keyboard.
-   * @param {...(Node | string)} before them
+   * Redraw the page except the variants, where the user may be typing. Unfolded details and the keyboard focus are kept.
+   * @param {...(Node | string)} before content above the variants
    */
   #around(...before) {
     /** @param {string} which @returns {HTMLElement | null} */
@@ -93,7 +93,7 @@ export class DownloadPage extends LiveElement {
   }
 
   /**
-   * Which formats, and the button that fetches them.
+   * Choice of formats, and the download button.
    * @param {Bundle} bundle
    * @param {import("../api-types").BundleFormat[]} formats
    */
@@ -134,7 +134,7 @@ export class DownloadPage extends LiveElement {
     );
   }
 
-  /** The linter and the checksum, run when asked. @param {Bundle} bundle */
+  /** Button that runs the linter and checks the checksum. @param {Bundle} bundle */
   #check(bundle) {
     const said = h("div", { role: "status" });
     const ask = h("button", { type: "button" }, "Check it now");
@@ -221,7 +221,7 @@ export class DownloadPage extends LiveElement {
   }
 }
 
-/** What the page tells; no certificate before the first run is through. @param {string} project */
+/** Data of the page; there is no certificate before the first run is done. @param {string} project */
 async function everything(project) {
   const [bundles, { formats }] = await Promise.all([listBundles(project), getSystem()]);
   const newest = bundles[0];

@@ -1,4 +1,4 @@
-/** Fronts drawn to scale on the planes of the scan: what the clicks found is set right here, and what is drawn is used as it is. */
+/** Elevation page: fronts to scale on the planes of the scan. Found fronts are corrected here; drawn ones are used as is. */
 
 import * as api from "../api.js";
 import { SegmenterChip } from "../annotate/segmenter-chip.js";
@@ -119,7 +119,7 @@ export class ElevationPage extends LiveElement {
     on(this.#pane, "adopt", () => this.act("adopt-cut"));
     on(live, "live", ({ status }) => {
       this.#segmenter.show(status);
-      if (status.state === "ready") this.#reload(true).catch(sayError); // the planes may be others now
+      if (status.state === "ready") this.#reload(true).catch(sayError); // the planes may have changed
     });
     on(live, "object", ({ object }) => object.project === this.project && (this.#fronts.take(object), this.#draw()));
     on(live, "segment", ({ state }) => state === "done" && this.#reload().catch(sayError));
@@ -142,14 +142,14 @@ export class ElevationPage extends LiveElement {
 
   #loading = Promise.resolve();
 
-  /** One after the other: masks of many fronts end at once. @param {boolean} [anew] */
+  /** Reload, one at a time: masks of many fronts may finish at once. @param {boolean} [anew] reload the planes too */
   #reload(anew = false) {
     const load = () => this.#loadNow(anew);
     this.#loading = this.#loading.then(load, load);
     return this.#loading;
   }
 
-  /** @param {boolean} anew the planes too */
+  /** @param {boolean} anew reload the planes too */
   async #loadNow(anew) {
     const [objects, found, planes] = await Promise.all([
       api.listObjects(this.project),

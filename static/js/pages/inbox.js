@@ -1,4 +1,4 @@
-/** What waits for who looks: sent back, assigned by its state, objects assigned, and comments that name the person. */
+/** Inbox page of the user: projects sent back, projects assigned by state, objects assigned, and comments with mentions. */
 
 import { assignObject, getInbox, resolveComment } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
@@ -16,7 +16,7 @@ import { live } from "../live.js";
 const STATES = /** @type {const} */ (["in review", "ready", "draft", "changes requested"]);
 
 /** @type {string[]} */
-const REVIEWED = ["ready", "in review"]; // states in which objects are looked at in Review
+const REVIEWED = ["ready", "in review"]; // states in which objects open on the review page
 
 export class InboxPage extends LiveElement {
   #answers = new Answers();
@@ -116,7 +116,7 @@ function group(title, lines) {
   );
 }
 
-/** Objects by the project they are in, in their order. @param {InboxObject[]} objects */
+/** Objects grouped by project, in their order. @param {InboxObject[]} objects */
 function projectsOf(objects) {
   const projects = [...new Set(objects.map(({ project }) => project))];
   return projects.map((project) => objects.filter((one) => one.project === project));
@@ -135,7 +135,7 @@ function projectLine({ id, name, review_state, who, at, reason }) {
 }
 
 /**
- * Where a comment is seen beside what it is about.
+ * Address of the page that shows a comment in its context.
  * @param {string} project
  * @param {InboxMention["comment"]} comment
  */

@@ -1,4 +1,4 @@
-/** What the recording is, before any work starts; and where the project stands. */
+/** Overview page: facts of the recording, and the state of the project. */
 
 import { changeProject, getHistory, getProject, getSystem, readAgain } from "../api.js";
 import { detailOf, h, LiveElement, renew } from "../dom.js";
@@ -22,7 +22,7 @@ import { live } from "../live.js";
 /** @typedef {import("../api-types").Project} Project */
 
 const SEAMS = /** @type {const} */ (["segmenter", "generator", "matcher", "arm"]);
-const BESIDE = new Set(["unregistered", "colour_focal_length"]); // causes that the doctor's fit mends
+const BESIDE = new Set(["unregistered", "colour_focal_length"]); // causes that depth registration fixes
 
 export class OverviewPage extends LiveElement {
   project = "";
@@ -32,7 +32,7 @@ export class OverviewPage extends LiveElement {
   #next = h("span");
   #head = h("header", {}, this.#title, this.#assignee, this.#next);
   #importing = h("section", { class: "card stack", hidden: true });
-  #arriving = h("div", { class: "arriving" }); // keeps the room of the picture that comes
+  #arriving = h("div", { class: "arriving" }); // reserves space for the next picture
   #scan = h("div", { class: "split", hidden: true });
   #work = h("div", { class: "split", hidden: true });
   #history = h("section", { class: "stack" });
@@ -46,10 +46,10 @@ export class OverviewPage extends LiveElement {
   #opinions = new OpinionList();
   #lengths = new TrueLengthList();
   #choices = SEAMS.map((seam) => Object.assign(new BackendChoice(), { seam }));
-  /** Which method does each stage; the list of all is opened by who wants another. */
+  /** Chosen method of each stage; unfolds to the list of all. */
   #methods = h("summary", {}, "Methods");
   #shown = false;
-  #read = ""; // what was drawn of the recording: the same again would make the page jump
+  #read = ""; // key of the facts drawn; redrawing the same would make the page jump
 
   connected() {
     this.#assignee.project = this.#news.project = this.#members.project = this.#lengths.project = this.project;
@@ -99,7 +99,7 @@ export class OverviewPage extends LiveElement {
     }
   }
 
-  /** What may be done about a recording that is not here. @param {Project} project */
+  /** Prompt to upload a missing recording. @param {Project} project */
   #missing(project) {
     const made = project.counts.objects;
     return h(
@@ -160,13 +160,13 @@ export class OverviewPage extends LiveElement {
     }
   }
 
-  /** Show the frame of a sample that was rendered last, once it is loaded. @param {string} address */
+  /** Show the last rendered frame of a sample, once it is loaded. @param {string} address */
   async #drawArriving(address) {
     const picture = h("img", { src: address, alt: "The frame that was rendered last" });
     try {
       await picture.decode();
     } catch {
-      return; // it was read meanwhile: its frames are there instead
+      return; // gone: the sample has been read, and its frames are shown instead
     }
     this.#arriving.replaceChildren(picture);
   }
@@ -218,7 +218,7 @@ export class OverviewPage extends LiveElement {
   }
 
   /**
-   * Depth that does not lie on its colour is moved there only if a person says so; and back.
+   * Button to register misaligned depth to the colour images, or to undo that; never done without the user's consent.
    * @param {Project} project
    * @param {NonNullable<Project["capture"]>} capture
    */

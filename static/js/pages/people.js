@@ -1,4 +1,4 @@
-/** Who may sign in, and where jobs run: an admin adds, changes and removes accounts; everybody changes their own password. */
+/** People page: accounts, which an admin adds, changes and removes; the user's own password; and the seats that run jobs. */
 
 import { addAccount, changeAccount, changePassword, getSystem, listAccounts, removeAccount } from "../api.js";
 import { h, icon, LiveElement } from "../dom.js";
@@ -57,7 +57,7 @@ export class PeoplePage extends LiveElement {
     if (role === "admin") this.#load(account);
   }
 
-  /** @param {boolean} account whether who looks has an account */
+  /** @param {boolean} account whether the user has an account */
   async #load(account) {
     try {
       await this.#answers.take(listAccounts(), (accounts) =>

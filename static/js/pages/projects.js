@@ -1,4 +1,4 @@
-/** All projects; import by upload, drop or path; the sample kitchen. */
+/** Projects page: list of all projects; import by upload, drop or path; the sample kitchen. */
 
 import {
   cancelUpload,
@@ -29,12 +29,12 @@ import { go } from "../router.js";
 
 /** @typedef {import("../api-types").ProjectSummary} Project */
 
-/** @type {Record<string, (a: Project, b: Project) => number>} beside last changed first, as they come */
+/** @type {Record<string, (a: Project, b: Project) => number>} besides the server's order, last changed first */
 const ORDERS = {
   name: (a, b) => a.name.localeCompare(b.name),
   size: (a, b) => b.size_bytes - a.size_bytes,
 };
-const MANY = 4; // projects, from which they are searched through
+const MANY = 4; // projects from which the search is shown
 
 export class ProjectsPage extends LiveElement {
   #answers = new Answers();
@@ -120,7 +120,7 @@ export class ProjectsPage extends LiveElement {
     this.#showStopped();
   }
 
-  /** What new projects may take over. @param {import("../api-types").Template[]} templates */
+  /** Fill the menu of templates for new projects. @param {import("../api-types").Template[]} templates */
   #offer(templates) {
     this.#templates.hidden = !templates.length;
     this.#template.replaceChildren(
@@ -129,7 +129,7 @@ export class ProjectsPage extends LiveElement {
     );
   }
 
-  /** A new project, with the objects of the template that is chosen. @param {{ id: string }} project */
+  /** Open a new project, after giving it the chosen template's checklist. @param {{ id: string }} project */
   async #made({ id }) {
     const taken = this.#template.value ? setChecklist(id, Number(this.#template.value)) : null;
     const refused = await taken?.then(
@@ -160,7 +160,7 @@ export class ProjectsPage extends LiveElement {
     }
   }
 
-  /** @param {Project[]} projects last touched first */
+  /** @param {Project[]} projects last changed first */
   #show(projects) {
     this.#projects = projects;
     const place = this.#place.value;
@@ -248,7 +248,7 @@ export class ProjectsPage extends LiveElement {
     this.#showStopped();
   }
 
-  /** Uploads that stopped: choosing the same file goes on with it. */
+  /** Show interrupted uploads; choosing the same file resumes one. */
   async #showStopped() {
     try {
       const uploads = await listUploads();

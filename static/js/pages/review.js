@@ -1,4 +1,4 @@
-/** Candidates beside their evidence, the mesh over photos and scan, the finished scene with its joints. The verdict is a person's. */
+/** Review page: candidates with their evidence, the mesh over photos and scan, the scene with its joints, and verdicts. */
 
 import { detailOf, h, LiveElement, renew } from "../dom.js";
 import { CommentList } from "../elements/comment-list.js";
@@ -112,7 +112,7 @@ export class ReviewPage extends LiveElement {
     renew(this.#nav, ...objectNav(this.#objects, bringBack, copy));
   }
 
-  /** Only when something in it changed: a number may be half typed. */
+  /** Redraw the panel only if its data changed, as the user may be typing a number. */
   #drawPanel() {
     const { group, item, certificate, candidate } = this.#objects;
     const movable = this.#centre.mover.box !== null;
@@ -140,13 +140,13 @@ export class ReviewPage extends LiveElement {
   #stored({ object, job }) {
     if (job) this.#hear(job);
     if (object === this.#objects.object) this.#centre.mover.drop();
-    this.#centre.show(); // what geometry can show of it, before any run
+    this.#centre.show(); // shows the geometric part of a correction before any run
   }
 
   /** @param {Partial<CommentIn>} pin */
   async #comment(pin = {}) {
     const { number, group } = this.#objects;
-    const view = pin.frame === undefined ? await this.#centre.kept().catch(() => null) : null; // a view that is down is not kept
+    const view = pin.frame === undefined ? await this.#centre.kept().catch(() => null) : null; // none if the viewer is down
     this.#comments.ask({ ...pin, object: number, view }, group?.name ?? "the project");
   }
 

@@ -1,4 +1,4 @@
-/** Run the pipeline: progress of each stage, cancel, the log of a failed one, then the result's table and certificate. */
+/** Run page: start the pipeline, progress of each stage, cancel, log of a failed one, then the results and the certificate. */
 
 import { getCertificate, getProject, getScene, listJobs, startRun } from "../api.js";
 import { detailOf, h, LiveElement } from "../dom.js";
@@ -12,7 +12,7 @@ import { live } from "../live.js";
 /** @typedef {import("../api-types").Job} Job */
 
 const SOON_MS = 500;
-/** What a run has to do. */
+/** Text about a run's work, by the state of the result. */
 const WORK = {
   none: "Everything is computed.",
   current: "The result is up to date: running again does no work.",
@@ -66,7 +66,7 @@ export class RunPage extends LiveElement {
     }
   }
 
-  /** Masks came to an end: what they contradict may be another in a moment, once others came too. @param {{ state: string }} told */
+  /** Check for contradictions after masks end, debounced, as others may follow soon. @param {{ state: string }} told */
   #found({ state }) {
     if (state !== "done" && state !== "failed") return;
     clearTimeout(this.#soon);

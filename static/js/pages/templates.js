@@ -1,4 +1,4 @@
-/** Templates: lists of names and categories that projects take over as the objects to click. */
+/** Templates page: lists of names and categories that projects use as checklists of objects to click. */
 
 import { addTemplate, changeTemplate, listTemplates, removeTemplate } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
@@ -99,11 +99,11 @@ export class TemplatesPage extends LiveElement {
 }
 
 /**
- * @param {string} whose for who does not see where it stands
+ * @param {string} whose suffix of the accessible labels
  * @param {TemplateIn} template
  * @param {string} button
  * @param {(wanted: TemplateIn) => void} send
- * @param {...HTMLElement} more buttons
+ * @param {...HTMLElement} more further buttons
  */
 function form(whose, { name, objects }, button, send, ...more) {
   const called = h("input", {

@@ -1,4 +1,4 @@
-/** Addresses that are told of runs and review states: a person's own, an admin's all; with what they answered. */
+/** Webhooks page: addresses notified of runs and review states, with their responses; admins see all, others their own. */
 
 import {
   addWebhook,
@@ -17,7 +17,7 @@ import { ago, counted } from "../lib/format.js";
 /** @typedef {import("../api-types").Webhook} Webhook */
 /** @typedef {import("../api-types").Delivery} Delivery */
 
-const LOOK_MS = 2000; // what is posted tells no tab
+const LOOK_MS = 2000; // polling: no event is sent for a delivery
 
 export class WebhooksPage extends LiveElement {
   #answers = new Answers();
@@ -28,7 +28,7 @@ export class WebhooksPage extends LiveElement {
   #secret = h("section", { class: "card stack", hidden: true, "aria-label": "The secret" });
   #deliveries = h("section", { class: "card stack", hidden: true, "aria-label": "Answers" });
   #add = h("section", { class: "card stack" });
-  /** @type {Webhook | null} whose answers are shown */
+  /** @type {Webhook | null} webhook whose responses are shown */
   #shown = null;
 
   connected() {
@@ -208,7 +208,7 @@ function action(text, label, at, act) {
 }
 
 /**
- * When it is tried again.
+ * Text for the time of the next attempt.
  * @param {number | null} due
  * @param {number} attempts
  */
