@@ -1,9 +1,9 @@
-/** What can be done in the elevation by a key or from the palette, by the names of the keymap. */
+/** Actions of the elevation page for keys and the command palette, by their names in the keymap. */
 
 import * as rows from "../lib/front-rows.js";
 import { drawnOf } from "./fronts.js";
 
-/** What a key held down must not do again and again. */
+/** Actions that do not repeat while a key is held down. */
 export const ONE_A_PRESS = ["copy-handle", "front-here", "seam", "level-seam", "merge", "is-seam", "no-seam"];
 
 /**

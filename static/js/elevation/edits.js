@@ -1,4 +1,4 @@
-/** What is done to the fronts of the plane that is looked at: drawn, moved, cut, repeated, named; each call is one gesture. */
+/** Edits of the fronts on the open plane: draw, move, split, repeat, name and more. Each call is one undo step. */
 
 import { say } from "../elements/toasts.js";
 import * as plane from "../lib/elevation.js";
@@ -12,7 +12,7 @@ import { drawnOf } from "./fronts.js";
 /** @typedef {import("../lib/elevation.js").Side} Side */
 /** @typedef {import("../lib/front-rows.js").Way} Way */
 
-const NEW_M = { width: 0.6, height: 0.72 }; // of a front that is added by keyboard
+const NEW_M = { width: 0.6, height: 0.72 }; // of a front added by keyboard
 const STEP_M = { usual: 0.01, fine: 0.001 };
 
 export class FrontEdits {
@@ -59,7 +59,7 @@ export class FrontEdits {
     this.#fronts.do({ change: [{ front, wanted: { front: { ...drawnOf(front), corners_m, handle } } }] });
   }
 
-  /** All chosen fronts, as one gesture. @param {(front: Front) => import("../elevation/fronts.js").Wanted | false} want */
+  /** Change chosen fronts as one gesture. @param {(front: Front) => import("../elevation/fronts.js").Wanted | false} want */
   change(want) {
     const change = this.#fronts.chosen.flatMap((front) => {
       const wanted = want(front);
@@ -68,7 +68,7 @@ export class FrontEdits {
     if (change.length) this.#fronts.do({ change });
   }
 
-  /** Its left or upper edge stays. @param {"width" | "height"} side @param {number} metres */
+  /** Resize the leading front; its left or top edge stays in place. @param {"width" | "height"} side @param {number} metres */
   resize(side, metres) {
     const front = this.#view.leading();
     if (!front || !(metres >= plane.SMALLEST_M)) return;
@@ -91,7 +91,7 @@ export class FrontEdits {
     return this.#part(front, way, parts);
   }
 
-  /** By sizes that were typed. @param {Way} way @param {string} text */
+  /** Divide the leading front by typed sizes. @param {Way} way @param {string} text */
   divide(way, text) {
     const front = this.#view.leading();
     const parts = front && rows.divided(front.rect, way, text);
@@ -99,13 +99,18 @@ export class FrontEdits {
     else say(`“${text}” does not fit: type 3 for equal parts, or sizes in mm as 600 450 600; / 3 leaves 3 mm between.`);
   }
 
-  /** The first part keeps its name; the last one is chosen. @param {Front} front @param {Way} way @param {Rect[]} parts */
+  /**
+   * Replace a front by its parts: the first keeps the name, the last is chosen.
+   * @param {Front} front
+   * @param {Way} way
+   * @param {Rect[]} parts
+   */
   #part(front, way, parts) {
     const elevation = this.#view.elevation;
     const kept = this.#fronts.get(front.key);
     if (!elevation || !kept) return;
     /** @type {"none" | null} */
-    const handle = kept.handle === "none" ? "none" : null; // where it was is the middle of none of the parts
+    const handle = kept.handle === "none" ? "none" : null; // its position does not fit any of the parts
     const [first, ...others] = parts.map((rect) => ({
       category: way === "level" ? plane.likelyCategory(rect, elevation.top_m) : front.category,
       corners: plane.cornersOf(elevation, rect),
@@ -120,7 +125,7 @@ export class FrontEdits {
     this.pick(made.at(-1)?.key ?? null, null, false);
   }
 
-  /** As large as the chosen one, moved onto the lines that are near. @param {Way} way */
+  /** Add a front beside the leading one, of the same size and snapped to nearby lines. @param {Way} way */
   repeat(way) {
     const elevation = this.#view.elevation;
     const front = this.#view.leading();
@@ -132,10 +137,10 @@ export class FrontEdits {
     return this.pick(made?.key ?? null, null, false);
   }
 
-  /** Several are numbered, from left to right and from the top down. @param {string} name */
+  /** Rename the chosen fronts; several are numbered from left to right and top to bottom. @param {string} name */
   async name(name) {
     const chosen = new Set(this.#fronts.chosen.map(({ key }) => key));
-    await outbox.settled; // until then nobody knows what new ones are called
+    await outbox.settled; // new fronts get their names from the server
     const mine = rows.inOrder(this.#view.here.filter(({ key }) => chosen.has(key)));
     const taken = this.#fronts.all.filter(({ key }) => !chosen.has(key)).map((front) => front.name);
     const change = rows.renamed(mine, name, taken).flatMap(({ key, name }) => {
@@ -178,7 +183,7 @@ export class FrontEdits {
     });
   }
 
-  /** Handle and hinge of the front chosen last, on the other chosen ones, as one gesture. */
+  /** Copy handle and hinge of the front chosen last to the other chosen ones, as one gesture. */
   copyToOthers() {
     const from = this.#view.leading();
     const elevation = this.#view.elevation;
@@ -193,7 +198,10 @@ export class FrontEdits {
     });
   }
 
-  /** The side nearest to a position, none where it is that already. @param {{ x: number, y: number }} at */
+  /**
+   * Set the hinge to the side nearest to a position; if it is there already, clear it.
+   * @param {{ x: number, y: number }} at
+   */
   setHinge(at) {
     const front = this.#view.at(at);
     const kept = front && this.#fronts.get(front.key);
@@ -267,7 +275,7 @@ export class FrontEdits {
     if (next) this.pick(next.key, this.#canvas.edge, false);
   }
 
-  /** Where a key is meant: at the pointer, else in the middle of the chosen front. */
+  /** Position a key applies to: the pointer, else the middle of the leading front. */
   #aim() {
     const front = this.#view.leading();
     return this.#canvas.pointer ?? (front ? plane.middleOf(front.rect) : undefined);

@@ -1,6 +1,6 @@
 /**
- * The chosen front in numbers and words, and the fronts of the plane. Says "choose" key, "size" {side, metres}, "category",
- * "name", "hinge", "handle" with what is wanted, "divide" {way, text}, "next", "copy" and "adopt".
+ * Pane with the properties of the leading front and the list of fronts on the plane. Emits "choose" key, "size" {side, metres},
+ * "category", "name", "hinge" and "handle" with the new value, "divide" {way, text}, "next", "copy" and "adopt".
  */
 
 import { h, renew } from "../dom.js";
@@ -12,9 +12,12 @@ import { inOrder } from "../lib/front-rows.js";
 /** @typedef {import("../api-types").Category} Category */
 /** @typedef {import("../elevation/fronts.js").Front} Front */
 /** @typedef {Front & { rect: import("../lib/elevation.js").Rect }} Placed */
-/** @typedef {{ leading: Placed | null, chosen: Set<string>, cut: number, paint: (front: Front) => string }} How `cut`: panels without a front */
+/**
+ * `cut` is the number of panels without a front.
+ * @typedef {{ leading: Placed | null, chosen: Set<string>, cut: number, paint: (front: Front) => string }} How
+ */
 
-/** Those that a digit chooses. */
+/** Categories chosen by digit keys. */
 const QUICK = ["cabinet", "drawer", "wall_cabinet", "double-door cabinet", "dishwasher", "oven", "refrigerator"];
 
 export class FrontPane extends EventTarget {
@@ -26,7 +29,7 @@ export class FrontPane extends EventTarget {
   #down = h("input", { type: "text", inputMode: "numeric", placeholder: "3, or 140 280 280" });
   #category = h("select");
   #side = h("span", { class: "muted" }, "Hinge");
-  /** Kinds that slide along their front: their side is where to. @type {Set<string>} */
+  /** Categories that slide along their front; the hinge side is then the side they slide to. @type {Set<string>} */
   #sideways = new Set();
   #hinge = h("select", {}, ...options({ "": "inferred", left: "left", right: "right", top: "top", bottom: "bottom" }));
   #handle = h("select", {}, ...options({ "": "detected", none: "none", drawn: "drawn" }));
@@ -67,7 +70,11 @@ export class FrontPane extends EventTarget {
     );
   }
 
-  /** Enter takes what was typed, Ctrl+Enter goes on to the next front, Escape leaves what was there. @param {HTMLInputElement} input @param {() => void} take */
+  /**
+   * Wire a text field: Enter accepts, Ctrl+Enter accepts and goes to the next front, Escape reverts.
+   * @param {HTMLInputElement} input
+   * @param {() => void} take
+   */
   #field(input, take) {
     input.addEventListener("change", take);
     input.addEventListener("keydown", ({ key, ctrlKey, metaKey }) => {
@@ -100,7 +107,7 @@ export class FrontPane extends EventTarget {
     );
   }
 
-  /** Whether that kind slides along its front. @param {string} category */
+  /** Whether a category slides along its front. @param {string} category */
   slides(category) {
     return this.#sideways.has(category);
   }
@@ -111,7 +118,7 @@ export class FrontPane extends EventTarget {
     if (name && this.#shown) this.#say("category", name);
   }
 
-  /** Let it be typed. @param {"name" | "width" | "height" | "across" | "down"} what */
+  /** Focus a field for typing. @param {"name" | "width" | "height" | "across" | "down"} what */
   type(what) {
     if (!this.#fields.disabled)
       this.#type(

@@ -1,4 +1,4 @@
-/** What a click on the plane does instead of choosing: seams, handles and hinges, one of them at a time or none. */
+/** Tools for a click on the plane, instead of choosing a front: seam, handle or hinge; at most one is active. */
 
 import { h, segments } from "../dom.js";
 
@@ -37,7 +37,7 @@ export class FrontTools {
     this.#canvas = canvas;
   }
 
-  /** Chosen again, it is put down. @param {Tool} tool */
+  /** Activate a tool, or deactivate it if it is active. @param {Tool} tool */
   use(tool) {
     this.chosen = this.chosen === tool ? null : tool;
     this.#canvas.tooled = this.chosen !== null;

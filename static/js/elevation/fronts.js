@@ -1,6 +1,6 @@
 /**
- * The fronts of a project as the elevation page knows them, and what a person does to them. What is done shows at once, is kept
- * by the outbox until it is stored, and is taken back gesture by gesture. Says "change", "choose", "saved" {text, tone}.
+ * Fronts of a project and their edits on the elevation page. Edits show at once, stay in the outbox until stored, and are
+ * undone one gesture at a time. Emits "change", "choose", "refused", "saved" {text, tone}.
  */
 
 import * as changes from "../changes.js";
@@ -15,7 +15,8 @@ import { saving } from "../saving.js";
 /** @typedef {{ name?: string, category?: string, front?: Drawn }} Wanted */
 /** @typedef {{ category: string, corners: number[][], handle?: "none" | null, hinge?: Drawn["hinge"] }} Making */
 /**
- * `seen` is the handle that was found, `edges` how sure its edges are (left, right, top, bottom); `key` never changes; `id` is null until the object is stored; `pending` changes are on their way.
+ * `seen` is the detected handle, `edges` the confidence of the edges (left, right, top, bottom); `key` never changes; `id` is
+ * null until the object is stored; `pending` counts changes not stored yet.
  * @typedef {{
  *   key: string, id: number | null, name: string, category: string, colour: number, version: number, corners: number[][],
  *   handle: Drawn["handle"], seen: FoundFront["handle"], hinge: Drawn["hinge"], drawn: boolean, pending: number,
@@ -27,14 +28,14 @@ export class Fronts extends EventTarget {
   project = "";
   /** @type {Map<string, Front>} */
   #all = new Map();
-  /** @type {string[]} the chosen ones, the last one leads */
+  /** @type {string[]} keys of the chosen fronts; the last one leads */
   #chosen = [];
-  /** @type {string[][]} gestures to take back: the fronts each changed, in order */
+  /** @type {string[][]} gestures to undo: keys of the fronts each changed, in order */
   #done = [];
   /** @type {string[][]} */
   #undone = [];
   #made = 0;
-  /** Deleted here: what is said of them on the way says less. @type {Set<number>} */
+  /** Ids of objects deleted here; messages about them still in transit are outdated. @type {Set<number>} */
   #gone = new Set();
 
   get all() {
@@ -55,7 +56,7 @@ export class Fronts extends EventTarget {
   }
 
   /**
-   * What is stored, and where fronts were found that nobody drew.
+   * Load the stored objects, and the detected fronts of those nobody drew.
    * @param {SceneObject[]} objects
    * @param {FoundFront[]} found
    */
@@ -63,20 +64,20 @@ export class Fronts extends EventTarget {
     const known = new Map(found.map((one) => [one.object, one]));
     for (const object of objects) this.take(object, known.get(object.id));
     const there = new Set(objects.map(({ id }) => id));
-    const newest = Math.max(0, ...there); // what was made since they were asked for is not among them
+    const newest = Math.max(0, ...there); // objects created after the request are not among them
     for (const { id, key } of this.all) if (id !== null && id <= newest && !there.has(id)) this.#all.delete(key);
     this.#say("change");
   }
 
   /**
-   * An object as it is stored now; while changes of it are on their way, those are newer.
+   * Update a front from the stored object; ignored while the front has pending or newer changes.
    * @param {SceneObject} object
    * @param {FoundFront} [found]
    */
   take(object, found) {
     const known = this.all.find(({ id }) => id === object.id);
     if (known && (known.pending > 0 || known.version > object.version)) return;
-    if (!known && (this.#gone.has(object.id) || this.all.some(({ id }) => id === null))) return; // it may be one of those
+    if (!known && (this.#gone.has(object.id) || this.all.some(({ id }) => id === null))) return; // it may be one of the fronts being stored
     const corners =
       object.front?.corners_m ?? found?.corners_m ?? (object.front === null && !known?.drawn ? known?.corners : null);
     if (object.deleted || !corners) {
@@ -101,7 +102,7 @@ export class Fronts extends EventTarget {
     });
   }
 
-  /** @param {string | null} key @param {boolean} [also] beside those chosen */
+  /** @param {string | null} key @param {boolean} [also] toggle it in the selection instead of replacing that */
   choose(key, also = false) {
     if (key === null) this.#chosen = [];
     else if (!also) this.#chosen = [key];
@@ -116,9 +117,9 @@ export class Fronts extends EventTarget {
   }
 
   /**
-   * New fronts, changed ones and ones that go, as one gesture; one that changes nothing is none: there is nothing to take back.
+   * Create, change and remove fronts as one gesture; a gesture without effect is not recorded for undo.
    * @param {{ make?: Making[], change?: { front: Front, wanted: Wanted }[], remove?: Front[] }} gesture
-   * @returns {Front[]} the new ones
+   * @returns {Front[]} the new fronts
    */
   do({ make = [], change = [], remove = [] }) {
     const changed = change.filter(({ front, wanted }) => isNews(front, wanted));
@@ -149,7 +150,7 @@ export class Fronts extends EventTarget {
     }
   }
 
-  /** Numbers of fronts, also of those that are gone. @type {Map<string, number>} */
+  /** Object ids by front key, including deleted fronts. @type {Map<string, number>} */
   #ids = new Map();
 
   /** @param {"undo" | "redo"} which @param {number | null} object */
@@ -166,11 +167,11 @@ export class Fronts extends EventTarget {
       this.#say("change");
       say(`${which === "undo" ? "Undone" : "Redone"}: ${text}`);
     } catch {
-      // said where it was refused
+      // the error has been shown by `saving`
     }
   }
 
-  /** @param {Front} front @param {string} key it had before it went */
+  /** @param {Front} front @param {string} key its key before deletion */
   #rename(front, key) {
     this.#all.delete(front.key);
     this.#all.set(key, { ...front, key });
@@ -203,7 +204,7 @@ export class Fronts extends EventTarget {
     return front;
   }
 
-  /** What an object is called in an address while it is not stored. @type {Map<string, string>} */
+  /** References used in addresses for objects not stored yet, by front key. @type {Map<string, string>} */
   #refs = new Map();
 
   /** @param {Front} front @param {Wanted} wanted */
@@ -245,7 +246,7 @@ export class Fronts extends EventTarget {
         this.#ids.set(front.key, object.id);
         front.pending -= 1;
         front.id = object.id;
-        front.version = object.version; // those on their way are counted from here
+        front.version = object.version; // pending changes are numbered from this version
         if (front.pending === 0) Object.assign(front, { name: object.name, colour: object.colour });
         this.#say("change");
       },
@@ -275,13 +276,13 @@ export class Fronts extends EventTarget {
   }
 }
 
-/** Whether anything of it is not so already. @param {Front} front @param {Wanted} wanted */
+/** Whether the wanted values differ from the front. @param {Front} front @param {Wanted} wanted */
 function isNews(front, { name = front.name, category = front.category, front: drawn }) {
   const redrawn = drawn !== undefined && !(front.drawn && sameFront(drawn, drawnOf(front)));
   return redrawn || name !== front.name || category !== front.category;
 }
 
-/** @param {Front} front @returns {Drawn} as prompts.json holds it */
+/** @param {Front} front @returns {Drawn} in the format of prompts.json */
 export function drawnOf({ corners, handle, hinge }) {
   return { corners_m: corners, handle, hinge };
 }

@@ -1,4 +1,4 @@
-/** The planes of the scan, as small pictures to choose from. Says "choose" id. */
+/** Thumbnails of the scan's planes. Emits "choose" id. */
 
 import { h } from "../dom.js";
 import { rectOf, sizeOf } from "../lib/elevation.js";
@@ -23,7 +23,7 @@ export class PlaneList extends EventTarget {
       button.setAttribute("aria-pressed", String(Number(button.dataset.plane) === id));
   }
 
-  /** How many fronts are on each. @param {number[][][]} fronts corners */
+  /** Show the number of fronts on each plane. @param {number[][][]} fronts corners */
   count(fronts) {
     for (const item of this.items) {
       const count = fronts.filter((corners) => rectOf(item, corners)).length;

@@ -1,4 +1,4 @@
-/** The plane that is looked at: the fronts on it, what was cut there and no front is on, and the lines edges snap to. */
+/** Open plane: the fronts on it, cut panels without a front, and the lines that edges snap to. */
 
 import * as plane from "../lib/elevation.js";
 
@@ -26,7 +26,7 @@ export class PlaneView {
     this.#lines = { upright: plane.decoded(elevation.upright), level: plane.decoded(elevation.level) };
   }
 
-  /** The fronts on the plane that is looked at. @returns {Placed[]} */
+  /** Fronts on the open plane. @returns {Placed[]} */
   get here() {
     const elevation = this.elevation;
     if (!elevation) return [];
@@ -36,7 +36,7 @@ export class PlaneView {
     });
   }
 
-  /** Panels that were cut and no front is on. @param {Placed[]} here @returns {Rect[]} */
+  /** Cut panels without a front. @param {Placed[]} here @returns {Rect[]} */
   cut(here) {
     const { cells = [], cell_m = 1 } = this.elevation ?? {};
     const rects = cells.map(([left = 0, top = 0, right = 0, bottom = 0]) => ({
@@ -53,7 +53,7 @@ export class PlaneView {
     return here.find(({ key }) => key === this.#fronts.leading?.key) ?? null;
   }
 
-  /** How clearly lines along one side's direction show beside a front. @param {Side} side @param {Rect} rect */
+  /** Strength of the lines parallel to a side, over the extent of a front. @param {Side} side @param {Rect} rect */
   profile(side, rect) {
     const upright = side === "left" || side === "right";
     const [from, to] = upright ? [rect.top, rect.bottom] : [rect.left, rect.right];
@@ -65,7 +65,7 @@ export class PlaneView {
    * @param {Side} side
    * @param {number} at
    * @param {Rect} rect
-   * @param {string | null} key of the front, whose own edges count for nothing
+   * @param {string | null} key of the front, whose own edges are ignored
    * @param {number} reach
    */
   snap(side, at, rect, key, reach) {
@@ -77,7 +77,7 @@ export class PlaneView {
     return plane.snapped(at, reach, edges, this.profile(side, rect));
   }
 
-  /** The chosen front if it is there, else the one that is. @param {{ x: number, y: number } | undefined} at @returns {Placed | null} */
+  /** Front at a position, the leading one first. @param {{ x: number, y: number } | undefined} at @returns {Placed | null} */
   at(at) {
     if (!at) return null;
     const there = this.here.filter(({ rect }) => plane.holds(rect, at));

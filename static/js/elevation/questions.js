@@ -1,6 +1,6 @@
 /**
- * Edges of found fronts that hardly show: each is asked about, and a key answers. A front whose questions are all answered is
- * drawn by that; before, nothing of it is stored.
+ * Questions about uncertain edges of detected fronts. Nothing is stored until all questions of a front are answered; the front
+ * is then drawn.
  */
 
 import { middleOf, nextLine, overlap, withEdge } from "../lib/elevation.js";
@@ -12,16 +12,16 @@ import { middleOf, nextLine, overlap, withEdge } from "../lib/elevation.js";
 /** @typedef {Front & { rect: Rect }} Placed */
 /** @typedef {{ key: string, side: Side, sure: number }} Question */
 
-const UNSURE = 0.3; // as the run asks: Params.unsure_edge of r2c2r_core/segment/contradictions.py
-const NEAR_M = 0.03; // of a neighbour's edge that is the same seam
+const UNSURE = 0.3; // same as Params.unsure_edge of r2c2r_core/segment/contradictions.py
+const NEAR_M = 0.03; // distance of a neighbour's edge at the same seam
 /** @type {Side[]} in the order of FoundFront.edges */
 const SIDES = ["left", "right", "top", "bottom"];
 
 export class Questions {
-  /** @type {Map<string, Map<Side, boolean>>} whether there is a seam, by front */
+  /** @type {Map<string, Map<Side, boolean>>} whether there is a seam, by front and side */
   #answers = new Map();
 
-  /** Those still to be answered. @param {Placed[]} here @returns {Question[]} */
+  /** Open questions. @param {Placed[]} here @returns {Question[]} */
   open(here) {
     return here.flatMap((front) => this.about(front));
   }
@@ -37,7 +37,7 @@ export class Questions {
   }
 
   /**
-   * Note an answer; all of the front's answers once none is missing.
+   * Record an answer; returns all answers of the front once none is missing, else null.
    * @param {Front} front
    * @param {Side} side
    * @param {boolean} isSeam
@@ -47,18 +47,18 @@ export class Questions {
     const answers = this.#answers.get(front.key) ?? new Map();
     this.#answers.set(front.key, answers.set(side, isSeam));
     if (this.about(front).length) return null;
-    this.#answers.delete(front.key); // undone, it is asked about again
+    this.#answers.delete(front.key); // asked again after an undo
     return answers;
   }
 }
 
 /**
- * The front without a seam at one of its edges: it goes on to the far edge of the front beyond, else to the next clear line; null
- * where there is neither.
+ * Front extended across an edge without a seam: to the far edge of the next front, else to the next clear line; null if there
+ * is neither.
  * @param {Rect} rect
  * @param {Side} side
  * @param {Rect[]} others
- * @param {Profile | null} profile of lines of that direction beside it
+ * @param {Profile | null} profile of the lines parallel to that side
  * @returns {Rect | null}
  */
 export function without(rect, side, others, profile) {
@@ -69,13 +69,13 @@ export function without(rect, side, others, profile) {
   return at === null ? null : withEdge(rect, side, at);
 }
 
-/** Whether another front stands level with one, or in its column. @param {Rect} rect @param {Rect} other @param {Side} side */
+/** Whether another front is in the same row or column. @param {Rect} rect @param {Rect} other @param {Side} side */
 function beside(rect, other, side) {
   const { x, y } = middleOf(other);
   return side === "left" || side === "right" ? y > rect.top && y < rect.bottom : x > rect.left && x < rect.right;
 }
 
-/** The fronts that lie in a rectangle. @template {{ rect: Rect }} T @param {T[]} fronts @param {Rect} rect @returns {T[]} */
+/** Fronts that lie in a rectangle. @template {{ rect: Rect }} T @param {T[]} fronts @param {Rect} rect @returns {T[]} */
 export function swallowed(fronts, rect) {
   return fronts.filter((front) => {
     const { x, y } = middleOf(front.rect);

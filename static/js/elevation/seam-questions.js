@@ -1,4 +1,4 @@
-/** Whether there is a seam at an edge that hardly shows: asked of a person one after the other, and what the answer changes. */
+/** Questions to the user, one at a time, whether an uncertain edge is a seam; the answers change the front. */
 
 import { say } from "../elements/toasts.js";
 import { counted } from "../lib/format.js";
@@ -14,7 +14,7 @@ import { Questions, swallowed, without } from "./questions.js";
 
 export class SeamQuestions {
   #questions = new Questions();
-  /** The one that Y and X answer. @type {Question | null} */
+  /** Current question, answered by Y or X. @type {Question | null} */
   #asked = null;
   #view;
   #fronts;
@@ -52,7 +52,7 @@ export class SeamQuestions {
     return `${counted(open.length, "edge")} hardly ${open.length > 1 ? "show" : "shows"}: Q asks whether there is a seam`;
   }
 
-  /** The next edge to be asked about. */
+  /** Ask about the next edge. */
   ask() {
     const open = this.#questions.open(rows.inOrder(this.#view.here));
     const at = open.findIndex(({ key, side }) => key === this.#asked?.key && side === this.#asked.side);
@@ -62,7 +62,7 @@ export class SeamQuestions {
     return this.#edits.pick(next.key, next.side, false);
   }
 
-  /** @param {boolean} isSeam whether there is one at the edge asked about */
+  /** @param {boolean} isSeam whether there is a seam at the edge */
   answer(isSeam) {
     const front = this.#view.here.find(({ key }) => key === this.#asked?.key);
     const kept = front && this.#fronts.get(front.key);
@@ -74,7 +74,7 @@ export class SeamQuestions {
     return this.#redraw();
   }
 
-  /** The front as it was answered, drawn from now on. @param {Placed} front @param {Front} kept @param {Map<Side, boolean>} answers */
+  /** Draw a front by its answers. @param {Placed} front @param {Front} kept @param {Map<Side, boolean>} answers */
   #settle(front, kept, answers) {
     const elevation = this.#view.elevation;
     if (!elevation) return;
