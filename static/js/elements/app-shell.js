@@ -141,7 +141,7 @@ export class AppShell extends LiveElement {
   }
 
   /**
-   * Leave a project that was deleted or is no longer visible to the user: go to the list and say why.
+   * Leave a project that was deleted or is no longer visible to the user: go to the list and show why.
    * @param {{ project: string, why: string }} gone
    */
   #leave({ project, why }) {

@@ -159,7 +159,7 @@ export class FrameCanvas extends LiveElement {
     return this.#view;
   }
 
-  /** Set whether Space is down. @param {boolean} held @returns {boolean} whether a drag panned while it was */
+  /** Set whether Space is down. @param {boolean} held @returns {boolean} whether a drag panned since it went down */
   holdSpace(held) {
     const { panned } = this.#space;
     if (held !== this.#space.held) this.#space = { held, panned: false };

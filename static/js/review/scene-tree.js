@@ -1,4 +1,4 @@
-/** Objects in the scene that nobody clicked: visibility buttons, and those left out. */
+/** Scene objects without clicks: visibility buttons, and those left out. */
 
 import { h, icon } from "../dom.js";
 
