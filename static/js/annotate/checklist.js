@@ -1,6 +1,6 @@
 /**
- * The objects that a project still has to click, and the fields that say what the next click makes: filled from the one of the
- * list whose turn it is, free to be written over.
+ * Checklist of the objects still to be clicked, with editable fields for the name and category of the next object, filled in
+ * from the selected entry.
  */
 
 import { h, renew } from "../dom.js";
@@ -30,17 +30,17 @@ export class Checklist {
   #listed = [];
   /** @type {{ name: string }[]} */
   #objects = [];
-  /** Names of objects whose making is on its way. @type {Set<string>} */
+  /** Names of objects being created. @type {Set<string>} */
   #coming = new Set();
-  /** @type {string | null} whose turn it is */
+  /** @type {string | null} name of the selected entry */
   #chosen = null;
-  /** Whether a person wants none of the list next. */
+  /** Whether the user deselected the list, so that the next object is not taken from it. */
   #free = false;
-  #drawn = ""; // masks that stream in must not take a line away that is pressed
+  #drawn = ""; // last rendered state: streamed masks must not replace a row that is being pressed
   fields = [this.#category, this.#named];
   element = h("details", { class: "checklist", open: true, hidden: true }, this.#count, this.#lines);
 
-  /** What the next click makes. */
+  /** Category and name of the object that the next click creates. */
   get next() {
     return { category: this.category, name: usableName(this.#name.value) || undefined };
   }
@@ -53,7 +53,7 @@ export class Checklist {
     this.#category.value = category;
   }
 
-  /** Those that nobody clicked yet. */
+  /** Entries without an object, neither stored nor being created. */
   get left() {
     return remaining(this.#listed, [...this.#objects, ...[...this.#coming].map((name) => ({ name }))]);
   }
@@ -64,13 +64,13 @@ export class Checklist {
     this.#draw();
   }
 
-  /** Those that are there. @param {{ name: string }[]} objects */
+  /** Stored objects. @param {{ name: string }[]} objects */
   set objects(objects) {
     this.#objects = objects;
     this.#draw();
   }
 
-  /** An object of that name is being made, or its making ended. @param {string | undefined} name @param {boolean} coming */
+  /** Mark an object of that name as being created, or no longer. @param {string | undefined} name @param {boolean} coming */
   making(name, coming) {
     if (name && coming) this.#coming.add(name);
     else if (name) this.#coming.delete(name);
@@ -78,7 +78,7 @@ export class Checklist {
     this.#draw();
   }
 
-  /** The next one of the list, after the last one none of it. */
+  /** Select the next entry; after the last one, none. */
   step() {
     const { left } = this;
     const at = left.findIndex(({ name }) => name === this.#chosen);
@@ -93,7 +93,7 @@ export class Checklist {
     this.#draw();
   }
 
-  /** Whose turn it is by now: another's once the chosen one is clicked. @returns {Listed | null} */
+  /** Entry that is next: the selected one, or the one after it once that is clicked. @returns {Listed | null} */
   get #turn() {
     const { left } = this;
     if (this.#free) return null;

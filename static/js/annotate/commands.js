@@ -1,4 +1,4 @@
-/** What can be done on the page by a key or from the palette, by the names of the keymap. */
+/** Actions of the Annotate page for keys and the command palette, by their names in the keymap. */
 
 import { say } from "../elements/toasts.js";
 
@@ -19,7 +19,7 @@ import { say } from "../elements/toasts.js";
  * @property {import("./layout.js").Layout} layout
  */
 
-/** What a key held down must not do again and again. */
+/** Actions that do not repeat while their key is held down. */
 export const ONE_A_PRESS = [
   "confirm-proposal",
   "dismiss-proposal",
@@ -44,7 +44,7 @@ export function actionsOf(doers) {
 }
 
 /**
- * From frame to frame.
+ * Navigation between frames.
  * @param {Doers} doers
  * @returns {import("../keyboard.js").Actions}
  */
@@ -73,7 +73,7 @@ function moves({ player, objects, masks }) {
 }
 
 /**
- * What is stored.
+ * Edits: undo, painting, cropping, segmenting, proposals and comments.
  * @param {Doers} doers
  * @returns {import("../keyboard.js").Actions}
  */
@@ -81,7 +81,7 @@ function changes({ objects, edits, player, pane: { proposals, checklist }, press
   const findAlike = () => {
     const { chosen } = objects;
     if (!chosen && !proposals.likeOne) return say("Choose an object first.");
-    canvas.focus(); // Enter is about what is found from now on, not about a button
+    canvas.focus(); // Enter now applies to the matches, not to a focused button
     proposals.findLike(chosen);
   };
   const deleteLast = () => {
@@ -116,7 +116,7 @@ function changes({ objects, edits, player, pane: { proposals, checklist }, press
 }
 
 /**
- * What is chosen and shown.
+ * Selection and display of objects, frames and panels.
  * @param {Doers} doers
  * @returns {import("../keyboard.js").Actions}
  */
@@ -147,7 +147,7 @@ function looks({ objects, masks, player, canvas, tools, evidence, mosaic, layout
 }
 
 /**
- * What the palette offers besides the keys: a frame by its number, an object, a category.
+ * Extra commands of the palette: a frame by its number, an object, a category, an assignee.
  * @param {string} typed
  * @param {Pick<Doers, "player" | "objects">} doers
  * @param {string[]} categories

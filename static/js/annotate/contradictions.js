@@ -1,6 +1,6 @@
 /**
- * What the masks on the frame shown contradict, said beside the objects concerned as soon as it can be seen.
- * Says "change" when that is another than before.
+ * Contradictions between the masks of the shown frame, grouped by object and updated live.
+ * Emits "change" when they differ from before.
  */
 
 import { contradictionsOn, shownOn, unseenOn } from "../lib/contradictions.js";
@@ -10,7 +10,7 @@ import { contradictionsOn, shownOn, unseenOn } from "../lib/contradictions.js";
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
 /** @typedef {import("../lib/contradictions.js").Said} Said */
 
-const SOON_MS = 200; // masks arrive by the dozen
+const SOON_MS = 200; // masks arrive in bursts
 
 export class Contradictions extends EventTarget {
   #objects;
@@ -31,14 +31,14 @@ export class Contradictions extends EventTarget {
   }
 
   /**
-   * The lines about an object.
+   * Contradictions of one object.
    * @param {number} object
    */
   about(object) {
     return this.#said.filter((said) => said.object === object);
   }
 
-  /** In a moment, at this frame with what changes until then. @param {FrameInfo} frame */
+  /** Check this frame after a short delay, which each further call restarts. @param {FrameInfo} frame */
   lookSoon(frame) {
     clearTimeout(this.#timer);
     this.#timer = window.setTimeout(() => this.#look(frame), SOON_MS);
@@ -57,7 +57,7 @@ export class Contradictions extends EventTarget {
     });
     const look = ++this.#looks;
     const shown = await shownOn(masks, frame);
-    if (look !== this.#looks) return; // a newer one is under way
+    if (look !== this.#looks) return; // a newer check has started
     const unseen = unseenOn(objects, frame.index, (object) => this.#masks.lane(object).has(frame.index));
     const said = [...contradictionsOn(shown), ...unseen];
     if (JSON.stringify(said) === JSON.stringify(this.#said)) return;

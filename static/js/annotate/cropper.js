@@ -1,6 +1,6 @@
 /**
- * The crop box of the chosen thing over the frame: its sides are dragged, or moved by arrow keys (1 mm, with Shift 10 mm).
- * Says "use" when it begins or ends.
+ * Editor of the chosen object's crop box over the frame: sides are dragged, or moved with arrow keys (1 mm, with Shift 10 mm).
+ * Emits "use" when editing starts or ends.
  */
 
 import * as api from "../api.js";
@@ -13,9 +13,9 @@ import { toScreen } from "../lib/view.js";
 /** @typedef {import("../lib/crop-box.js").Side} Side */
 /** @typedef {import("../api-types").FrameCamera} FrameCamera */
 
-const PAUSE_MS = 400; // after which keys pressed one after the other are stored as one change
-const APART_PX = 34; // from the middle of a small box to its handles: none lies over another
-const LEAST_PX_PER_M = 40; // a side seen along its own way cannot be dragged
+const PAUSE_MS = 400; // debounce: key presses in quick succession are stored as one change
+const APART_PX = 34; // minimum distance of handles from the centre of a small box, so that they do not overlap
+const LEAST_PX_PER_M = 40; // a side that moves along the line of sight cannot be dragged
 
 export class Cropper extends EventTarget {
   project = "";
@@ -26,13 +26,13 @@ export class Cropper extends EventTarget {
   #lines = shape("svg");
   #size = h("output", { class: "crop-size" });
   element = h("div", { class: "crop", role: "group", "aria-label": "Crop box" });
-  /** @type {number | null} of the object whose box is shown */
+  /** @type {number | null} id of the object whose box is shown */
   #object = null;
   /** @type {Crop | null} */
   #crop = null;
   /** @type {Map<number, Promise<FrameCamera>>} */
   #cameras = new Map();
-  /** @type {FrameCamera | null} of the frame shown */
+  /** @type {FrameCamera | null} camera of the shown frame */
   #camera = null;
   #timer = 0;
   /** @type {{ side: Side, from: { x: number, y: number }, crop: Crop } | null} */
@@ -58,7 +58,7 @@ export class Cropper extends EventTarget {
     return this.#object !== null;
   }
 
-  /** Show the chosen object's box, one around its points where it has none yet; or put it away. */
+  /** Show the chosen object's box, or one around its points if it has none; close it if shown. */
   async use() {
     if (this.on) return this.#end();
     const { chosen } = this.#objects;
@@ -72,7 +72,7 @@ export class Cropper extends EventTarget {
     this.#frame();
   }
 
-  /** The object is as found again. */
+  /** Remove the object's crop box, which restores the object as found. */
   remove() {
     const object = this.#object ?? this.#objects.current;
     if (object !== null && this.#objects.get(object)?.crop) this.#edits.patch(object, { crop: null });
@@ -97,7 +97,7 @@ export class Cropper extends EventTarget {
     }
   }
 
-  /** What somebody else set, or what was undone; another object chosen ends it. */
+  /** Adopt a box changed by another user or by undo; close when another object is chosen. */
   #follow() {
     if (this.#object === null) return;
     if (this.#objects.current !== this.#object) return this.#end();
@@ -136,7 +136,7 @@ export class Cropper extends EventTarget {
     if (held) /** @type {HTMLElement | null} */ (this.element.querySelector(`[data-side="${held}"]`))?.focus();
   }
 
-  /** While one is dragged the others are moved, not made anew. @param {Side} side @param {HTMLElement} made */
+  /** Move an existing handle instead of replacing it, while a side is dragged. @param {Side} side @param {HTMLElement} made */
   #keep(side, made) {
     const there = /** @type {HTMLElement | null} */ (this.element.querySelector(`[data-side="${nameOf(side)}"]`));
     if (there) Object.assign(there.style, { left: made.style.left, top: made.style.top });
@@ -173,7 +173,7 @@ export class Cropper extends EventTarget {
     return { side, handle };
   }
 
-  /** Where a side's handle is on the screen: at its middle, or farther outwards. @param {Side} side */
+  /** Screen position of a side's handle: the side's middle, or farther outwards on a small box. @param {Side} side */
   #placeOf({ at, middle, perMetre }) {
     const [from, to] = [toScreen(this.#canvas.view, middle), toScreen(this.#canvas.view, at)];
     const length = Math.hypot(perMetre.x, perMetre.y) || 1;
@@ -215,7 +215,7 @@ export class Cropper extends EventTarget {
     this.#timer = window.setTimeout(() => this.#flush(), PAUSE_MS);
   }
 
-  /** What was typed is stored now. */
+  /** Store pending key presses now. */
   #flush() {
     if (!this.#timer) return;
     clearTimeout(this.#timer);

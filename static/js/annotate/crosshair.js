@@ -1,4 +1,4 @@
-/** The crosshair's keys: arrows move it, plus and minus click where it stands, Escape puts it away. */
+/** Keys of the crosshair: arrows move it, plus and minus click at its position, Escape hides it. */
 
 /** @type {Record<string, [number, number]>} */
 const MOVES = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };

@@ -1,6 +1,7 @@
 /**
- * What a person does to the objects, sent through the outbox. Says "object" {object} for every answer, "made" {object} when a
- * click made a new one, "making" {name, coming} when that began or ended, "clicks" when those on their way changed, "saved" {text, tone} about how it stands.
+ * Edits of the objects, sent through the outbox. Emits "object" {object} for every response, "made" {object} when a click
+ * created a new one, "making" {name, coming} when that starts or ends, "clicks" when the unsaved clicks change, "saved"
+ * {text, tone} with the saving state.
  */
 
 import { getFoundFronts } from "../api.js";
@@ -23,7 +24,7 @@ import { saving } from "../saving.js";
 export class Edits extends EventTarget {
   project = "";
   #objects;
-  /** The object whose making is on its way: further clicks are on it. @type {string | null} */
+  /** Provisional id of the object being created; further clicks are added to it. @type {string | null} */
   #coming = null;
   /** @type {Map<string, PointIn[]>} clicks that are not stored yet */
   #clicks = new Map();
@@ -45,9 +46,9 @@ export class Edits extends EventTarget {
   }
 
   /**
-   * Clicks on the current object, or on a new one.
+   * Add clicks to the current object, or to a new one; without a name, that is called by its category and a number.
    * @param {PointIn[]} points
-   * @param {{ category: string, name?: string, infer: boolean }} how a new one is called its category and a number without a name
+   * @param {{ category: string, name?: string, infer: boolean }} how
    */
   place(points, { category, name, infer }) {
     const key = newKey();
@@ -58,7 +59,7 @@ export class Edits extends EventTarget {
     sent
       .then(
         (object) => this.#say("object", { object }),
-        () => {}, // said where it was refused
+        () => {}, // save() has shown the error
       )
       .finally(() => this.#onTheirWay(key, null));
   }
@@ -88,7 +89,7 @@ export class Edits extends EventTarget {
       return object;
     } finally {
       this.#say("making", { name: wanted.name, coming: false });
-      if (isMine()) this.#coming = null; // also where it was refused: the next click tries anew
+      if (isMine()) this.#coming = null; // also after a refusal: the next click tries again
     }
   }
 
@@ -144,7 +145,7 @@ export class Edits extends EventTarget {
   }
 
   /**
-   * One name for several, numbered from left to right and from the top down as they stand in the room.
+   * Give several objects one name, numbered from left to right and top to bottom as they stand in the room.
    * @param {SceneObject[]} objects
    * @param {string} name
    */
@@ -158,7 +159,7 @@ export class Edits extends EventTarget {
   }
 
   /**
-   * Two objects that are one: the older one keeps its name and gets the clicks on the other, which goes.
+   * Merge two objects: the older one keeps its name and gets the other's positive clicks; the other is deleted.
    * @param {number} id
    * @param {number} other
    */
@@ -193,9 +194,9 @@ export class Edits extends EventTarget {
   }
 
   /**
-   * Of the chosen object, else of what was changed last.
+   * Undo or redo the latest change of the chosen object, or else of the project.
    * @param {"undo" | "redo"} which
-   * @param {number | undefined} frame that is looked at
+   * @param {number | undefined} frame shown
    */
   undoRedo(which, frame) {
     const { chosen } = this.#objects;
@@ -212,7 +213,7 @@ export class Edits extends EventTarget {
   }
 
   /**
-   * Send a change and say how it stands; what the server refuses, and what a lock forbids, is said here.
+   * Send a change and report its saving state; a refusal by the server or by a lock is shown as a toast.
    * @template T
    * @param {Change<T>} change
    * @param {string} [key]

@@ -1,6 +1,6 @@
 /**
- * The right of the page: depth of the frame, shape of the object so far, comments. On a narrow screen it comes and goes; a wide
- * one always has room for it. Says "mosaic", "comment", "crop" and "uncrop" when they are asked for, "open" when it came or went.
+ * Right panel: depth of the frame, shape of the object so far, comments. Collapsible on a narrow screen, always visible on a
+ * wide one. Emits "mosaic", "comment", "crop" and "uncrop" when their buttons are clicked, "open" when it opens or closes.
  */
 
 import { h } from "../dom.js";

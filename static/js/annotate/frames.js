@@ -1,11 +1,11 @@
-/** The recording's pictures: what lies near is fetched ahead, and a small one of everything, so that scrubbing never waits. */
+/** Images of the recording: neighbours of a frame are prefetched, and small images of all, so that scrubbing never waits. */
 
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
 
 const NEAR = 12;
 const KEPT = 6 * NEAR;
 const SMALL_WIDTH = 320;
-const MOST_SMALL = 300; // of a long recording every n-th
+const MOST_SMALL = 300; // in a long recording, every n-th frame
 const AT_ONCE = 3;
 
 export class Frames {
@@ -17,7 +17,7 @@ export class Frames {
   #large = new Map();
   /** @type {Map<number, HTMLImageElement>} by position */
   #small = new Map();
-  /** @type {number[]} positions whose small picture is still to come */
+  /** @type {number[]} positions whose small image is still to be loaded */
   #waiting = [];
 
   /**
@@ -34,7 +34,7 @@ export class Frames {
     for (let k = 0; k < AT_ONCE; k += 1) this.#fetchSmall();
   }
 
-  /** Stop fetching what nobody will look at. */
+  /** Stop loading further small images. */
   stop() {
     this.#waiting = [];
   }
@@ -68,7 +68,7 @@ export class Frames {
     return image;
   }
 
-  /** All of its pixels, for who looks closely. @param {FrameInfo} frame */
+  /** Image at full resolution, for zooming in. @param {FrameInfo} frame */
   whole(frame) {
     const image = new Image();
     image.src = `/media/${this.#project}/frames/${frame.index}.jpg?v=${this.#version}`;
@@ -76,7 +76,7 @@ export class Frames {
   }
 
   /**
-   * What can be shown at once in the place of a frame that is not here yet: its small picture, else a near one's.
+   * Image to show immediately for a frame that is not loaded yet: its small image, or a near frame's; null without one.
    * @param {number} position
    */
   atOnce(position) {

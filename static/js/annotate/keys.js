@@ -1,4 +1,4 @@
-/** The keys of the page: those of the mode that is on come before the commands of the keymap. */
+/** Keyboard input of the page: keys of the active mode take precedence over the commands of the keymap. */
 
 import { isForPage } from "../keyboard.js";
 import { crosshairKey } from "./crosshair.js";
@@ -24,7 +24,7 @@ function press(event, { canvas, presses, painter, cropper, pane, commands }) {
   if (event.key === "Escape" && painter.tool) return painter.use(null);
   if (event.key === "Enter" && painter.close()) return event.preventDefault();
   if (pane.proposals.likeOne && likeKey(event, pane.proposals)) return event.preventDefault();
-  if (event.key === " ") return (event.preventDefault(), void canvas.holdSpace(true)); // a tap plays: release
+  if (event.key === " ") return (event.preventDefault(), void canvas.holdSpace(true)); // a tap plays, see release
   const click = (/** @type {0 | 1} */ label) =>
     canvas.crosshair && presses.click({ ...canvas.crosshair, label, hold: false });
   if (crosshairKey(event, canvas, click)) return event.preventDefault();
@@ -32,10 +32,10 @@ function press(event, { canvas, presses, painter, cropper, pane, commands }) {
 }
 
 /**
- * While those like an object are shown, Enter is about them.
+ * Handle a key while matches of an object are shown: Enter confirms one (with Shift all), Escape closes them.
  * @param {KeyboardEvent} event
  * @param {import("../elements/proposal-list.js").ProposalList} proposals
- * @returns {boolean} whether it was
+ * @returns {boolean} whether the key was handled
  */
 function likeKey({ key, shiftKey, repeat }, proposals) {
   if (key === "Escape") proposals.findLike(null);

@@ -1,4 +1,4 @@
-/** What is drawn over a frame and in the lanes, from the objects and their masks. */
+/** Overlays of a frame and lanes of the film strip, computed from the objects and their masks. */
 
 import { rgbOf } from "../lib/masks.js";
 
@@ -6,11 +6,11 @@ import { rgbOf } from "../lib/masks.js";
 /** @typedef {import("./masks.js").Masks} Masks */
 /** @typedef {import("../api-types").PointIn} PointIn */
 
-/** A click on its way: of no object yet, so it is neither moved nor removed. */
+/** Marker of a click that is not stored yet: it has no object, so it cannot be moved or removed. */
 const COMING = { id: -1, colour: "#c8ccd4", number: 0, object: -1, current: false };
 
 /**
- * The clicks on a frame, with those that are not stored yet.
+ * Markers of the clicks on a frame, including those not stored yet.
  * @param {SceneObjects} objects
  * @param {PointIn[]} coming
  * @param {number | undefined} frame

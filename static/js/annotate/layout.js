@@ -1,4 +1,4 @@
-/** How the page is divided: objects, tools, the picture, evidence, and the frames below. A bar between two of them changes their sizes. */
+/** Layout of the page: objects, tools, image, evidence, and the frames below, resizable by splitters between them. */
 
 import { h } from "../dom.js";
 import { Splitter } from "../elements/splitter.js";
@@ -19,7 +19,7 @@ export class Layout {
     this.element.replaceChildren(...parts, ...this.#bars.map(({ element }) => element));
   }
 
-  /** The picture alone with its tools, or everything again. */
+  /** Collapse all panels except the image and its tools, or restore them. */
   fold() {
     const folded = !this.#bars.every((bar) => bar.folded);
     for (const bar of this.#bars) bar.fold(folded);

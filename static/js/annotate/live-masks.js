@@ -1,7 +1,7 @@
 /**
- * The masks of a project as they come: a frame's when it is asked for, an object's while it is being found.
- * Says "masks" {frame} when those of a frame changed (null: of many), "grown" {object} when one is seen on other frames than before,
- * "openings" when fronts were filmed to move otherwise than was known.
+ * Masks of a project, loaded per frame on request and received live while an object is being segmented.
+ * Emits "masks" {frame} when the masks of a frame changed (null: of many frames), "grown" {object} when the frames on which an
+ * object is visible changed, "openings" when the filmed movements of fronts changed.
  */
 
 import { getLanes, getMasks, getOpenings } from "../api.js";
@@ -12,12 +12,15 @@ import { live } from "../live.js";
 import { Masks } from "./masks.js";
 
 /** @typedef {import("../api-types").FrameMask} FrameMask */
-/** @typedef {{ object: number, restart: boolean, state: string, error: { message: string, hint: string } | null }} Told about an object being found */
+/**
+ * Message about an object being segmented.
+ * @typedef {{ object: number, restart: boolean, state: string, error: { message: string, hint: string } | null }} Told
+ */
 
 export class LiveMasks extends EventTarget {
   project = "";
   stored = new Masks();
-  /** @type {import("../api-types").Opening[]} how fronts were filmed to move */
+  /** @type {import("../api-types").Opening[]} movements of fronts in the recording */
   openings = [];
   #meanwhile = new Meanwhile();
 
@@ -27,7 +30,7 @@ export class LiveMasks extends EventTarget {
     live.addEventListener("segment", (event) => this.#told(detailOf(event)), { signal });
   }
 
-  /** On which frames each object is seen; masks themselves are asked for frame by frame. */
+  /** Load the openings and the frames on which each object is visible; masks are loaded per frame by `fetch`. */
   async load() {
     const both = Promise.all([getLanes(this.project), getOpenings(this.project)]);
     await this.#meanwhile.during(both, ([lanes, openings]) => {
@@ -37,7 +40,7 @@ export class LiveMasks extends EventTarget {
   }
 
   /**
-   * Those of a frame, as they are stored.
+   * Load the stored masks of a frame.
    * @param {number} frame
    * @param {AbortSignal} signal
    */

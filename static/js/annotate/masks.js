@@ -1,4 +1,4 @@
-/** The masks of the frames that were looked at and of those that arrived live, and on which frames each object is seen. */
+/** Cache of masks loaded per frame or received live, with the frames on which each object is visible. */
 
 /** @typedef {import("../api-types").FrameMask} FrameMask */
 /** @typedef {import("../api-types").Lane} Lane */
@@ -24,7 +24,7 @@ export class Masks {
   }
 
   /**
-   * One that arrived live. A first look can be here before the answer that names its object.
+   * Store a mask received live. A first mask can arrive before the response that names its object.
    * @param {FrameMask} mask
    */
   receive(mask) {
@@ -34,13 +34,13 @@ export class Masks {
     this.keep(mask);
   }
 
-  /** @param {number} object whose masks are made anew */
+  /** Drop the masks of an object that is segmented again. @param {number} object */
   restart(object) {
     this.#lanes.set(object, new Map());
     for (const key of [...this.#masks.keys()]) if (key.startsWith(`${object}/`)) this.#masks.delete(key);
   }
 
-  /** All of an object, or its mask in one frame. @param {number} object @param {number} [frame] */
+  /** Drop all masks of an object, or only its mask in one frame. @param {number} object @param {number} [frame] */
   forget(object, frame) {
     if (frame !== undefined) return void this.#masks.delete(`${object}/${frame}`);
     this.restart(object);

@@ -1,4 +1,7 @@
-/** The left of the page: undo and redo, what the next object is, those still to click, the objects, what is proposed, the way on. Says "undo", "redo". */
+/**
+ * Left panel: undo and redo, the next object, the checklist, the objects, the proposals, a link to the next step.
+ * Emits "undo" and "redo".
+ */
 
 import { meanOf } from "../lib/listing.js";
 
@@ -10,7 +13,7 @@ import { ProposalList } from "../elements/proposal-list.js";
 /** @typedef {import("./scene-objects.js").SceneObjects} SceneObjects */
 
 export class ObjectsPane extends EventTarget {
-  /** Who looks, where people have accounts. @type {string | undefined} */
+  /** Name of the signed-in user, where people have accounts. @type {string | undefined} */
   me;
   list = new ObjectList();
   proposals = new ProposalList();
@@ -34,7 +37,7 @@ export class ObjectsPane extends EventTarget {
   /**
    * @param {SceneObjects} objects
    * @param {import("./masks.js").Masks} masks
-   * @param {(object: number) => import("../lib/contradictions.js").Said[]} contradicted what its masks contradict
+   * @param {(object: number) => import("../lib/contradictions.js").Said[]} contradicted contradictions of an object's masks
    */
   draw(objects, masks, contradicted) {
     const { current } = objects;

@@ -1,6 +1,7 @@
 /**
- * The chosen object's mask in the shown frame, painted: a brush, an eraser, a lasso and a polygon; kept as it is, or said not to
- * be there. What is set right stands, whatever is found later. Says "tool" when another one or none is used.
+ * Manual editing of the chosen object's mask in the shown frame: brush, eraser, lasso, polygon, keep as it is, or mark as not
+ * visible. A corrected mask is not replaced by later segmentation. Emits "tool" when the active tool changes, "painted" with
+ * the frame's index when a mask does.
  */
 
 import { getMasks } from "../api.js";
@@ -27,7 +28,7 @@ import { outbox } from "../outbox.js";
  * @property {import("../elements/frame-canvas.js").FrameCanvas} canvas
  */
 
-const PREVIEW_PX = 960; // across, where there is no mask to paint on
+const PREVIEW_PX = 960; // width of a blank mask, where there is none to paint on
 const SIZES = { least: 4, most: 160 }; // of the brush, in pixels of the screen
 
 export class Painter extends EventTarget {
@@ -36,9 +37,9 @@ export class Painter extends EventTarget {
   tool = null;
   #known;
   #size = 24;
-  /** Corners so far, of one object in one frame. @type {Spot[]} */
+  /** Corners placed so far, of one object in one frame. @type {Spot[]} */
   #polygon = [];
-  /** One stroke after the other: each is painted over the one before it. */
+  /** Queue of strokes: each is painted over the result of the one before it. */
   #work = Promise.resolve();
 
   /** @param {Known} known */
@@ -49,7 +50,7 @@ export class Painter extends EventTarget {
     known.objects.addEventListener("choose", () => this.#drop());
   }
 
-  /** Use a tool, or leave it. @param {Tool | null} tool */
+  /** Activate a tool, or deactivate it if it is active. @param {Tool | null} tool */
   use(tool) {
     this.tool = this.tool === tool ? null : tool;
     this.#polygon = [];
@@ -63,7 +64,7 @@ export class Painter extends EventTarget {
     this.#show();
   }
 
-  /** A press that did not wander: a corner of the polygon, or a dot. @param {Spot} at @returns {boolean} whether it was for a tool */
+  /** Handle a press without a drag: a polygon corner, or a dot. @param {Spot} at @returns {boolean} whether a tool is active */
   click(at) {
     if (!this.tool) return false;
     if (this.tool !== "polygon") this.stroke([at, at]);
@@ -72,7 +73,7 @@ export class Painter extends EventTarget {
     return true;
   }
 
-  /** Corners belong to the object and the frame that they were clicked in: in another, they are of nothing. */
+  /** Discard the corners: they belong to the object and the frame they were clicked in. */
   #drop() {
     if (this.#polygon.length) this.#setPolygon([]);
   }
@@ -97,12 +98,12 @@ export class Painter extends EventTarget {
     if (this.tool && this.tool !== "polygon") this.#paint(path, this.tool);
   }
 
-  /** What is shown stands. */
+  /** Keep the shown mask as it is. */
   keep() {
     this.#change((mask) => mask, false);
   }
 
-  /** The object is not visible in this frame, or it is as found there again. */
+  /** Mark the object as not visible in this frame, or restore its mask as found if it is already marked. */
   absent() {
     const { object, frame } = this.#now ?? {};
     if (!object || frame === undefined) return say("Choose an object first.");
@@ -131,7 +132,7 @@ export class Painter extends EventTarget {
   /** @param {Place} now @param {Alter} alter @param {boolean} fromNothing */
   async #alter(now, alter, fromNothing) {
     const { object, frame, size } = now;
-    const coming = this.#isComing(object.id); // asked first: what is not there after that is not to come
+    const coming = this.#isComing(object.id); // checked first: a mask still missing after that will not arrive
     const before = await this.#maskOf(now);
     const where = `${object.name} in frame ${frame}`;
     if (!before && coming) return say(`The mask of ${where} is still loading: try again in a moment.`);
@@ -146,15 +147,18 @@ export class Painter extends EventTarget {
     return undefined;
   }
 
-  /** Whether masks of it may be about to change: while it is found, and while changes are on their way. @param {number} object */
+  /** Whether the object's masks may change: it is being segmented, or changes are not stored yet. @param {number} object */
   #isComing(object) {
     return outbox.waiting > 0 || isComing(this.#known.objects.get(object) ?? { segment: "" });
   }
 
-  /** What was painted last: it may not have come back yet. @type {{ object: number, frame: number, mask: Mask, bits: MaskBits, version: number | null } | null} */
+  /**
+   * Last painted mask, which the server may not have returned yet.
+   * @type {{ object: number, frame: number, mask: Mask, bits: MaskBits, version: number | null } | null}
+   */
   #local = null;
 
-  /** Show what was painted last until it comes back. */
+  /** Show the last painted mask until the server returns it. */
   restore() {
     const last = this.#local;
     if (!last || !this.#isNewest(last) || this.#known.masks.on(last.object, last.frame)) return;
@@ -162,12 +166,16 @@ export class Painter extends EventTarget {
     this.#known.masks.receive({ object, frame, confidence: 1, source: "live", mask: bits });
   }
 
-  /** Whether nothing was changed about the object since. @param {{ object: number, version: number | null }} last */
+  /** Whether the object has not changed since. @param {{ object: number, version: number | null }} last */
   #isNewest({ object, version }) {
     return version === null || version === this.#known.objects.get(object)?.version;
   }
 
-  /** What was painted last, else what is here, else what is stored; null where there is none. @param {Place} now @returns {Promise<Mask | null>} */
+  /**
+   * Mask to paint on: the last painted one, else the cached one, else the stored one; null without one.
+   * @param {Place} now
+   * @returns {Promise<Mask | null>}
+   */
   async #maskOf({ object, frame }) {
     const last = this.#local;
     if (last?.object === object.id && last.frame === frame && this.#isNewest(last)) return last.mask;
@@ -177,7 +185,7 @@ export class Painter extends EventTarget {
 
   /** @param {number} object @param {number} frame */
   async #stored(object, frame) {
-    if (outbox.waiting) return undefined; // it may be another one once they are there
+    if (outbox.waiting) return undefined; // pending changes may replace it
     return (await getMasks(this.project, frame)).find((mask) => mask.object === object);
   }
 
@@ -189,7 +197,7 @@ export class Painter extends EventTarget {
         this.#known.objects.answered(stored);
         if (text) say(text);
       },
-      () => (this.#local = null), // said where it was refused
+      () => (this.#local = null), // save() has shown the error
     );
   }
 
@@ -209,7 +217,7 @@ export class Painter extends EventTarget {
   }
 }
 
-/** @param {Size} size of the frame @returns {Mask} to paint on where there is none */
+/** Empty mask to paint on. @param {Size} size of the frame @returns {Mask} */
 function blank(size) {
   const width = Math.min(PREVIEW_PX, size.width);
   const height = Math.max(Math.round((size.height * width) / size.width), 1);

@@ -1,4 +1,4 @@
-/** What is known, drawn: masks, clicks, proposals and comments over the frame, and a lane per object under it. */
+/** Drawing of the overlays: masks, clicks, proposals and comments over the frame, and a lane per object below it. */
 
 import { lanesOf, markersOn, masksOn } from "./layers.js";
 
@@ -13,7 +13,7 @@ import { lanesOf, markersOn, masksOn } from "./layers.js";
  * @property {import("../elements/comment-list.js").CommentList} comments
  */
 
-const LANES_MS = 250; // masks arrive by the dozen
+const LANES_MS = 250; // masks arrive in bursts
 
 export class Picture {
   #known;
@@ -32,7 +32,7 @@ export class Picture {
     this.#strip = strip;
   }
 
-  /** Another frame is shown. */
+  /** Redraw for another frame. */
   drawFrame() {
     this.drawMarkers();
     this.drawMasks();
@@ -40,7 +40,7 @@ export class Picture {
     this.drawPins();
   }
 
-  /** The objects changed. */
+  /** Redraw after a change of the objects. */
   drawObjects() {
     this.drawMarkers();
     this.drawMasks();
@@ -74,7 +74,7 @@ export class Picture {
     this.#strip.setLanes(lanesOf(this.#known.objects, this.#known.masks, this.#known.openings()));
   }
 
-  /** In a moment, with what changes until then. */
+  /** Draw the lanes after a short delay, once for all changes until then. */
   drawLanesSoon() {
     this.#lanesTimer ||= window.setTimeout(() => this.drawLanes(), LANES_MS);
   }

@@ -1,6 +1,6 @@
 /**
- * Where in the recording the page is: the frame shown, its neighbours fetched ahead, playing, the way to the next frame of
- * interest. Says "frame" at once, and "settled" when scrubbing rests on one.
+ * Player of the recording: the shown frame, prefetching of its neighbours, playback, jumps to the next frame of interest.
+ * Emits "frame" at once on each change, and "settled" when scrubbing rests on a frame.
  */
 
 import { nextDoubtful } from "../lib/lanes.js";
@@ -10,14 +10,14 @@ import { Frames } from "./frames.js";
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
 
 const FRAME_MS = 100;
-const SETTLE_MS = 30; // scrubbing passes frames faster: what belongs to them is not asked for
+const SETTLE_MS = 30; // data of frames passed faster while scrubbing is not requested
 
 export class Player extends EventTarget {
   frames = new Frames();
   position = 0;
   #canvas;
   #strip;
-  /** @type {FrameInfo | null} whose every pixel was asked for */
+  /** @type {FrameInfo | null} frame requested at full resolution */
   #sharpened = null;
   #asDepth = false;
   #playing = 0;
@@ -34,7 +34,7 @@ export class Player extends EventTarget {
     canvas.addEventListener("view", () => this.#sharpen());
   }
 
-  /** Show the picture that the HTML asked for, until the table of frames is here. @param {string} project */
+  /** Show the image preloaded by the HTML until the list of frames is loaded. @param {string} project */
   showFirst(project) {
     const link = document.head.querySelector('link[rel="preload"][as="image"]');
     link?.remove(); // a page that is opened later has its own first frame
@@ -92,14 +92,14 @@ export class Player extends EventTarget {
     this.#strip.setPlaying(!playing);
   }
 
-  /** Depth instead of colour, or back. */
+  /** Switch between depth and colour. */
   switchDepth() {
     this.#asDepth = !this.#asDepth;
     this.#showPicture();
   }
 
   /**
-   * The next of the wanted frames in that direction; stays when there is none.
+   * Seek the next of the wanted frames in that direction, if there is one.
    * @param {Set<number>} wanted
    * @param {1 | -1} direction
    */
@@ -110,6 +110,7 @@ export class Player extends EventTarget {
   }
 
   /**
+   * Seek the next frame of doubtful confidence in that direction.
    * @param {Map<number, number>} lane confidence by frame
    * @param {1 | -1} direction
    * @returns {boolean} whether there was one
@@ -126,7 +127,7 @@ export class Player extends EventTarget {
     this.frames.stop();
   }
 
-  /** The frame's picture, or what is at hand until it is here. */
+  /** Show the frame's image, and a small one until it is loaded. */
   #showPicture() {
     this.#sharpened = null;
     const frame = this.frame;
@@ -140,7 +141,7 @@ export class Player extends EventTarget {
     if (meanwhile) this.#canvas.setFrame(meanwhile, frame, `Frame ${frame.index}`);
   }
 
-  /** A frame that is zoomed into is shown with all its pixels. */
+  /** Load the frame at full resolution once it is zoomed into. */
   #sharpen() {
     const frame = this.frame;
     if (!frame || this.#asDepth || this.#sharpened === frame || !this.#canvas.wantsMore) return;

@@ -1,6 +1,6 @@
 /**
- * What a press on the frame means: a click or a box of an object, or the place of a comment.
- * Says "pinning" when the next click is to say where a comment belongs, or no longer is; "pin" {frame, x, y} once it did.
+ * Interpretation of presses on the frame: a click or box for an object, or the position of a comment.
+ * Emits "pinning" when placing a comment starts or ends, "pin" {frame, x, y} when its position is clicked.
  */
 
 import { say } from "../elements/toasts.js";
@@ -24,8 +24,8 @@ export class Presses extends EventTarget {
    * @param {import("./scene-objects.js").SceneObjects} objects
    * @param {import("./edits.js").Edits} edits
    * @param {import("./player.js").Player} player
-   * @param {() => { category: string, name?: string }} next what the next object is
-   * @param {(spot: Spot) => number[]} under the objects whose masks are there, the uppermost first
+   * @param {() => { category: string, name?: string }} next category and name of the next object
+   * @param {(spot: Spot) => number[]} under ids of the objects whose masks cover a spot, topmost first
    */
   constructor(objects, edits, player, next, under) {
     super();
@@ -36,13 +36,13 @@ export class Presses extends EventTarget {
     this.#under = under;
   }
 
-  /** The next click starts a new object, also on another's mask. */
+  /** Let the next click start a new object, even on another object's mask. */
   startNew() {
     this.#objects.choose(null);
     this.#forced = true;
   }
 
-  /** Whether the next click is the place of a comment. */
+  /** Whether the next click places a comment. */
   get pinning() {
     return this.#pinning;
   }
@@ -64,7 +64,7 @@ export class Presses extends EventTarget {
     this.#place([{ frame, x, y, label }], hold);
   }
 
-  /** The object that a click means that falls on its mask, and not on the chosen one's. @param {Spot} spot */
+  /** Topmost object under a click, unless the click is on the chosen object's mask or starts a new one. @param {Spot} spot */
   #otherAt(spot) {
     const under = this.#forced && this.#objects.current === null ? [] : this.#under(spot);
     const [first] = under;
@@ -89,7 +89,7 @@ export class Presses extends EventTarget {
     if (points) this.#place(points, hold);
   }
 
-  /** The key that holds masks back was let go. */
+  /** Handle the release of the key that defers segmentation. */
   release() {
     if (!this.#batching) return;
     this.#batching = false;
@@ -97,9 +97,9 @@ export class Presses extends EventTarget {
   }
 
   /**
-   * Clicks on the current object, or on a new one.
+   * Add clicks to the current object, or to a new one.
    * @param {PointIn[]} points
-   * @param {boolean} hold whether more will follow before masks are wanted
+   * @param {boolean} hold whether segmentation waits for further clicks
    */
   #place(points, hold) {
     this.#batching = hold;

@@ -1,5 +1,5 @@
 /**
- * Make the buttons of a toolbar one stop of the Tab key, the first of them: arrows, Home and End reach the others.
+ * Roving tabindex of a toolbar: Tab stops at its first button only; arrow keys, Home and End reach the others.
  * @param {HTMLElement} bar
  */
 export function rove(bar) {

@@ -1,7 +1,7 @@
 /**
- * The objects of the project as the page knows them: which is chosen, which are selected besides, hidden or locked, in which colour
- * each is drawn. A lock is this browser's own, and kept: it guards what is finished against one's own slips.
- * Says "change" when any of it is to be drawn anew, "choose" when another one or none is chosen, "gone" {id}.
+ * Client-side state of the project's objects: chosen, selected, hidden, locked, and the colour of each. Locks are stored in
+ * this browser only: they protect finished objects from the user's own accidental changes.
+ * Emits "change" when a redraw is needed, "choose" when another object or none is chosen, "gone" {id} when one is deleted.
  */
 
 import { isComing } from "../lib/listing.js";
@@ -19,7 +19,7 @@ export class SceneObjects extends EventTarget {
   #hidden = new Set();
   /** @type {Set<number>} */
   #locked = new Set();
-  /** @type {Set<number>} several, to be changed together */
+  /** @type {Set<number>} objects to be changed together */
   #selected = new Set();
   #project = "";
   /** @type {string[]} */
@@ -38,7 +38,7 @@ export class SceneObjects extends EventTarget {
     this.#locked = new Set(JSON.parse(localStorage.getItem(`${LOCKED}-${id}`) ?? "[]"));
   }
 
-  /** The number of the chosen one. */
+  /** Id of the chosen object. */
   get current() {
     return this.#current;
   }
@@ -51,12 +51,12 @@ export class SceneObjects extends EventTarget {
     return this.#all.size;
   }
 
-  /** Of how many masks are still to come. */
+  /** Number of objects whose masks are still being found. */
   get following() {
     return this.sorted.filter(isComing).length;
   }
 
-  /** In the order they were made. */
+  /** Objects in order of creation. */
   get sorted() {
     return [...this.#all.values()].toSorted((a, b) => a.id - b.id);
   }
@@ -86,18 +86,18 @@ export class SceneObjects extends EventTarget {
     return this.#locked.has(id);
   }
 
-  /** Lock them, or unlock them where all are. @param {number[]} ids */
+  /** Lock the objects, or unlock them if all are locked. @param {number[]} ids */
   lock(ids) {
     this.#switch(this.#locked, ids);
     localStorage.setItem(`${LOCKED}-${this.#project}`, JSON.stringify([...this.#locked]));
   }
 
-  /** Several, in the order they were made. */
+  /** Selected objects in order of creation. */
   get selected() {
     return this.sorted.filter(({ id }) => this.#selected.has(id));
   }
 
-  /** Those that a command is about: the selected ones, else the chosen one. */
+  /** Objects that a command applies to: the selected ones, else the chosen one. */
   get changed() {
     const { selected, chosen } = this;
     return selected.length ? selected : chosen ? [chosen] : [];
@@ -108,18 +108,18 @@ export class SceneObjects extends EventTarget {
     return this.#selected.has(id);
   }
 
-  /** These alone. @param {number[]} ids */
+  /** Select exactly these objects. @param {number[]} ids */
   select(ids) {
     this.#selected = new Set(ids);
     this.#say("change");
   }
 
-  /** An answer to a change: what the live connection said of the same change may be newer. @param {SceneObject} object */
+  /** Store the response to a change, unless the live connection has delivered a newer version. @param {SceneObject} object */
   answered(object) {
     if ((this.get(object.id)?.version ?? -1) < object.version) this.store(object);
   }
 
-  /** @param {SceneObject} object one that was deleted goes */
+  /** Store an object, or remove it if it was deleted. @param {SceneObject} object */
   store(object) {
     if (!object.deleted) this.#all.set(object.id, object);
     else if (this.#all.delete(object.id)) this.#say("gone", { id: object.id });
@@ -134,7 +134,7 @@ export class SceneObjects extends EventTarget {
     this.#say("change");
   }
 
-  /** Hide them, or show them again where all are hidden. @param {number[]} ids */
+  /** Hide the objects, or show them if all are hidden. @param {number[]} ids */
   hide(ids) {
     this.#switch(this.#hidden, ids);
   }
@@ -148,7 +148,7 @@ export class SceneObjects extends EventTarget {
     this.#say("change");
   }
 
-  /** The chosen one alone, or all again. */
+  /** Show only the chosen object, or all again. */
   solo() {
     if (this.#current === null) return;
     const others = [...this.#all.keys()].filter((id) => id !== this.#current);

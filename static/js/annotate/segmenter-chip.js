@@ -1,4 +1,4 @@
-/** How the live segmenter stands, in a chip. */
+/** Status chip of the live segmenter. */
 
 import { h } from "../dom.js";
 import { counted } from "../lib/format.js";
@@ -21,14 +21,14 @@ export class SegmenterChip {
   #status = null;
   #following = 0;
 
-  /** Of how many objects masks are still to come: it is ready once none is. @param {number} count */
+  /** Number of objects whose masks are still being found; the chip shows "ready" at zero. @param {number} count */
   set following(count) {
     this.#following = count;
     this.#draw();
   }
 
   /**
-   * Show what opening it answers, unless the live connection, which may be quicker, has said something newer by then.
+   * Show the response to opening the segmenter, unless the live connection has delivered a newer status first.
    * @param {Promise<LiveStatus>} opening
    */
   async open(opening) {

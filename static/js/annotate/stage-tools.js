@@ -1,6 +1,7 @@
 /**
- * The rail of tools beside the frame: what a click does, what is painted, how strong the masks are; on a narrow screen the way to
- * depth, shape and comments. Its status (the segmenter, the last change) stands among the frames, where nothing moves for it. Says "opacity", "sign" and "evidence" when they are changed, "paint" what is to be painted.
+ * Toolbar beside the frame: effect of a click, painting tools, opacity of the masks; on a narrow screen also the button for
+ * depth, shape and comments. Its status (segmenter, last change) is placed among the frames, where it shifts no layout.
+ * Emits "opacity" and "sign" when they change, "evidence" when its button is clicked, "paint" with the tool or action.
  */
 
 import { h, icon, segments, slider } from "../dom.js";
@@ -14,7 +15,7 @@ const PAINTS = [
   ["lasso", "Lasso", "Lasso: draw around what belongs to it (L)"],
   ["polygon", "Polygon", "Polygon: click its corners, Enter closes it (O)"],
 ];
-/** @type {[string, string, string, string][]} what it says, its icon, its name, what it does */
+/** @type {[string, string, string, string][]} action, icon, label, tooltip */
 const HERE = [
   ["keep", "check", "Keep", "Its mask in this frame is right: keep it (W)"],
   ["absent", "eye-off", "Not here", "It is not visible in this frame; again restores its mask (A)"],
@@ -24,7 +25,7 @@ export class StageTools extends EventTarget {
   segmenter = new SegmenterChip();
   #saved = h("span", { class: "chip", role: "status" });
   #opacity = h("input", { type: "range", min: "0", max: "100", value: "42", "aria-label": "Mask opacity" });
-  /** How the segmenter stands, and when the last change was stored. */
+  /** Chips with the state of the segmenter and of the last change. */
   status = h("div", { class: "status" }, this.segmenter.element, this.#saved);
   #adds = h("button", { type: "button" }, icon("plus"), "Add");
   #takes = h("button", { type: "button" }, icon("minus"), "Take away");
@@ -46,7 +47,7 @@ export class StageTools extends EventTarget {
       h("button", { type: "button", title, onClick: () => this.#paint(what) }, icon(shown), text),
     ),
   );
-  /** @type {0 | 1} what a click says */
+  /** @type {0 | 1} label of a click: 1 adds, 0 takes away */
   sign = 1;
   element = h(
     "div",
@@ -68,12 +69,12 @@ export class StageTools extends EventTarget {
     rove(this.element);
   }
 
-  /** Of the masks, 0 to 1. */
+  /** Opacity of the masks, 0 to 1. */
   get opacity() {
     return Number(this.#opacity.value) / 100;
   }
 
-  /** What a click does is the other thing now. */
+  /** Switch clicks between adding and taking away. */
   switchSign() {
     this.#mean(this.sign === 1 ? 0 : 1);
   }

@@ -1,4 +1,4 @@
-/** One line over the frame: what a click would do now. Those who have made a few objects know. */
+/** One-line hint over the frame on what a click does now; hidden once a few objects exist. */
 
 import { h } from "../dom.js";
 
