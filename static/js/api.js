@@ -18,7 +18,7 @@ export class ApiError extends Error {
   /**
    * @param {number} status 0 when the server could not be reached
    * @param {Omit<ErrorBody, "current"> & { current?: unknown }} body
-   * @param {number | null} retryMs when it may be tried again, where the server says so
+   * @param {number | null} retryMs time until a retry, if the server sent Retry-After
    */
   constructor(status, body, retryMs = null) {
     super(body.message);
@@ -29,12 +29,12 @@ export class ApiError extends Error {
     this.retryMs = retryMs;
   }
 
-  /** Whether nobody answered for the server: not it, or only what stands before it. */
+  /** Whether the server could not be reached: no response, or only one of a proxy in front of it. */
   get unreachable() {
     return this.status === 0 || (this.kind === "internal" && [502, 503, 504].includes(this.status));
   }
 
-  /** Whether the same change may go through a little later: the machine is busy or full, or the same was tried too often. */
+  /** Whether a retry may succeed later: the server is unreachable, busy or full, or there were too many requests. */
   get later() {
     return this.unreachable || [429, 507].includes(this.status) || (this.kind === "environment" && this.status === 503);
   }
@@ -90,7 +90,7 @@ const send = async (method, path, json = {}) => (await call(path, { method, json
 /** @param {number} ms @returns {Promise<void>} */
 const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 /**
- * Ask for heavy work until it is taken on; that it waits is said in the corner of the page.
+ * Retry a request for heavy work until the server accepts it; a notice in the corner of the page shows the wait.
  * @template T
  * @param {() => Promise<T>} ask
  * @param {(error: ApiError) => void} [told]
@@ -105,7 +105,7 @@ const takenOn = (ask, told = (error) => window.dispatchEvent(new CustomEvent("r2
 const of = (id) => `/api/projects/${encodeURIComponent(id)}`;
 
 /**
- * Send a change; the server does it once however often it comes with the same key, and only for the person who made it.
+ * Send a change; the server applies it once, however often it is sent with the same key, and only for the user who made it.
  * @param {string} method
  * @param {string} path
  * @param {Record<string, unknown>} json
@@ -117,11 +117,11 @@ export const perform = async (method, path, json, key, person) => {
   const whose = { "Idempotency-Key": key, ...(person && { "X-R2C2R-Person": encodeURIComponent(person) }) };
   const response = await call(path, { method, json, headers: whose });
   return response.json().catch(() => {
-    throw new ApiError(0, OFFLINE); // cut off while it was said: to be asked again
+    throw new ApiError(0, OFFLINE); // response cut off: to be requested again
   });
 };
 
-/** @param {string} name @param {string} password @param {(error: ApiError) => void} told while it waits for its turn */
+/** @param {string} name @param {string} password @param {(error: ApiError) => void} told called when it first has to wait */
 export const signIn = (name, password, told) =>
   takenOn(() => call("/api/login", { method: "POST", json: { name, password } }), told);
 export const signOut = () => call("/api/logout", { method: "POST", json: {} });
@@ -155,7 +155,7 @@ export const makeSample = (request) => send("POST", "/api/projects/sample", requ
 export const changeProject = (id, patch) => send("PATCH", of(id), patch);
 /** @param {string} id @param {ReadingIn} how @returns {Promise<Project>} */
 export const readAgain = (id, how) => send("PUT", `${of(id)}/reading`, how);
-/** Into the trash. @param {string} id @returns {Promise<Trashed>} */
+/** Move a project to the trash. @param {string} id @returns {Promise<Trashed>} */
 export const deleteProject = (id) => send("DELETE", of(id));
 /** @param {string} id @returns {Promise<Project>} */
 export const duplicateProject = (id) => send("POST", `${of(id)}/duplicate`);
@@ -193,7 +193,7 @@ export const listOpinions = (id, signal) => get(`${of(id)}/opinions`, signal);
 export const askOpinion = (id, name) => takenOn(() => send("POST", `${of(id)}/opinions`, { name }));
 /** @param {string} id @param {string} other @returns {Promise<Agreement>} */
 export const getAgreement = (id, other) => takenOn(() => get(`${of(id)}/opinions/${encodeURIComponent(other)}`));
-/** Where it is downloaded. @param {string} id @param {string} other */
+/** Download address of the agreement table. @param {string} id @param {string} other */
 export const agreementTable = (id, other) => `${of(id)}/opinions/${encodeURIComponent(other)}/agreement.csv`;
 /** @param {AbortSignal} [signal] @returns {Promise<Template[]>} */
 export const listTemplates = (signal) => get("/api/templates", signal);
@@ -211,7 +211,7 @@ export const getMembers = (id, signal) => get(`${of(id)}/members`, signal);
 export const setMembers = (id, members) => send("PUT", `${of(id)}/members`, members);
 /** @param {AbortSignal} [signal] @returns {Promise<Inbox>} */
 export const getInbox = (signal) => get("/api/inbox", signal);
-/** Who can be named in a project. @param {string} id @returns {Promise<string[]>} */
+/** Names of the people who can be mentioned or assigned in a project. @param {string} id @returns {Promise<string[]>} */
 export const listNames = (id) => get(`${of(id)}/people`);
 /** @param {string} id @param {string | null} name @returns {Promise<Project>} */
 export const assignProject = (id, name) => send("PUT", `${of(id)}/assignee`, { name });
@@ -219,7 +219,7 @@ export const assignProject = (id, name) => send("PUT", `${of(id)}/assignee`, { n
 export const assignObject = (id, object, name) => send("PATCH", `${of(id)}/objects/${object}`, { assignee: name });
 /** @param {string} id @param {AbortSignal} [signal] @returns {Promise<News>} */
 export const getNews = (id, signal) => get(`${of(id)}/news`, signal);
-/** @param {string} id @param {number} event up to which they were read @returns {Promise<News>} */
+/** @param {string} id @param {number} event last one read @returns {Promise<News>} */
 export const markSeen = (id, event) => send("PUT", `${of(id)}/news`, { event });
 /** @param {string} id @returns {Promise<FrameInfo[]>} */
 export const listFrames = (id) => get(`${of(id)}/frames`);
@@ -241,11 +241,11 @@ export const listUploads = () => get("/api/uploads");
 export const cancelUpload = (id) => call(`/api/uploads/${id}`, { method: "DELETE" });
 
 /**
- * Upload a recording in pieces, from where an earlier upload of the same file stopped; a lost connection is waited out.
+ * Upload a recording in pieces, resuming an earlier upload of the same file; a lost connection is retried.
  * @param {File} file
  * @param {(fraction: number, waiting: boolean) => void} onProgress
- * @param {AbortSignal} signal ends it; what arrived stays, to go on with
- * @param {string} [project] that has no recording, and is given this one
+ * @param {AbortSignal} signal aborts the upload; the server keeps the part it has received, for resuming
+ * @param {string} [project] project without a recording, which receives this one
  * @returns {Promise<Project>}
  */
 export async function uploadRecording(file, onProgress, signal, project) {
@@ -373,9 +373,14 @@ export const openViewer = (id) => takenOn(() => send("POST", `${of(id)}/viewer`)
 export const showInViewer = (id, what) => takenOn(() => send("POST", `${of(id)}/viewer/show`, what));
 /** @param {string} id @param {Record<string, number>} values @returns {Promise<ViewerShown>} */
 export const moveJoints = (id, values) => takenOn(() => send("POST", `${of(id)}/viewer/joints`, { values }));
-/** Put what is being moved in the 3D view somewhere; with null, learn where it was dragged. @param {string} id @param {number[][] | null} pose @returns {Promise<ViewerPlaced>} */
+/**
+ * Place the object being moved in the 3D view; with null, return where it was dragged.
+ * @param {string} id
+ * @param {number[][] | null} pose
+ * @returns {Promise<ViewerPlaced>}
+ */
 export const placeInViewer = (id, pose) => takenOn(() => send("POST", `${of(id)}/viewer/place`, { pose }));
 /** @param {string} id @returns {Promise<import("./api-types").ViewerCamera>} */
 export const getViewerCamera = (id) => takenOn(() => get(`${of(id)}/viewer/camera`));
-/** What the last click in the 3D view was on. @param {string} id @returns {Promise<ViewerPicked>} */
+/** Target of the last click in the 3D view. @param {string} id @returns {Promise<ViewerPicked>} */
 export const getPicked = (id) => takenOn(() => get(`${of(id)}/viewer/picked`));

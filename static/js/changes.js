@@ -1,6 +1,6 @@
 /**
- * Changes that must not get lost, as data: the outbox keeps each of them until the server has answered it.
- * An object that the server has not named yet is `{key}` of the change that makes it.
+ * Changes that must not be lost, as data: the outbox keeps each of them until the server has answered it.
+ * An object without an id from the server yet is referred to as `{key}`, the key of the change that creates it.
  */
 
 /** @import {
@@ -8,7 +8,7 @@
  * } from "./api-types" */
 
 /**
- * `seen` is what the person saw of the fields set: should somebody else have changed them, only what disagrees is asked about.
+ * `seen` holds the changed fields as the user saw them: on a conflict, only fields that disagree are asked about.
  * @template [T=unknown]
  * @typedef {{ method: string, path: string, json: Record<string, unknown>, seen?: Record<string, unknown>, answer?: T }} Change
  */
@@ -18,7 +18,7 @@
 const at = (project) => `/api/projects/${encodeURIComponent(project)}`;
 /** @param {string} project @param {Ref} object */
 const on = (project, object) => `${at(project)}/objects/${object}`;
-/** The object that a change is of; NaN where the server has not named it. @param {Change} change */
+/** Id of the object that a change applies to; NaN if the server has not assigned one yet. @param {Change} change */
 export const objectOf = ({ path }) => Number(/\/objects\/(\d+)/.exec(path)?.[1]);
 /** @param {object} json @returns {Record<string, unknown>} */
 const body = (json) => ({ ...json });
@@ -37,7 +37,7 @@ export const changeObject = (project, seen, wanted) => ({
   seen: { name: seen.name, category: seen.category, assignee: seen.assignee },
 });
 /**
- * A drawn front, or what it is called. `version`, of an object that is stored, is what it will be once changes before it are.
+ * Change of a drawn front or its name. `version`: for a stored object, its version once earlier changes are stored.
  * @param {string} project
  * @param {Ref} object
  * @param {Partial<ObjectPatch>} wanted
@@ -102,7 +102,7 @@ export const cancelSegment = (project, object) => ({
   json: {},
 });
 /**
- * Where `version` is given, nothing is taken back that somebody said since.
+ * Undo or redo of a change. With `version`, the server refuses if another user has changed the object since.
  * @param {string} project
  * @param {"undo" | "redo"} which
  * @param {UndoRequest} wanted
@@ -113,7 +113,12 @@ export const undoRedo = (project, which, wanted) => ({
   path: `${at(project)}/${which}`,
   json: body(wanted),
 });
-/** @param {string} project @param {string[]} ids @param {string} [category] of all, else as proposed @returns {Change<SceneObject[]>} */
+/**
+ * @param {string} project
+ * @param {string[]} ids
+ * @param {string} [category] for all of them; without it, as proposed
+ * @returns {Change<SceneObject[]>}
+ */
 export const confirmProposals = (project, ids, category) => ({
   method: "POST",
   path: `${at(project)}/proposals/confirm`,
@@ -140,7 +145,7 @@ export const changeOverride = (project, seen, patch) => ({
   seen: body(seen.override),
 });
 /**
- * What a run made from the scan and nobody clicked, by its name in the scene.
+ * Correction of an object that a run made from the scan without clicks, addressed by its name in the scene.
  * @param {string} project
  * @param {{ run_name: string, override?: import("./api-types").OverrideData }} seen
  * @param {Partial<OverridePatch>} patch
@@ -152,7 +157,7 @@ export const changeMade = (project, seen, patch) => ({
   json: { ...patch },
   seen: body(seen.override ?? {}),
 });
-/** What people said of an object's candidates. @param {CandidateGroup} group */
+/** Verdicts given on an object's candidates, as text. @param {CandidateGroup} group */
 export const verdictOf = (group) =>
   group.candidates
     .filter(({ verdict }) => verdict)

@@ -1,4 +1,4 @@
-/** Two people changed one thing: ask only about what really disagrees, and say what is to be stored then. */
+/** Resolution of conflicting changes by two users: asks only about fields that disagree, and returns the change to store. */
 
 import { verdictOf } from "./changes.js";
 import { askToMerge } from "./elements/merge-dialog.js";
@@ -8,7 +8,7 @@ import { disagreements } from "./lib/merge.js";
 /** @typedef {import("./api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("./api-types").PromptsFileFrontOutput} PromptsFileFrontOutput */
 /** @typedef {Record<string, unknown>} Fields */
-/** @typedef {{ version: number, name?: string, override?: Fields, group?: CandidateGroup }} Stored what a 409 brings */
+/** @typedef {{ version: number, name?: string, override?: Fields, group?: CandidateGroup }} Stored content of a 409 response */
 
 /** @type {Record<string, string>} */
 const LABELS = {
@@ -29,7 +29,7 @@ const LABELS = {
 };
 
 /**
- * The change to send instead; null when the other's is to stay as it is.
+ * Change to send instead; null to leave the other user's as it is.
  * @param {Change} change
  * @param {unknown} current what is stored now
  * @returns {Promise<Change | null>}

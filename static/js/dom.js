@@ -1,7 +1,7 @@
-/** Small helpers around the DOM. Text enters by textContent, never as markup. */
+/** Small DOM helpers. Text is inserted with textContent, never as markup. */
 
 /**
- * Make an element: properties are set, `on…` functions become listeners, dashed names and a few more become attributes.
+ * Create an element: properties are set, `on…` functions become listeners, dashed names and a few more become attributes.
  * @template {keyof HTMLElementTagNameMap} K
  * @param {K} tag
  * @param {Record<string, unknown>} [props]
@@ -68,7 +68,7 @@ export function numberField(text, value, options) {
 }
 
 /**
- * Buttons of which one or some are pressed, as one control.
+ * Segmented control: a group of toggle buttons, one or several of them pressed.
  * @param {string} label
  * @param {...HTMLElement} buttons
  */
@@ -76,7 +76,7 @@ export function segments(label, ...buttons) {
   return h("div", { class: "segments", role: "group", "aria-label": label }, ...buttons);
 }
 
-/** Bring a line into sight in the list that scrolls around it; where the whole page scrolls, what somebody looks at stays. @param {Element | null} line */
+/** Scroll a row into view within its scrolling list; the page itself is not scrolled. @param {Element | null} line */
 export function reveal(line) {
   const around = line?.closest(".scrolled");
   if (!line || !around || around.scrollHeight <= around.clientHeight) return;
@@ -86,7 +86,7 @@ export function reveal(line) {
 }
 
 /**
- * A slider with its name before it, which goes where there is no room.
+ * A slider with its name before it, which is hidden where there is no room.
  * @param {string} text
  * @param {HTMLInputElement} input that has a label of its own
  */
@@ -94,9 +94,9 @@ export function slider(text, input) {
   return h("label", { class: "slider", title: text }, h("span", {}, text), input);
 }
 
-/** What a pointer is held down on. @type {Node | null} */
+/** Button, link or summary on which a pointer is held down. @type {Node | null} */
 let pressed = null;
-/** The children that wait until it is released, by their parent. @type {Map<HTMLElement, (Node | string)[]>} */
+/** Children to be inserted once it is released, by their parent. @type {Map<HTMLElement, (Node | string)[]>} */
 const waiting = new Map();
 
 addEventListener(
@@ -105,8 +105,8 @@ addEventListener(
   true,
 );
 for (const type of ["pointerup", "pointercancel"]) addEventListener(type, () => setTimeout(release), true); // after its click
-addEventListener("click", () => (pressed = null), true); // what its click changes is drawn at once
-addEventListener("blur", release); // the window's: a release outside is not heard
+addEventListener("click", () => (pressed = null), true); // changes made by the click are drawn at once
+addEventListener("blur", release); // of the window: a release outside it fires no event
 
 function release() {
   pressed = null;
@@ -116,9 +116,9 @@ function release() {
 }
 
 /**
- * New children in the place of the old ones. Who was at one of them by keyboard, or at a field at all, stays where they were: at the
- * one with the same `data-at`, "what:which", else at the next of the same "what"; and what was selected of a text still is.
- * While a button in the parent is held down it waits: a browser clicks only what is there from press to release.
+ * Replace the children of an element. Keyboard focus, or any focus in a field, moves to the child with the same `data-at`,
+ * "what:which", else to the next one of the same "what"; a text selection is restored. While a button in the parent is held
+ * down, the replacement waits: a browser fires a click only on an element that is present from press to release.
  * @param {HTMLElement} parent
  * @param {...(Node | string)} children
  */
@@ -166,7 +166,7 @@ export class LiveElement extends HTMLElement {
   connected() {}
 
   /**
-   * Tell the parents.
+   * Dispatch an event that bubbles to the parents.
    * @param {string} type
    * @param {unknown} [detail]
    */
@@ -176,7 +176,7 @@ export class LiveElement extends HTMLElement {
 }
 
 /**
- * What a person does on a canvas that fills its element, and every change of that element's size, while it is on the page.
+ * Listen to pointer and wheel events of a canvas, and to size changes of the element it fills, while that is on the page.
  * @param {LiveElement} element
  * @param {HTMLCanvasElement} canvas
  * @param {{
@@ -198,7 +198,7 @@ export function wire(element, canvas, { down, move, up, cancel, wheel, resized }
 }
 
 /**
- * The detail of one of our events.
+ * The detail of a custom event.
  * @template T
  * @param {Event} event
  * @returns {T}

@@ -1,10 +1,10 @@
-/** Key presses: whose they are, and what a page does for its own. */
+/** Keyboard shortcuts: commands of a page, and tests whether a key press belongs to it. */
 
 import { actionOf } from "./lib/keymap.js";
 
-/** @typedef {Record<string, (key: string, fine: boolean) => void>} Actions what a page can be asked to do, by the names of the keymap */
+/** Actions of a page by their names in the keymap. @typedef {Record<string, (key: string, fine: boolean) => void>} Actions */
 
-/** What a page can be asked to do, by a key or from the palette. */
+/** Commands of a page, run by a key or from the palette. */
 export class Commands {
   #page;
   #actions;
@@ -13,7 +13,7 @@ export class Commands {
   /**
    * @param {string} page
    * @param {Actions} actions
-   * @param {string[]} [once] what a key held down must not do again and again
+   * @param {string[]} [once] actions that do not repeat while their key is held down
    */
   constructor(page, actions, once = []) {
     this.#page = page;
@@ -30,7 +30,7 @@ export class Commands {
     this.#actions[action]?.(key, fine);
   }
 
-  /** Do what the key means on this page, if anything. @param {KeyboardEvent} event */
+  /** Run the action of a key on this page, if it has one. @param {KeyboardEvent} event */
   press(event) {
     const action = actionOf(event, this.#page, plainKeys());
     if (!action || !this.#actions[action]) return;
@@ -39,7 +39,7 @@ export class Commands {
   }
 }
 
-/** Whether a key press is for the page: nobody types, uses a control by keyboard or answers a dialog. @param {KeyboardEvent} event */
+/** Whether a key press is for the page: not for a text field, a focused control or a dialog. @param {KeyboardEvent} event */
 export function isForPage(event) {
   return !isTyping(event) && !isOperating(event) && !document.querySelector("dialog[open]");
 }
@@ -55,7 +55,10 @@ export function isTyping(event) {
 
 const SLIDER_KEYS = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End"];
 
-/** Whether a key press is for the control that was reached by keyboard: Enter on a button, an arrow on a slider. @param {KeyboardEvent} event */
+/**
+ * Whether a key press is for a control focused by keyboard: Enter on a button, an arrow on a slider.
+ * @param {KeyboardEvent} event
+ */
 function isOperating(event) {
   const target = event.composedPath()[0];
   if (!(target instanceof Element) || !target.matches(":focus-visible")) return false;
@@ -65,7 +68,7 @@ function isOperating(event) {
 
 const PLAIN_KEYS = "plain-keys";
 
-/** Whether a letter alone is a command (WCAG 2.1.4 asks for a way to turn that off). */
+/** Whether single letters are commands (WCAG 2.1.4 requires a way to turn that off). */
 export function plainKeys() {
   return localStorage.getItem(PLAIN_KEYS) !== "off";
 }

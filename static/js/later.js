@@ -1,4 +1,4 @@
-/** The pages and what they are made of, each fetched when a page first needs it; the HTML asks for those of the first page at once. */
+/** Lazy loading of pages and their elements when first needed; the HTML preloads those of the first page. */
 
 /** @type {Record<string, () => Promise<CustomElementConstructor>>} */
 const ELEMENTS = {
@@ -44,7 +44,7 @@ const ELEMENTS = {
   "r2c2r-webhooks": async () => (await import("./pages/webhooks.js")).WebhooksPage,
 };
 
-/** What a page is made of beside itself. @type {Record<string, string[]>} */
+/** Elements that a page uses. @type {Record<string, string[]>} */
 const PARTS = {
   annotate: ["film-strip", "frame-canvas", "object-list", "proposal-list", "mosaic", "object-cloud", "comments"],
   download: ["job", "variants"],
@@ -67,11 +67,11 @@ const PARTS = {
   run: ["job"],
 };
 
-/** The style sheet of one page alone. @type {Record<string, string>} */
+/** Style sheets used by a single page. @type {Record<string, string>} */
 const STYLES = { elevation: "elevation", review: "compare" };
 
 /**
- * Fetch a page that is not here yet; null when there is nothing to wait for.
+ * Load a page that is not loaded yet; null if there is nothing to wait for.
  * @param {string} page
  * @returns {Promise<void> | null}
  */
@@ -81,7 +81,11 @@ export function fetched(page) {
   return Promise.all([fetchAll(tags), styled(STYLES[page])]).then(() => {});
 }
 
-/** Add a style sheet, and wait for it: without it a page would be drawn twice. @param {string | undefined} name @returns {Promise<void>} */
+/**
+ * Add a style sheet and wait for it: without it, a page would be drawn twice.
+ * @param {string | undefined} name
+ * @returns {Promise<void>}
+ */
 function styled(name) {
   const href = `/static/css/${name}.css`;
   if (!name || document.querySelector(`link[href="${href}"]`)) return Promise.resolve();
@@ -92,7 +96,7 @@ function styled(name) {
   });
 }
 
-/** Define them in this order: a page makes its parts. @param {string[]} tags */
+/** Load elements and define them in this order: a page creates its parts. @param {string[]} tags */
 async function fetchAll(tags) {
   const found = await Promise.all(tags.map((tag) => ELEMENTS[tag]?.()));
   for (const [k, element] of found.entries()) {

@@ -1,10 +1,10 @@
-/** One WebSocket per tab: job progress, masks, saved objects. Messages arrive as events named by their type. */
+/** WebSocket of the tab for job progress, masks and saved objects. Dispatches each message as an event named by its type. */
 
 /** @typedef {{ type: string, seq?: number, [key: string]: unknown }} Message */
 
 const SESSION_ENDED = 4401;
 const TOO_MANY_TABS = 4429;
-const CROWDED_MS = 15_000; // until a tab too many asks again
+const CROWDED_MS = 15_000; // until a tab refused as one too many tries again
 
 class Live extends EventTarget {
   /** @type {WebSocket | null} */
@@ -18,19 +18,19 @@ class Live extends EventTarget {
   #seq = 0;
   #wait = 500;
 
-  /** Whether the server hears us. */
+  /** Whether the connection is open. */
   get connected() {
     return this.#socket?.readyState === WebSocket.OPEN;
   }
 
-  /** Why the server keeps no connection to this tab; empty when it does, or does not answer. */
+  /** Reason why the server refuses a connection to this tab; empty if it does not, or does not answer. */
   refusal = "";
 
-  /** What the server calls this tab. */
+  /** Id that the server gave this tab. */
   tab = "";
 
   /**
-   * Look at a project; null for none.
+   * Subscribe to a project; null for none.
    * @param {string | null} project
    */
   watch(project) {
@@ -40,7 +40,7 @@ class Live extends EventTarget {
   }
 
   /**
-   * Be at a page and on an object, for the others to see.
+   * Report the page and the object that this user is on, for others to see.
    * @param {string} page
    * @param {number | null} object
    */

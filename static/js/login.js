@@ -1,4 +1,4 @@
-/** The sign-in page: a password becomes a session, and the page that was asked for opens. */
+/** Sign-in page: exchanges a password for a session, then opens the requested page. */
 
 import { ApiError, signIn } from "./api.js";
 import { nextPage } from "./lib/next-page.js";
@@ -10,7 +10,7 @@ if (theme) document.documentElement.dataset.theme = theme;
 
 if (new URLSearchParams(location.search).has("token")) {
   /** @type {HTMLElement} */ (document.querySelector("#used")).hidden = false;
-  history.replaceState(null, "", "/login"); // the key leaves the address, and the next reload asks for no key
+  history.replaceState(null, "", "/login"); // remove the key from the address, so that a reload does not use it again
 }
 
 const provider = /** @type {HTMLAnchorElement} */ (document.querySelector("#provider"));
@@ -21,7 +21,7 @@ form.addEventListener("submit", async (event) => {
   event.preventDefault();
   const said = new FormData(form);
   const button = /** @type {HTMLButtonElement} */ (form.querySelector("button"));
-  button.disabled = true; // after wrong passwords the answer takes its time
+  button.disabled = true; // after wrong passwords the server delays its response
   alertLine.textContent = "Signing in…";
   const waits = (/** @type {ApiError} */ error) =>
     (alertLine.textContent = `${error.message}: retrying in ${Math.ceil((error.retryMs ?? 0) / 1000)} s`);

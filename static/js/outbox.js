@@ -1,9 +1,9 @@
 /**
- * Changes on their way to the server, one after the other. Each is kept in the browser's storage until it is answered, so that
- * neither a lost connection nor a closed tab loses any; its key lets the server do it once however often it is sent. A tab sends
- * its own, and those of tabs that are gone.
- * Says "change" whenever the number of waiting ones or the state does, "caught-up" when those of another tab are stored, "refused"
- * {detail: error} when one of them is not.
+ * Queue of changes, sent to the server one at a time. Each is kept in the browser's storage until it is answered, so that
+ * neither a lost connection nor a closed tab loses any; its key lets the server apply it once, however often it is sent. A tab
+ * sends its own changes, and those of closed tabs.
+ * Emits "change" when the number of waiting changes or the state changes, "caught-up" when changes of another tab are stored,
+ * "refused" {detail: error} when one of those is refused.
  */
 
 import { ApiError, perform } from "./api.js";
@@ -24,15 +24,18 @@ const NOT_MADE = { kind: "not-made", message: "the object of this click could no
 export class Outbox extends EventTarget {
   #chain = Promise.resolve();
   #tabs;
-  /** Whose changes these are; null while it is not known. @type {string | null} */
+  /** User who makes these changes; null while unknown. @type {string | null} */
   #user = null;
   /** @type {Kept[]} */
   #waiting = [];
-  /** What to send instead of a change that somebody else's disagrees with; null lets theirs stand. @type {(change: Kept, stored: unknown) => Promise<Change<unknown> | null>} */
+  /**
+   * Returns what to send instead of a change that conflicts with another user's; null keeps theirs.
+   * @type {(change: Kept, stored: unknown) => Promise<Change<unknown> | null>}
+   */
   merge = async () => null;
-  /** Whether the server did not answer last time. */
+  /** Whether the last attempt failed and is being retried. */
   stuck = false;
-  /** Whether what waits would outlive this page. */
+  /** Whether waiting changes would survive closing this page. */
   safe = true;
 
   /** @param {Tabs} tabs */
@@ -48,7 +51,7 @@ export class Outbox extends EventTarget {
   }
 
   /**
-   * Know whose changes these are, and send what earlier visits of that person left.
+   * Set the user of these changes, and send those left by earlier visits of that user.
    * @param {string} user
    */
   begin(user) {
@@ -57,14 +60,14 @@ export class Outbox extends EventTarget {
     this.#inherit();
   }
 
-  /** What other tabs of this person keep is sent here once they are gone. */
+  /** Send the changes of the user's other tabs once those are closed. */
   #inherit() {
     if (this.#user === null) return;
     for (const { tab } of keptBy(localStorage, this.#user))
       this.#tabs.whenGone(tab, () => Promise.all(this.#left(tab).map((change) => this.#sendLeft(change))));
   }
 
-  /** What that tab left. @param {string} tab */
+  /** Changes left by a tab. @param {string} tab */
   #left(tab) {
     const here = new Set(this.#waiting.map(({ key }) => key));
     return keptBy(localStorage, this.#user ?? "").filter((change) => change.tab === tab && !here.has(change.key));
@@ -79,7 +82,7 @@ export class Outbox extends EventTarget {
   }
 
   /**
-   * Send a change after those before it; resolves with what the server said, rejects with what it refused.
+   * Queue a change; resolves with the server's response, rejects with its error.
    * @template T
    * @param {Change<T>} change
    * @param {string} [key]
@@ -99,7 +102,7 @@ export class Outbox extends EventTarget {
     return change;
   }
 
-  /** When everything that was said so far is stored or refused. */
+  /** Promise that resolves when every change queued so far is stored or refused. */
   get settled() {
     return this.#chain;
   }
@@ -124,12 +127,12 @@ export class Outbox extends EventTarget {
       this.#settle(change, answer);
       return answer;
     } catch (error) {
-      if (!(error instanceof ApiError && error.status === 401)) this.#settle(change, null); // after signing in it is sent
+      if (!(error instanceof ApiError && error.status === 401)) this.#settle(change, null); // 401: sent after signing in
       throw error;
     }
   }
 
-  /** Whether it is about an object whose making was refused. @param {Kept} change */
+  /** Whether a change is for an object whose creation was refused. @param {Kept} change */
   #isOrphan({ path }) {
     const maker = path.match(/\{(\w+)\}/)?.[1];
     return maker !== undefined && !this.#waiting.some(({ key }) => key === maker);
@@ -144,14 +147,14 @@ export class Outbox extends EventTarget {
       return await this.#persist(change);
     } catch (error) {
       if (!(error instanceof ApiError) || error.kind !== "conflict") throw error;
-      if (!error.current) this.dispatchEvent(new Event("caught-up")); // stored before the server stopped: look anew
+      if (!error.current) this.dispatchEvent(new Event("caught-up")); // stored before the server stopped: reload
       if (!error.current || !change.seen) throw error;
       const instead = await this.merge(change, error.current);
       return instead ? this.#answered({ ...change, ...instead, key: newKey() }) : error.current;
     }
   }
 
-  /** Until the server answers. @param {Kept} change */
+  /** Send a change, retried with increasing delay until the server answers. @param {Kept} change */
   async #persist({ key, method, path, json, user }) {
     for (let wait = FIRST_WAIT_MS; ; wait = Math.min(2 * wait, LONGEST_WAIT_MS)) {
       try {
@@ -195,7 +198,7 @@ export class Outbox extends EventTarget {
   }
 }
 
-/** What the server knows a change by; `crypto.randomUUID` is there on secure origins only. */
+/** Random key that identifies a change to the server; `crypto.randomUUID` exists on secure origins only. */
 export function newKey() {
   return [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 }
@@ -209,7 +212,7 @@ function now() {
 }
 
 /**
- * Until the live connection is back, at most that long.
+ * Wait until the live connection is back, or at most `wait` milliseconds.
  * @param {number} wait
  * @returns {Promise<void>}
  */

@@ -1,4 +1,4 @@
-/** Who else is at this project, and on which object: chips in the header. */
+/** Presence chips in the header: other people in this project, and the object each is on. */
 
 import { listObjects } from "./api.js";
 import { detailOf, h, LiveElement } from "./dom.js";
@@ -11,7 +11,7 @@ import { routeOf } from "./router.js";
 export class Presence extends LiveElement {
   /** @type {Here[]} */
   #people = [];
-  /** Of objects, by their numbers. @type {Map<number, string>} */
+  /** Names of objects by id. @type {Map<number, string>} */
   #names = new Map();
 
   connected() {
@@ -39,7 +39,7 @@ export class Presence extends LiveElement {
     live.stand(page, Number.isInteger(object) && object > 0 ? object : null);
   }
 
-  /** What the project's objects are called. @param {string} project */
+  /** Load the names of the project's objects. @param {string} project */
   async #learn(project) {
     const objects = await listObjects(project).catch(() => []);
     for (const { id, name } of objects) this.#names.set(id, name);

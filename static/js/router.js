@@ -1,8 +1,8 @@
-/** Addresses: which page shows, for which project, and what it should look at. */
+/** Router: page, project and query of an address, and navigation between pages. */
 
 /** @typedef {{ page: string, project: string | null, query: URLSearchParams }} Route */
 
-const ALONE = ["inbox", "people", "templates", "webhooks"]; // of no project
+const ALONE = ["inbox", "people", "templates", "webhooks"]; // pages outside a project
 const PAGES = ["annotate", "elevation", "run", "review", "download", "agreement"];
 
 /**
@@ -18,7 +18,7 @@ export function routeOf(address) {
 }
 
 /**
- * Follow links inside the app without reloading, and say when the page changes.
+ * Follow links inside the app without reloading, and call `show` when the page changes.
  * @param {(route: Route) => void} show
  */
 export function startRouter(show) {

@@ -1,10 +1,10 @@
-/** A change that is sent, and how it stands is said. */
+/** Saving of a change, with its state reported. */
 
 import { sayError } from "./elements/toasts.js";
 import { outbox } from "./outbox.js";
 
 /**
- * What the server refuses is said here, and thrown.
+ * Send a change; an error is shown as a toast and rethrown.
  * @template T
  * @param {import("./changes.js").Change<T>} change
  * @param {string | undefined} key
@@ -15,7 +15,7 @@ export async function saving(change, key, tell) {
   tell({ text: "saving…", tone: "" });
   try {
     const answer = await outbox.send(change, key);
-    if (!outbox.waiting) tell({ text: `saved ${new Date().toLocaleTimeString()}`, tone: "" }); // else more is on its way
+    if (!outbox.waiting) tell({ text: `saved ${new Date().toLocaleTimeString()}`, tone: "" }); // else more changes are waiting
     return answer;
   } catch (error) {
     tell({ text: "not saved", tone: "bad" });

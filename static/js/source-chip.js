@@ -1,4 +1,4 @@
-/** Where a number comes from: a word and a sign that differ for each, so that none is taken for another without its colour. */
+/** Chip for the source of a number, with a word and a sign of its own for each source, so that none relies on colour alone. */
 
 import { h } from "./dom.js";
 
@@ -13,7 +13,7 @@ const KINDS = {
 
 /**
  * @param {string} source
- * @param {{ of?: string, title?: string }} [about] what it is the source of, said before it
+ * @param {{ of?: string, title?: string }} [about] of: name of the value, shown before the source
  */
 export function sourceChip(source, { of = "", title = "" } = {}) {
   const { word, sign, title: meaning } = KINDS[source] ?? { word: source.replaceAll("_", " "), sign: "", title: "" };
@@ -21,5 +21,5 @@ export function sourceChip(source, { of = "", title = "" } = {}) {
   return h("span", { class: `chip source ${source}`, title: title || meaning }, text);
 }
 
-/** In words. @param {string} source */
+/** Word for a source. @param {string} source */
 export const sourceWord = (source) => KINDS[source]?.word ?? source.replaceAll("_", " ");

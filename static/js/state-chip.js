@@ -1,4 +1,4 @@
-/** Where a project stands on its way to approval, in a chip. */
+/** Chip with a project's state on its way to approval. */
 
 import { h } from "./dom.js";
 

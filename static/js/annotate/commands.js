@@ -152,7 +152,7 @@ function looks({ objects, masks, player, canvas, tools, evidence, mosaic, layout
  * @param {Pick<Doers, "player" | "objects">} doers
  * @param {string[]} categories
  * @param {(category: string) => void} categorise
- * @param {{ names: string[], assign: (name: string | null) => void }} people whom the chosen or selected objects may be assigned to
+ * @param {{ names: string[], assign: (name: string | null) => void }} people possible assignees of the changed objects
  * @returns {import("../lib/commands.js").Command[]}
  */
 export function offers(typed, { player, objects }, categories, categorise, { names, assign }) {
