@@ -1,11 +1,11 @@
-/** Answers to one question that is asked anew before it is answered: they may come in another order than they were asked for. */
+/** Responses to repeated requests, which may arrive in another order than they were sent. */
 
 export class Answers {
   #asked = 0;
   #taken = 0;
 
   /**
-   * Take an answer, unless one that was asked for later was taken already: it knows more.
+   * Take a response, unless that of a later request was taken already: it is newer.
    * @template T
    * @param {Promise<T>} answer
    * @param {(answer: T) => void} take

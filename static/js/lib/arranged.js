@@ -1,4 +1,4 @@
-/** Objects in the order in which one who stands in the room reads them: wall after wall to the right, columns from the top down; no DOM. */
+/** Reading order of objects as seen from inside the room: walls from left to right, columns from top to bottom; no DOM. */
 
 import { inOrder } from "./front-rows.js";
 
@@ -9,7 +9,7 @@ import { inOrder } from "./front-rows.js";
 const SAME_WALL = Math.cos((30 * Math.PI) / 180);
 
 /**
- * Those with a flat front first, the others as they come.
+ * Objects in reading order: those with a flat front first, the others in the given order.
  * @template {{ id: number }} T
  * @param {T[]} objects
  * @param {FoundFront[]} fronts
@@ -33,7 +33,7 @@ function placedFront({ object, corners_m }) {
   return { key: object, corner, width, height, right, down, away: cross(right, down) };
 }
 
-/** Fronts that face one way. @param {Placed[]} fronts @returns {Placed[][]} */
+/** Fronts grouped by the direction they face. @param {Placed[]} fronts @returns {Placed[][]} */
 function walls(fronts) {
   /** @type {Placed[][]} */
   const found = [];
@@ -45,7 +45,10 @@ function walls(fronts) {
   return found;
 }
 
-/** As one turns to the right, from the wall that has none to its left, or most room there. @param {Placed[][]} all */
+/**
+ * Walls in the order of a turn to the right, starting with the one that has no wall, or the widest gap, to its left.
+ * @param {Placed[][]} all
+ */
 function toTheRight(all) {
   const first = all[0]?.[0];
   if (!first) return [];
@@ -60,7 +63,7 @@ function toTheRight(all) {
   return [...turned.slice(start), ...turned.slice(0, start)].map(({ wall }) => wall);
 }
 
-/** By how much one turns to the right from one to the other. @param {Placed} from @param {Placed} to */
+/** Angle of the turn to the right from one front to another, in radians. @param {Placed} from @param {Placed} to */
 const turn = (from, to) => Math.atan2(dot(to.away, from.right), dot(to.away, from.away));
 
 /** @param {Placed[]} wall */

@@ -1,11 +1,11 @@
-/** What a person should know before a run: which objects would spoil it, on which frames that is seen. */
+/** Checks before a run: objects that would spoil it, each with a frame that shows the problem. */
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
 /** @typedef {import("../api-types").Lane} Lane */
 /** @typedef {import("./contradictions.js").Said} Said */
 /** @typedef {{ object: number, frame: number | null, text: string }} Told */
 
-const FRAMES = 12; // looked at: a front that is two objects is seen to be that on many
+const FRAMES = 12; // checked: a front that was clicked as two objects shows as such on many frames
 
 /**
  * Frames that together show each object, those that show most objects first.
@@ -32,7 +32,7 @@ export function framesToLook(lanes, most = FRAMES) {
 }
 
 /**
- * What spoils the run: each contradiction between two objects once, and what has no mask.
+ * Problems that would spoil the run: each contradiction between two objects once, and objects without clicks or masks.
  * @param {SceneObject[]} objects
  * @param {{ frame: number, said: Said[] }[]} looked by frame
  * @returns {Told[]}

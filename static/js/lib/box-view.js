@@ -1,4 +1,4 @@
-/** An object's box as a camera sees it. Matrices are rows of four, as the server sends them. */
+/** Projection of an object's box into a camera. Matrices are rows of four, as the server sends them. */
 
 /** @typedef {number[][]} Matrix */
 /** @typedef {{ fx: number, fy: number, cx: number, cy: number, camera_from_world: Matrix }} Camera */

@@ -1,12 +1,13 @@
-/** A box drawn around a thing, said in clicks: the one prompt that every segmenter understands. */
+/** Conversion of a drawn box to clicks, the one prompt that every segmenter understands. */
 
 /** @typedef {{ x: number, y: number }} At */
 
-const OUTSIDE = 0.08; // of the box's side: how far beside it "not this" is said
+const OUTSIDE = 0.08; // distance of negative clicks from the box, as a share of its side
 const LEAST_PX = 8;
 
 /**
- * Clicks that mean "what this box holds": its middle, and beside each side that the frame still shows. Null for a slip.
+ * Clicks for the content of a box: a positive one in its middle, negative ones beside its sides, where they lie in the frame.
+ * Null for a box too small to be intended.
  * @param {At} from
  * @param {At} to
  * @param {{ width: number, height: number, index: number }} frame

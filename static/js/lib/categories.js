@@ -1,12 +1,12 @@
-/** Categories as lists offer them; no DOM. */
+/** Grouping and order of categories in selection lists; no DOM. */
 
 /** @typedef {import("../api-types").Category} Category */
 
-/** How what is of a category opens, by its joint. */
+/** Way of opening, by joint type. */
 const OPENS = { revolute: "turns", prismatic: "slides", none: "does not open" };
 
 /**
- * Each category once, under the first of its names, by how it opens.
+ * Categories grouped by how they open, each once, under the first of its names.
  * @param {Category[]} categories
  * @returns {{ text: string, of: Category[] }[]}
  */
@@ -16,7 +16,7 @@ export function byOpening(categories) {
 }
 
 /**
- * Those that are used in this kitchen first, the most used at the head; then all others, synonyms last.
+ * Categories used in this kitchen first, most used at the top; then all others, synonyms last.
  * @param {Category[]} categories
  * @param {string[]} used one for each object
  * @returns {Category[]}

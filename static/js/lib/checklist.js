@@ -1,11 +1,11 @@
-/** Objects that are to be clicked, and lists of them as text; no DOM. */
+/** Checklist of objects to be clicked, and its form as text; no DOM. */
 
 import { usableName } from "./format.js";
 
 /** @typedef {{ name: string, category: string }} Listed */
 
 /**
- * Those whose name no object has yet.
+ * Entries whose name no object has yet.
  * @param {Listed[]} checklist
  * @param {{ name: string }[]} objects
  */
@@ -15,7 +15,7 @@ export function remaining(checklist, objects) {
 }
 
 /**
- * The first one left after another of the list, else the first one left.
+ * First remaining entry after the given one, else the first remaining entry.
  * @param {Listed[]} checklist
  * @param {Listed[]} left
  * @param {string | null} name
@@ -26,12 +26,16 @@ export function following(checklist, left, name) {
   return checklist.find((entry, k) => k > at && names.has(entry.name)) ?? left[0] ?? null;
 }
 
-/** A line each: its name, a comma, its category. @param {Listed[]} objects */
+/** Checklist as text: a line per object with its name, a comma and its category. @param {Listed[]} objects */
 export function asText(objects) {
   return objects.map(({ name, category }) => `${name}, ${category}`).join("\n");
 }
 
-/** What a person wrote: a name a line, then its category; without one its name says it, as far as it is no number. @param {string} text @returns {Listed[]} */
+/**
+ * Parse a typed checklist: a name per line, then its category; without one, the name without its number is the category.
+ * @param {string} text
+ * @returns {Listed[]}
+ */
 export function fromText(text) {
   return text.split("\n").flatMap((line) => {
     const [first = "", ...rest] = line.split(/[,;\t]/);

@@ -1,4 +1,4 @@
-/** Colours as the page writes them, and which of a light and a dark text is the better to read on one. */
+/** Colours as hexadecimal text, and the choice of light or dark text for the better contrast on one. */
 
 import { rgbOf } from "./masks.js";
 
@@ -11,7 +11,7 @@ export function inkOn(colour) {
   return contrast(ground, luminance(LIGHT)) > contrast(ground, luminance(DARK)) ? LIGHT : DARK;
 }
 
-/** #rrggbb of three shares from 0 to 1. @param {number[]} shares */
+/** Colour #rrggbb of three components from 0 to 1. @param {number[]} shares */
 export function hexOf(shares) {
   return `#${shares
     .map((share) =>

@@ -1,9 +1,9 @@
-/** Commands of the palette: found by the letters typed, best first. */
+/** Search over the commands of the palette. */
 
 /** @typedef {{ text: string, keys?: string, run: () => void }} Command */
 
 /**
- * Commands that hold all words typed; those that begin with them first.
+ * Commands that contain all typed words, those that begin with them first.
  * @param {Command[]} commands
  * @param {string} typed
  */
@@ -17,7 +17,7 @@ export function ranked(commands, typed) {
 }
 
 /**
- * 0 for a word at the start, 1 at the start of a word, 2 anywhere; null when one is missing.
+ * Sum over the words, lowest best: 0 at the start of the text, 1 at the start of a word, 2 elsewhere; null if one is missing.
  * @param {string} text
  * @param {string[]} words
  */

@@ -1,21 +1,25 @@
 /**
- * Which masks of one frame contradict each other or their clicks. Masks are of what is visible, so that a pixel belongs to one
- * object. The run judges the same over many frames (r2c2r_core/segment/contradictions.py, where the figures come from).
+ * Contradictions of masks of one frame with each other or with their clicks. Masks cover what is visible, so that a pixel
+ * belongs to one object. The run checks the same over many frames (r2c2r_core/segment/contradictions.py, the source of the
+ * thresholds).
  */
 
 import { decodeBox } from "./masks.js";
 
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {{ x: number, y: number, label: number }} Click in pixels of the mask */
-/** @typedef {{ object: number, name: string, mask: MaskBits, pixels: Uint8Array, clicks: Click[] }} Shown pixels: of the mask's box */
-/** @typedef {{ object: number, text: string, other?: number, mergesWith?: { object: number, name: string } }} Said other: whose mask it shares pixels with */
+/** @typedef {{ object: number, name: string, mask: MaskBits, pixels: Uint8Array, clicks: Click[] }} Shown pixels: of the box */
+/**
+ * Contradiction of an object; `other` is the object whose mask shares pixels with its mask.
+ * @typedef {{ object: number, text: string, other?: number, mergesWith?: { object: number, name: string } }} Said
+ */
 
 const OVERLAP = 0.1; // of the smaller mask
 const SAME = 0.5;
 const NEAR = 0.01; // of the image's width: a click this near to a mask is on it
 
 /**
- * The masks of a frame as contradictions are found in them.
+ * Masks of a frame, decoded, with the clicks of their objects there.
  * @param {{ object: import("../api-types").SceneObject, mask: MaskBits }[]} masks
  * @param {{ index: number, width: number }} frame
  * @returns {Promise<Shown[]>}
@@ -34,7 +38,7 @@ export function shownOn(masks, { index, width }) {
 
 /**
  * @param {Shown[]} shown on one frame
- * @returns {Said[]} each line about one object
+ * @returns {Said[]} each about one object
  */
 export function contradictionsOn(shown) {
   const pairs = shown.flatMap((first, k) => shown.slice(k + 1).flatMap((second) => between(first, second)));
@@ -42,7 +46,7 @@ export function contradictionsOn(shown) {
 }
 
 /**
- * Objects that were clicked on a frame and have no mask there, though all their masks are found.
+ * Objects that were clicked on a frame but have no mask there, although segmentation is done.
  * @param {import("../api-types").SceneObject[]} objects
  * @param {number} frame
  * @param {(object: number) => boolean} isSeen whether it has a mask on the frame
@@ -52,7 +56,7 @@ export function unseenOn(objects, frame, isSeen) {
   return objects
     .filter(({ id, segment, points, frames }) => {
       const clicked = points.some((point) => point.frame === frame && point.label === 1);
-      const corrected = frames.some((said) => said.frame === frame); // a person said what is visible there
+      const corrected = frames.some((said) => said.frame === frame); // a user corrected the mask there
       return segment === "done" && clicked && !corrected && !isSeen(id);
     })
     .map(({ id }) => ({
@@ -108,7 +112,7 @@ function disobeyed({ object, mask, pixels, clicks }) {
 const count = (pixels) => pixels.reduce((sum, pixel) => sum + pixel, 0);
 
 /**
- * Pixels in both.
+ * Number of pixels in both masks.
  * @param {Shown} first
  * @param {Shown} second
  */

@@ -1,10 +1,10 @@
-/** What is copied from one object to others of its kind: how it opens, never where it is or how large; no DOM. */
+/** Corrections copied from one object to others of its kind: how it opens and its colour, never its place or size; no DOM. */
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").OverridePatch} OverridePatch */
 
 /**
- * What people said of an object that others of its kind may take over.
+ * Corrections of an object that others of its kind may adopt.
  * @param {CandidateGroup} from
  * @returns {Partial<OverridePatch>}
  */
@@ -22,14 +22,14 @@ const WORDS = [
   ["colour", "colour"],
 ];
 
-/** In words: "hinge and limits"; empty where nothing was said. @param {Partial<OverridePatch>} patch */
+/** Corrections in words, as "hinge and limits"; empty without any. @param {Partial<OverridePatch>} patch */
 export function copiedWords(patch) {
   const words = WORDS.filter(([key]) => key in patch).map(([, word]) => word);
   return words.length < 2 ? words.join("") : `${words.slice(0, -1).join(", ")} and ${words.at(-1)}`;
 }
 
 /**
- * The objects from one to another of a list, as Shift selects them.
+ * Objects of a list from one to another, as selected with Shift.
  * @param {number[]} order
  * @param {number} from
  * @param {number} to

@@ -1,11 +1,11 @@
-/** A box in space around a thing, drawn over a photo: its edges, its six sides, and what dragging one of them does. */
+/** Crop box in space, projected onto a photo: its edges, its six sides, and the effect of dragging a side. */
 
 /** @typedef {import("../api-types").PromptsFileCrop} Crop */
 /** @typedef {import("../api-types").FrameCamera} Camera */
 /** @typedef {{ x: number, y: number }} At in pixels of the frame */
 /**
- * A side: across edge `axis`, the one away from the corner or the one at it; called as who looks at the photo sees it. `at` is
- * its middle, `middle` that of the box, `perMetre` what a metre outwards is there.
+ * Side of the box: perpendicular to edge `axis`, `away` from the corner or at it, with a `name` as seen in the photo. `at` is
+ * its middle, `middle` that of the box, `perMetre` the shift in pixels of a metre outwards.
  * @typedef {{ axis: number, away: boolean, name: string, at: At, middle: At, perMetre: At, distance: number, extent: number }} Side
  */
 
@@ -42,7 +42,7 @@ export function edges(crop, camera) {
 }
 
 /**
- * Its sides that the camera has before it, the farthest first.
+ * Sides of the box in front of the camera, farthest first.
  * @param {Crop} crop
  * @param {Camera} camera
  * @returns {Side[]}
@@ -54,7 +54,7 @@ export function sides(crop, camera) {
 }
 
 /**
- * The box with one side moved outwards by so many metres; it keeps some thickness.
+ * The box with one side moved outwards by `metres`; it keeps a minimum thickness.
  * @param {Crop} crop
  * @param {{ axis: number, away: boolean }} side
  * @param {number} metres
@@ -106,8 +106,8 @@ function sideOf(crop, camera, axis, away, called) {
 }
 
 /**
- * What its axes are called from where the camera is: the most upright one top and bottom, of the others the one more across left
- * and right. `turned`: the side away from the corner is the one named first.
+ * Names of the axes as seen from the camera: the most upright one is top and bottom, the more horizontal of the others is left
+ * and right. `turned`: the side away from the corner has the first name.
  * @param {Crop} crop
  * @param {Camera} camera
  */

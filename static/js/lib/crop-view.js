@@ -1,11 +1,11 @@
-/** Where a photo lies on the screen so that an object fills it, or all of the photo is seen. */
+/** Position and size of a photo on the screen so that an object, or the whole photo, fills the view. */
 
 import { fit } from "./view.js";
 
 /** @typedef {{ width: number, height: number }} Size */
 
-const MARGIN = 0.25; // of the object's size, about it
-const LEAST = 0.15; // of the photo: nobody looks at a few pixels
+const MARGIN = 0.25; // around the object, as a share of its size
+const LEAST = 0.15; // smallest share of the photo shown: a few pixels show too little
 
 /**
  * @param {Size} photo

@@ -1,7 +1,7 @@
-/** The diamond that marks what a person said of a frame. */
+/** Diamond marker of user input on a frame. */
 
 /**
- * Its closed path, to fill or to stroke.
+ * Closed path of the diamond, to fill or to stroke.
  * @param {CanvasRenderingContext2D} context
  * @param {number} x
  * @param {number} y

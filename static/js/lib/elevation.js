@@ -5,18 +5,18 @@
 /** @typedef {import("../api-types").PromptsFileFrontOutput} Drawn */
 /** @typedef {{ left: number, top: number, right: number, bottom: number }} Rect */
 /** @typedef {"left" | "right" | "top" | "bottom"} Side */
-/** @typedef {{ positions: Float32Array, cell: number }} Profile how clearly a line shows at each position, 0 to 1 */
+/** @typedef {{ positions: Float32Array, cell: number }} Profile clarity of a line at each position, 0 to 1 */
 /** @typedef {{ left_m: number, bottom_m: number, right_m: number, top_m: number }} Box from a front's centre, z up */
 
 /** @type {Side[]} */
 export const SIDES = ["left", "top", "right", "bottom"];
 export const SMALLEST_M = 0.02;
-const OFF_PLANE_M = 0.03; // of a front that is still on the plane
-const CLEAR = 0.2; // of a line that is worth snapping to
-const HAND = 0.4; // of the reach: standard deviation of where a hand lets go about the line it means
-const DOOR_M = 0.4; // in height, from which a front is a door rather than a drawer
+const OFF_PLANE_M = 0.03; // up to which a front is on the plane
+const CLEAR = 0.2; // minimum clarity of a line to snap to
+const HAND = 0.4; // of the reach: standard deviation of the release position about the intended line
+const DOOR_M = 0.4; // height from which a front is a door rather than a drawer
 const HANDLE_M = { long: 0.16, thick: 0.02 };
-const SAME_M = 1e-4; // finer than any scan: what differs by less is the same
+const SAME_M = 1e-4; // finer than any scan: smaller differences count as equal
 
 /** @param {number[]} a @param {number[]} b */
 const dot = (a, b) => a.reduce((sum, value, k) => sum + value * (b[k] ?? 0), 0);
@@ -33,7 +33,7 @@ export const heightOf = ({ top, bottom }) => bottom - top;
 export const middleOf = (rect) => ({ x: (rect.left + rect.right) / 2, y: (rect.top + rect.bottom) / 2 });
 
 /**
- * Where a front lies on a plane; null when it is on another one.
+ * Rectangle of a front on a plane; null when it is on another plane.
  * @param {Elevation} elevation
  * @param {number[][]} corners as in prompts.json
  * @returns {Rect | null}
@@ -63,11 +63,11 @@ export function cornersOf({ origin_m, right, down }, rect) {
   return [at(rect.left, rect.top), at(rect.right, rect.top), at(rect.right, rect.bottom), at(rect.left, rect.bottom)];
 }
 
-/** To a tenth of a millimetre is finer than any scan; a hundredth keeps rectangles square. @param {number} metres */
+/** Round to 0.01 mm: 0.1 mm is finer than any scan, but 0.01 mm keeps rectangles square. @param {number} metres */
 const round = (metres) => Math.round(metres * 1e5) / 1e5;
 
 /**
- * How clearly lines show between two ends of the other direction.
+ * Clarity of lines at each position, averaged over a range of the other direction.
  * @param {{ block: number, blocks: number, positions: number, bytes: Uint8Array }} lines
  * @param {number} cell metres a cell
  * @param {number} from metres
@@ -90,8 +90,8 @@ export function decoded(lines) {
 }
 
 /**
- * Where an edge goes that a person let go near `at`: onto another front's edge, else onto the line within reach that is most
- * likely meant: a clear one, and near. Where many lines are as clear as can be said, as beside a worktop, it stays put.
+ * Snapped position of an edge released near `at`: another front's edge, else the most likely line within reach, which is clear
+ * and near. Where lines are at maximum clarity everywhere, as beside a worktop, the edge stays put.
  * @param {number} at metres
  * @param {number} reach metres
  * @param {number[]} edges of other fronts
@@ -128,7 +128,7 @@ function likeliestLine(at, reach, { positions, cell }) {
 }
 
 /**
- * The first line beyond a position that is clearer than those beside it and as clear as half of the clearest; null without one.
+ * First line beyond a position that is clearer than those beside it and at least half as clear as the clearest; null if none.
  * @param {number} at metres
  * @param {1 | -1} way
  * @param {Profile} profile
@@ -165,7 +165,7 @@ export function moved(rect, dx, dy) {
 }
 
 /**
- * Two by a seam; null where it would leave a part too small.
+ * Split a rectangle in two at a seam; null where a part would be too small.
  * @param {Rect} rect
  * @param {"upright" | "level"} way
  * @param {number} at
@@ -205,7 +205,7 @@ export function holds(rect, { x, y }) {
   return x >= rect.left && x <= rect.right && y >= rect.top && y <= rect.bottom;
 }
 
-/** Whether two share more than a seam. @param {Rect} a @param {Rect} b */
+/** Whether two rectangles overlap by more than a seam. @param {Rect} a @param {Rect} b */
 export function overlap(a, b) {
   const across = Math.min(a.right, b.right) - Math.max(a.left, b.left);
   const down = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
@@ -213,7 +213,7 @@ export function overlap(a, b) {
 }
 
 /**
- * The edge near a position, and how far it is.
+ * Nearest edge to a position, and its distance.
  * @param {Rect} rect
  * @param {{ x: number, y: number }} at
  * @returns {{ side: Side, off: number }}
@@ -232,7 +232,7 @@ export function nearestEdge(rect, { x, y }) {
 }
 
 /**
- * A bar handle at a position of a front: lying near its upper or lower edge and on drawers, else standing.
+ * Bar handle at a position of a front: horizontal on drawers and near the upper or lower edge, else vertical.
  * @param {Rect} rect
  * @param {{ x: number, y: number }} at
  * @returns {Box}
@@ -253,8 +253,8 @@ export function handleAt(rect, at) {
 }
 
 /**
- * A drawn handle stays where it is when an edge is moved, and goes with a front that is moved as a whole; it is looked for anew
- * where the front no longer reaches it.
+ * Drawn handle after its front changed: it stays in place when an edge is moved, and moves along with the whole front; null,
+ * to be detected again, where it is no longer on the front.
  * @template {Box | "none" | null} T
  * @param {T} handle
  * @param {Rect} before
@@ -269,7 +269,7 @@ export function handleAfter(handle, before, after) {
 }
 
 /**
- * The handle of one front on another: as far from an edge that it is near, else in the middle as it was.
+ * Handle of one front copied to another: at the same distance from an edge it is near, else at the same offset from the centre.
  * @param {Box} box
  * @param {Rect} from
  * @param {Rect} to
@@ -281,7 +281,14 @@ export function handleLike(box, from, to) {
   return { left_m, right_m, bottom_m, top_m };
 }
 
-/** From its middle. @param {number} low @param {number} high @param {number} before length of the side @param {number} after @returns {[number, number]} */
+/**
+ * Extent along a side, relative to the side's middle.
+ * @param {number} low
+ * @param {number} high
+ * @param {number} before length of the side
+ * @param {number} after
+ * @returns {[number, number]}
+ */
 function alongSide(low, high, before, after) {
   const middle = (low + high) / 2;
   const half = Math.min(high - low, after) / 2;
@@ -291,7 +298,13 @@ function alongSide(low, high, before, after) {
   return [round(at - half), round(at + half)];
 }
 
-/** @param {Box} box from one centre @param {{ x: number, y: number }} from @param {{ x: number, y: number }} to @returns {Box} */
+/**
+ * Box relative to another centre.
+ * @param {Box} box
+ * @param {{ x: number, y: number }} from centre before
+ * @param {{ x: number, y: number }} to centre after
+ * @returns {Box}
+ */
 function shifted(box, from, to) {
   const [right, up] = [from.x - to.x, to.y - from.y];
   return {
@@ -302,7 +315,7 @@ function shifted(box, from, to) {
   };
 }
 
-/** Whether a front reaches all of a handle. @param {Rect} rect @param {Box} box */
+/** Whether all of a handle lies on a front. @param {Rect} rect @param {Box} box */
 function isOn(rect, { left_m, right_m, bottom_m, top_m }) {
   const [across, up] = [widthOf(rect) / 2 + SAME_M, heightOf(rect) / 2 + SAME_M];
   return left_m >= -across && right_m <= across && bottom_m >= -up && top_m <= up;
@@ -316,7 +329,7 @@ function sameSize(a, b) {
 /** @param {number} a @param {number} b metres */
 const isNear = (a, b) => Math.abs(a - b) < SAME_M;
 
-/** Whether nobody could tell two drawn fronts apart. @param {Drawn} a @param {Drawn} b */
+/** Whether two drawn fronts are equal within the tolerance. @param {Drawn} a @param {Drawn} b */
 export function sameFront(a, b) {
   const corners = b.corners_m.flat();
   const placed = a.corners_m.flat().every((value, k) => isNear(value, corners[k] ?? Number.NaN));
@@ -332,7 +345,7 @@ function sameHandle(a, b) {
 }
 
 /**
- * What a front of that shape and height most likely is.
+ * Most likely category of a front of that shape and height.
  * @param {Rect} rect
  * @param {number} top height of the plane's upper end above the floor, metres
  */

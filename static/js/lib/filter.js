@@ -1,6 +1,6 @@
-/** Finding things by their names. */
+/** Search by name. */
 
-/** Whether every word typed is in one of the texts, in any case. @param {string} typed @param {string[]} texts */
+/** Whether every typed word is in one of the texts, ignoring case. @param {string} typed @param {string[]} texts */
 export function matches(typed, texts) {
   const there = texts.join(" ").toLowerCase();
   return typed

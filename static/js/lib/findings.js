@@ -1,9 +1,10 @@
-/** Which findings of the certificate are about an object; no DOM. */
+/** Findings of the certificate about one object; no DOM. */
 
 /** @typedef {import("../api-types").Certificate} Certificate */
 
 /**
- * Findings at an object, at several of which it is one, or at a part of it: links and joints begin with their object's name.
+ * Findings located at an object, at several objects including it, or at a part of it: names of links and joints begin with that
+ * of their object.
  * @param {Certificate | null} certificate
  * @param {string} name
  * @param {string[]} names of all objects

@@ -1,4 +1,4 @@
-/** Numbers and times for people. */
+/** Formatting of numbers, times and names. */
 
 /** @param {number} bytes */
 export function bytes(bytes) {
@@ -39,7 +39,7 @@ export function counted(count, noun) {
   return `${count} ${noun}${count === 1 ? "" : "s"}`;
 }
 
-/** Lengths of a box's sides. @param {number[]} lengths */
+/** Side lengths of a box as text. @param {number[]} lengths */
 export function sides(lengths) {
   return lengths.map((length) => String(Number(length.toPrecision(3)))).join(" × ");
 }
@@ -50,7 +50,7 @@ export function centimetres(metres) {
 }
 
 /**
- * A joint's position for a person.
+ * A joint's position as text.
  * @param {"revolute" | "prismatic"} type
  * @param {number} value rad or m
  */
@@ -58,10 +58,10 @@ export function jointValue(type, value) {
   return type === "revolute" ? `${Math.round((value * 180) / Math.PI)}°` : `${(100 * value).toFixed(0)} cm`;
 }
 
-/** A name as simulators accept it: accents go, and what else is no letter, digit or underscore becomes one. @param {string} typed */
+/** Name that simulators accept: accents are removed, other special characters become underscores. @param {string} typed */
 export function usableName(typed) {
   const plain = typed.trim().normalize("NFKD").replaceAll(/\p{M}/gu, "");
   const joined = plain.replaceAll(/\W+/g, "_").replaceAll(/^_|_$/g, "");
-  const refused = /^(\d|(con|prn|aux|nul|com\d|lpt\d)$)/i; // by simulators; by Windows, which keeps these for devices
+  const refused = /^(\d|(con|prn|aux|nul|com\d|lpt\d)$)/i; // by simulators; by Windows, which reserves these for devices
   return refused.test(joined) ? `item_${joined}` : joined;
 }

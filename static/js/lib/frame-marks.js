@@ -1,4 +1,4 @@
-/** What is drawn over a frame at a spot of the screen: clicks, comments, the box being drawn, the crosshair. */
+/** Marks drawn over a frame in screen coordinates: clicks, comments, the box being drawn, the crosshair. */
 
 const DARK = "#10131a";
 const BRIGHT = "#ffe14d";
@@ -35,7 +35,7 @@ export function drawClick(context, { x, y }, { colour, label, current }) {
 }
 
 /**
- * What a mask is of: its number in the list, and its name where that is asked for.
+ * Label of a mask: its object's number in the list, and its name where requested.
  * @param {CanvasRenderingContext2D} context
  * @param {At} at
  * @param {string} text
@@ -97,7 +97,7 @@ export function drawCrosshair(context, { x, y }) {
 }
 
 /**
- * Whether a click drawn there is under a press.
+ * Whether a drawn click is under a press.
  * @param {At} drawn
  * @param {At} pressed
  */
@@ -106,7 +106,7 @@ export function isOnClick(drawn, pressed) {
 }
 
 /**
- * Whether a comment's bubble is.
+ * Whether a comment's bubble is under a press.
  * @param {At} tip
  * @param {At} pressed
  */
@@ -126,7 +126,7 @@ function stroke(context, width, style) {
 }
 
 /**
- * A stroke as wide as its brush, or the outline of what a lasso or a polygon will take in.
+ * A stroke as wide as its brush, or the outline of a lasso or polygon.
  * @param {CanvasRenderingContext2D} context
  * @param {{ x: number, y: number }[]} path on the screen
  * @param {{ tool: string, px: number }} brush

@@ -1,15 +1,15 @@
-/** What a pointer takes hold of on a plane of fronts, and where it puts it. In metres from the plane's top left corner; no DOM. */
+/** Hit testing and dragging of fronts on a plane, in metres from the plane's top left corner; no DOM. */
 
 import { between, heightOf, holds, moved, nearestEdge, SMALLEST_M, widthOf, withEdge } from "./elevation.js";
 
 /** @typedef {import("./elevation.js").Rect} Rect */
 /** @typedef {import("./elevation.js").Side} Side */
 /** @typedef {{ x: number, y: number }} Spot */
-/** @typedef {{ key: string, side: Side | null }} Held an edge; null: the whole front */
-/** @typedef {(side: Side, at: number, rect: Rect) => number} Snap where an edge of the rectangle settles */
+/** @typedef {{ key: string, side: Side | null }} Held `side`: an edge; null: the whole front */
+/** @typedef {(side: Side, at: number, rect: Rect) => number} Snap snapped position of an edge of the rectangle */
 
 /**
- * What a press takes hold of: an edge within reach, of a chosen front first; else a chosen front.
+ * Target of a press: an edge within reach, of a chosen front first; else a chosen front.
  * @param {{ key: string, rect: Rect, chosen: boolean }[]} fronts
  * @param {Spot} spot
  * @param {number} reach
@@ -42,7 +42,7 @@ export function smallestAt(fronts, spot) {
  * @param {Side | null} side
  * @param {Spot} from
  * @param {Spot} to
- * @param {Snap | null} snap null leaves it where it is put
+ * @param {Snap | null} snap null: no snapping
  */
 export function carried(rect, side, from, to, snap) {
   if (side === null) return settled(moved(rect, to.x - from.x, to.y - from.y), snap);
@@ -50,7 +50,11 @@ export function carried(rect, side, from, to, snap) {
   return withEdge(rect, side, snap ? snap(side, put, rect) : put);
 }
 
-/** A rectangle moved as a whole so that, each way, the edge with the shortest way to go snaps. @param {Rect} rect @param {Snap | null} snap */
+/**
+ * Move a rectangle as a whole so that, in each direction, the edge closest to a snap position snaps.
+ * @param {Rect} rect
+ * @param {Snap | null} snap
+ */
 export function settled(rect, snap) {
   if (!snap) return rect;
   const way = (/** @type {Side[]} */ sides) =>
@@ -60,7 +64,12 @@ export function settled(rect, snap) {
   return moved(rect, way(["left", "right"]), way(["top", "bottom"]));
 }
 
-/** A new rectangle between two spots, snapped unless that makes it too small. @param {Spot} from @param {Spot} to @param {Snap | null} snap */
+/**
+ * A new rectangle between two spots, snapped unless that makes it too small.
+ * @param {Spot} from
+ * @param {Spot} to
+ * @param {Snap | null} snap
+ */
 export function drawn(from, to, snap) {
   const rect = between(from, to);
   if (!snap) return rect;

@@ -1,4 +1,4 @@
-/** Lines of the marks drawn on a front. Rectangles and points share one unit, pixels of the screen; x to the right, y down. */
+/** Geometry of the marks drawn on a front. Rectangles and points are in pixels of the screen; x to the right, y down. */
 
 /** @typedef {import("./elevation.js").Rect} Rect */
 /** @typedef {import("./elevation.js").Side} Side */
@@ -27,14 +27,24 @@ export function edgeMiddle(rect, side) {
   return [(x1 + x2) / 2, (y1 + y2) / 2];
 }
 
-/** The opening triangle of technical drawings: its point is at the hinge. @param {Rect} rect @param {Side} side of the hinge @returns {Point[]} */
+/**
+ * The opening triangle of technical drawings: its tip is at the hinge.
+ * @param {Rect} rect
+ * @param {Side} side of the hinge
+ * @returns {Point[]}
+ */
 export function hingeLine(rect, side) {
   const opposite = /** @type {const} */ ({ left: "right", right: "left", top: "bottom", bottom: "top" })[side];
   const [from, to] = edgeOf(rect, opposite);
   return [from, edgeMiddle(rect, side), to];
 }
 
-/** An arrow in the direction a front slides: its shaft and the two lines of its head. @param {Rect} rect @param {Side} side it slides to @returns {[Point, Point][]} */
+/**
+ * An arrow in the direction a front slides: its shaft and the two lines of its head.
+ * @param {Rect} rect
+ * @param {Side} side it slides to
+ * @returns {[Point, Point][]}
+ */
 export function slideArrow({ left, top, right, bottom }, side) {
   const y = (top + bottom) / 2;
   const quarter = (right - left) / 4;

@@ -1,19 +1,20 @@
-/** Rows and stacks of fronts: divided by typed sizes, repeated, put in order and named one after the other; no DOM. */
+/** Rows and stacks of fronts: division by typed sizes, repetition, order and renaming; no DOM. */
 
 import { heightOf, moved, SMALLEST_M, widthOf } from "./elevation.js";
 
 /** @typedef {import("./elevation.js").Rect} Rect */
 /** @typedef {"upright" | "level"} Way upright seams part a front's width, level ones its height */
 
-const COLUMN_M = 0.05; // left edges this near stand over each other
-const SEAM_M = 0.003; // between fronts of most makers
+const COLUMN_M = 0.05; // fronts whose left edges are this close form a column
+const SEAM_M = 0.003; // gap between fronts of most manufacturers
 
 /**
- * A front divided as it was typed: "3" in equal parts, "600 450 600" in millimetres, the rest one more; "/ 28" leaves 28 mm between.
+ * Divide a front as typed: "3" in equal parts, "600 450 600" in millimetres, with the rest as one more part; "/ 28" leaves gaps
+ * of 28 mm.
  * @param {Rect} rect
  * @param {Way} way
  * @param {string} text
- * @returns {Rect[] | null} null where nothing is meant by it, or it does not fit
+ * @returns {Rect[] | null} null where the text is invalid or does not fit
  */
 export function divided(rect, way, text) {
   const [sizes, gap = 0, ...more] = text.split("/").map(numbersOf);
@@ -32,7 +33,7 @@ export function divided(rect, way, text) {
   );
 }
 
-/** A number this small is how many, not how wide. @param {number | undefined} number @returns {number is number} */
+/** Whether a number is a count of parts, not a size. @param {number | undefined} number @returns {number is number} */
 function isCount(number) {
   return number !== undefined && Number.isInteger(number) && number <= 12;
 }
@@ -69,7 +70,7 @@ export function again(rect, way) {
 }
 
 /**
- * Columns from left to right, each from the top down.
+ * Fronts by columns from left to right, each from top to bottom.
  * @template {{ rect: Rect }} T
  * @param {T[]} fronts
  * @returns {T[]}
@@ -86,8 +87,8 @@ export function inOrder(fronts) {
 }
 
 /**
- * Names to give one after the other: a name alone, or numbered with those that others have left out. A name that another of them
- * still has is given once that one has its own; where they wait for each other, one steps aside.
+ * Renaming steps, to be applied in order: to the name itself, or for several fronts to numbers that are not taken. A name still
+ * used by another of the fronts is assigned after that one is renamed; in a cycle, one gets a temporary name first.
  * @param {{ key: string, name: string }[]} fronts in the order of their numbers
  * @param {string} name
  * @param {string[]} taken by others
@@ -121,5 +122,5 @@ function numbered(name, count, taken) {
   return free.filter((one) => !taken.some((other) => same(one, other))).slice(0, count);
 }
 
-/** Names that differ by case alone are one name. @param {string} a @param {string} b */
+/** Whether two names are equal, ignoring case. @param {string} a @param {string} b */
 const same = (a, b) => a.toLowerCase() === b.toLowerCase();

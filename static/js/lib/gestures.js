@@ -1,4 +1,4 @@
-/** Presses, drags and two fingers told apart. Positions are the screen's; what a press holds is whatever lay under it. */
+/** Recognition of clicks, drags and two-finger gestures, in screen coordinates; `held` is the item under the press. */
 
 /** @typedef {{ x: number, y: number }} At */
 /**
@@ -30,7 +30,7 @@ export class Gestures {
   /**
    * @param {number} pointer
    * @param {At} at
-   * @param {number} still how far a press may wander and be a click
+   * @param {number} still distance up to which a press counts as a click
    * @returns {Motion<T> | null}
    */
   move(pointer, at, still) {
@@ -48,7 +48,7 @@ export class Gestures {
   /**
    * @param {number} pointer
    * @param {At} at
-   * @returns {Gesture<T> | null} what was meant; null where it ended a pan or a pinch
+   * @returns {Gesture<T> | null} the gesture; null at the end of a pan or a pinch
    */
   release(pointer, at) {
     const drag = this.#drag;
@@ -59,7 +59,7 @@ export class Gestures {
     return moved ? { kind: "box", from, to: at } : { kind: "click", at };
   }
 
-  /** It left, or was taken away. @param {number} pointer */
+  /** Drop a pointer that left or was cancelled. @param {number} pointer */
   forget(pointer) {
     this.#down.delete(pointer);
     this.#drag = null;

@@ -1,4 +1,4 @@
-/** What a joint does, in words: which way it slides, or on which side it turns, as seen by a person facing the front. */
+/** Motion of a joint in words: the direction it slides, or the side of its hinge, as seen by a person facing the front. */
 
 /** @typedef {import("../api-types").SceneItem} SceneItem */
 
@@ -15,7 +15,7 @@ export function motionOf({ type, axis, origin }) {
   return (origin[2] ?? 0) < 0 ? "Hinged below" : "Hinged above";
 }
 
-/** Whether it slides along its front, as doors on tracks do. @param {SceneItem["joints"][number]} joint */
+/** Whether a joint slides along its front, as doors on tracks do. @param {SceneItem["joints"][number]} joint */
 export function slidesSideways(joint) {
   return ["Slides left", "Slides right"].includes(motionOf(joint));
 }

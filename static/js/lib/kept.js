@@ -1,7 +1,7 @@
-/** Changes kept in the browser's storage until the server has answered them, each in an item of its own: tabs do not overwrite each other's. */
+/** Storage of changes in the browser until the server has answered them, one item per change: tabs cannot overwrite others'. */
 
 /** @typedef {import("../changes.js").Change} Change */
-/** @typedef {Change & { key: string, user: string, tab: string, at: number }} Kept of whom, made in which tab, when */
+/** @typedef {Change & { key: string, user: string, tab: string, at: number }} Kept with its user, tab and time */
 /** @typedef {Pick<Storage, "getItem" | "setItem" | "removeItem" | "key" | "length">} Store */
 
 const PREFIX = "r2c2r-change-";
@@ -14,14 +14,14 @@ export function isChange(name) {
 /**
  * @param {Store} store
  * @param {Kept} change
- * @returns {boolean} whether there was room for it
+ * @returns {boolean} whether it was stored
  */
 export function keep(store, change) {
   try {
     store.setItem(nameOf(change), JSON.stringify(change));
     return true;
   } catch {
-    return false; // full, or switched off
+    return false; // storage full or disabled
   }
 }
 
@@ -34,7 +34,7 @@ export function forget(store, change) {
 }
 
 /**
- * A person's changes that wait, in the order they were made; what cannot be read is dropped.
+ * Waiting changes of a user, in the order they were made; unreadable ones are skipped.
  * @param {Store} store
  * @param {string} user
  * @returns {Kept[]}
@@ -49,7 +49,7 @@ export function keptBy(store, user) {
 }
 
 /**
- * A change with the object it is about named, once the server has made that.
+ * Change with the id of its object in place of `{key}`, once the server has created the object.
  * @template {Change} C
  * @param {C} change
  * @param {string} key of the change that made the object

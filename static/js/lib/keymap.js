@@ -1,4 +1,4 @@
-/** One table of keys: the pages act on it, the `?` overlay prints it, a test looks for clashes. */
+/** Key bindings of all pages, used by the pages, by the `?` overlay and by a test for clashes. */
 
 /** @typedef {{ keys: string[], action: string, text: string, page: "annotate" | "elevation" | "review" | "all" }} Binding */
 
@@ -242,7 +242,7 @@ export const KEYMAP = [
  * The action of a key press on a page, or null.
  * @param {{ key: string, ctrlKey: boolean, metaKey: boolean, shiftKey: boolean, altKey: boolean }} event
  * @param {string} page
- * @param {boolean} [plain] whether a letter alone is a command; some who dictate or hold a key by accident turn that off
+ * @param {boolean} [plain] whether single letters are commands; users who dictate or press keys by accident turn that off
  */
 export function actionOf(event, page, plain = true) {
   if (event.altKey) return null;
@@ -258,7 +258,7 @@ export function actionOf(event, page, plain = true) {
 function nameOf(event) {
   const key = event.key === " " ? "Space" : event.key.length === 1 ? event.key.toLowerCase() : event.key;
   const control = event.ctrlKey || event.metaKey ? "Ctrl+" : "";
-  // A shifted sign such as ? already says that Shift was held; letters and named keys do not.
+  // A shifted sign such as ? already implies Shift; letters and named keys do not.
   const shift = event.shiftKey && (key.length > 1 || /[a-z]/.test(key)) ? "Shift+" : "";
   return control + shift + key;
 }
@@ -267,7 +267,7 @@ function nameOf(event) {
 const SIGNS = { ArrowRight: "→", ArrowLeft: "←", ArrowUp: "↑", ArrowDown: "↓", Escape: "Esc", Delete: "Del" };
 
 /**
- * A binding's keys as they are printed: arrows as arrows, a row of digits as its ends, a key that only does more with Shift once.
+ * A binding's keys for display: arrows as symbols, a row of digits as a range, a key and its Shift variant as one.
  * @param {string[]} keys
  */
 export function printed(keys) {
@@ -282,7 +282,7 @@ export function printed(keys) {
     );
 }
 
-/** Keys that two actions of one page claim. */
+/** Keys bound to two actions on one page. */
 export function clashes() {
   /** @type {string[]} */
   const found = [];

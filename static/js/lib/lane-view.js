@@ -1,15 +1,18 @@
-/** A lane, drawn: a bar where an object has a mask, hatched where that is doubtful, a diamond at each click, a line where one is. */
+/** Drawing of a lane: a bar where an object has a mask, hatched where doubtful, a diamond per click, a line at the position. */
 
 import { diamond } from "./diamond.js";
 import { runs } from "./lanes.js";
 
-/** @typedef {{ colour: string, frames: Map<number, number>, prompts: Set<number>, current: boolean }} LaneView frames are confidences by index */
+/**
+ * Lane of an object; `frames` holds confidences by frame index.
+ * @typedef {{ colour: string, frames: Map<number, number>, prompts: Set<number>, current: boolean }} LaneView
+ */
 
 const DIAMOND = 5;
 
 /**
  * @param {HTMLCanvasElement} canvas
- * @param {{ width: number, height: number }} size it is shown at; asked once for all lanes, as a scrub draws them again and again
+ * @param {{ width: number, height: number }} size on the page; measured once for all lanes, as scrubbing redraws them often
  * @param {LaneView} lane
  * @param {number[]} indices of the recording's frames
  * @param {number} position of the frame that is shown
@@ -52,7 +55,7 @@ function drawDiamond(context, x, y) {
 }
 
 /**
- * Slanted lines in a colour.
+ * Pattern of slanted lines in a colour.
  * @param {CanvasRenderingContext2D} context
  * @param {string} colour
  */

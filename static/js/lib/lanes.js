@@ -1,4 +1,4 @@
-/** What the frames of an object's lane say: where it is doubtful, which look worst. */
+/** Confidence along an object's lane: doubtful frames, and the frames to check first. */
 
 export const DOUBTFUL = 0.5; // below this a mask is drawn hatched and offered for a second look
 
@@ -18,7 +18,7 @@ export function nextDoubtful(frames, confidence, position, step) {
 }
 
 /**
- * Frames worth a look: the doubtful ones first, then evenly spread over the rest, at most `count`.
+ * Frames to check: the doubtful ones, then a selection evenly spread over the rest, at most `count`.
  * @param {Map<number, number>} confidence by frame
  * @param {number} count
  * @returns {{ frame: number, confidence: number }[]} worst first
@@ -36,7 +36,7 @@ export function worstFirst(confidence, count) {
 }
 
 /**
- * Frames that follow each other with a mask, and are all sure or all doubtful.
+ * Runs of consecutive frames with a mask that are all sure or all doubtful.
  * @param {(number | undefined)[]} confidences by position; undefined where there is no mask
  */
 export function runs(confidences) {

@@ -1,13 +1,13 @@
-/** A leaf at any opening as a camera sees it, and how far it stands open where somebody drags its edge to. */
+/** Pose and projection of a leaf at any opening, and the opening at which its edge is nearest to a pixel. */
 
 import { apply, NEAR_M, pixel } from "./box-view.js";
 
 /** @typedef {import("../api-types").Leaf} Leaf */
 /** @typedef {import("./box-view.js").Camera} Camera */
 
-const STEPS = 720; // of all it can open: a quarter of a degree
+const STEPS = 720; // over the range of its opening: a quarter of a degree each
 
-/** Its pose in the world. @param {Leaf} leaf @param {number} value rad or m */
+/** Pose of a leaf in the world. @param {Leaf} leaf @param {number} value rad or m */
 export function leafAt(leaf, value) {
   const columns = [0, 1, 2].map((k) => leaf.pose.map((row) => row[k] ?? 0));
   const ends = columns.map((way) => turned(leaf, value, way.slice(0, 3)));
@@ -15,13 +15,24 @@ export function leafAt(leaf, value) {
   return [0, 1, 2].map((k) => [...ends.map((way) => way[k] ?? 0), at[k] ?? 0]).concat([[0, 0, 0, 1]]);
 }
 
-/** Where to take hold of it, in a photo: at the edge that swings furthest, or in its middle; null behind the camera. @param {Leaf} leaf @param {number} value @param {Camera} camera */
+/**
+ * Drag point of a leaf in a photo: on the edge that swings furthest, or in its middle if it slides; null behind the camera.
+ * @param {Leaf} leaf
+ * @param {number} value
+ * @param {Camera} camera
+ */
 export function holdAt(leaf, value, camera) {
   const seen = apply(camera.camera_from_world, moved(leaf, value, hold(leaf)));
   return (seen[2] ?? 0) < NEAR_M ? null : pixel(camera, seen);
 }
 
-/** How far it is open where it is held nearest to a pixel. @param {Leaf} leaf @param {Camera} camera @param {number} x @param {number} y */
+/**
+ * Opening at which the drag point of a leaf is nearest to a pixel.
+ * @param {Leaf} leaf
+ * @param {Camera} camera
+ * @param {number} x
+ * @param {number} y
+ */
 export function openingAt(leaf, camera, x, y) {
   const values = Array.from({ length: STEPS + 1 }, (_, k) => (k * leaf.most) / STEPS);
   const away = values.map((value) => {
@@ -31,7 +42,7 @@ export function openingAt(leaf, camera, x, y) {
   return values[away.indexOf(Math.min(...away))] ?? 0;
 }
 
-/** @param {Leaf} leaf @returns {number[]} in the world, closed */
+/** Drag point of the closed leaf. @param {Leaf} leaf @returns {number[]} in the world */
 function hold(leaf) {
   const [w = 0, d = 0, h = 0] = leaf.size_m.map((side) => side / 2);
   if (leaf.type === "prismatic") return apply(leaf.pose, [0, -d, 0]);
@@ -51,7 +62,7 @@ function moved(leaf, value, point) {
   return turned(leaf, value, less(point, leaf.pivot)).map((p, k) => p + (leaf.pivot[k] ?? 0));
 }
 
-/** A direction of the closed leaf (Rodrigues). @param {Leaf} leaf @param {number} value @param {number[]} way */
+/** Direction of the closed leaf after opening (Rodrigues). @param {Leaf} leaf @param {number} value @param {number[]} way */
 function turned({ type, axis }, value, way) {
   if (type === "prismatic") return way;
   const [across, along] = [cross(axis, way), way.reduce((sum, p, k) => sum + p * (axis[k] ?? 0), 0)];

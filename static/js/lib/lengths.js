@@ -1,11 +1,15 @@
-/** True lengths in words: what was typed, how far the scan is off, what a rescale changes; no DOM. */
+/** True lengths: parsing of typed lengths, error of the scan and effects of a rescale in words; no DOM. */
 
 /** @typedef {import("../api-types").TrueLengths} TrueLengths */
 
 /** @type {Record<string, number>} */
 const UNITS = { mm: 0.001, cm: 0.01, m: 1 };
 
-/** "596", "596 mm", "59.6 cm" or "0.596 m", and what it is of. @param {string} typed @returns {{ metres: number, text: string } | null} */
+/**
+ * Parse a length as "596", "596 mm", "59.6 cm" or "0.596 m", followed by a description; null if invalid.
+ * @param {string} typed
+ * @returns {{ metres: number, text: string } | null}
+ */
 export function parseLength(typed) {
   const found = /^\s*(\d+(?:[.,]\d+)?)\s*(mm|cm|m)?(?![a-z])[\s,:]*(.*?)\s*$/is.exec(typed);
   if (!found) return null;
@@ -21,7 +25,11 @@ export function offBy({ metres, error_m: error }) {
   return mm === 0 ? "as measured" : `${mm > 0 ? "+" : "−"}${Math.abs(mm)} mm, ${signedPercent(error / metres)}`;
 }
 
-/** What a rescale does, before anybody does it. @param {TrueLengths} all @param {{ name: string, dimensions_m: number[] }[]} items */
+/**
+ * Effects of a rescale in words, to be shown before it.
+ * @param {TrueLengths} all
+ * @param {{ name: string, dimensions_m: number[] }[]} items
+ */
 export function rescaleNotes({ lengths, scale, scale_wanted: wanted, mean_error, mean_error_scaled }, items) {
   if (wanted === null) return [];
   const factor = wanted / scale;

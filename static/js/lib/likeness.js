@@ -1,16 +1,19 @@
-/** Which proposals are like an object: of its category and size, with a handle of its kind; no DOM. */
+/** Similarity of proposals to an object, by category, size and kind of handle; no DOM. */
 
 /** @typedef {import("../api-types").Proposal} Proposal */
 /** @typedef {import("../api-types").FoundFront} FoundFront */
 /** @typedef {"upright" | "level" | "none"} HandleKind */
-/** @typedef {{ category: string, sides: [number, number] | null, handle: HandleKind | null }} Kind sides: width and height, null: not known */
+/**
+ * Features of an object; `sides` are width and height; null where not known.
+ * @typedef {{ category: string, sides: [number, number] | null, handle: HandleKind | null }} Kind
+ */
 
-const LEAST = 0.4; // a side of less than half its length beside equal ones
+const LEAST = 0.4; // minimum likeness: one side at 40 % of its length, all else equal
 const OTHER_CATEGORY = 0.5;
 const OTHER_HANDLE = 0.6;
 
 /**
- * What others are compared with.
+ * Features that proposals are compared with.
  * @param {string} category
  * @param {FoundFront | undefined} front undefined: it has no flat front, or its masks are not done
  * @returns {Kind}
@@ -29,8 +32,8 @@ export function kindOf(category, front) {
 }
 
 /**
- * The proposals like it, most alike first, each with its likeness, 0 to 1, as its confidence. Of something without a flat front
- * only the category is known.
+ * Similar proposals, most similar first, each with its likeness, 0 to 1, as its confidence. Without a flat front, only the
+ * category is compared.
  * @param {Kind} kind
  * @param {Proposal[]} items
  * @returns {Proposal[]}
@@ -52,7 +55,7 @@ function likeness({ category, sides, handle }, item) {
   return size * (same ? 1 : OTHER_CATEGORY) * (handle === handleOf(item) ? 1 : OTHER_HANDLE);
 }
 
-/** As it lies in the picture. @param {Proposal} item @returns {HandleKind} */
+/** Kind of handle by its orientation in the image. @param {Proposal} item @returns {HandleKind} */
 function handleOf({ handle }) {
   if (!handle.length) return "none";
   const [wide, high] = [0, 1].map((axis) => {

@@ -1,4 +1,4 @@
-/** Objects as their list shows them: found by words, kept by a state, in an order, under headings; no DOM. */
+/** List of objects: search, filter by state, order and headings; no DOM. */
 
 import { matches } from "./filter.js";
 import { DOUBTFUL } from "./lanes.js";
@@ -7,7 +7,7 @@ import { DOUBTFUL } from "./lanes.js";
 /**
  * @template {Named} T
  * @typedef {{ object: T, number: number, sure: number | null, hidden: boolean, locked: boolean, current: boolean, mine: boolean }} Entry
- * `number` as on the picture; `sure` the mean confidence of its masks, null without one; `mine` assigned to who looks
+ * `number` as shown on the frame; `sure`: mean confidence of its masks, null without one; `mine`: assigned to this user
  */
 /** @typedef {keyof typeof ORDERS} Order */
 /** @typedef {keyof typeof STATES} State */
@@ -22,7 +22,7 @@ export const STATES = {
   mine: "Assigned to me",
   nobodys: "Assigned to nobody",
 };
-export const OF_PEOPLE = ["mine", "nobodys"]; // states that mean something where people have accounts
+export const OF_PEOPLE = ["mine", "nobodys"]; // states that apply only where people have accounts
 
 /** @type {Record<State, (entry: Entry<any>) => boolean>} */
 const KEPT = {
@@ -44,7 +44,7 @@ const BEFORE = {
 };
 
 /**
- * What is shown, under a heading each where it is grouped. The current one is always among them: somebody works on it.
+ * Entries to show, under headings where they are grouped. The current one is always included, as the user works on it.
  * @template {Named} T
  * @param {Entry<T>[]} entries
  * @param {{ typed: string, state: State, order: Order }} wanted
@@ -61,14 +61,14 @@ export function listed(entries, { typed, state, order }) {
   }));
 }
 
-/** What an object is found by. @param {Named} object */
+/** Texts by which an object is found. @param {Named} object */
 const words = ({ name, category, assignee }) => [name, category, ...(assignee ? [`@${assignee}`] : [])];
 
-/** drawer_2 before drawer_10. @param {string} a @param {string} b */
+/** Natural order of names: drawer_2 before drawer_10. @param {string} a @param {string} b */
 const byName = (a, b) => a.localeCompare(b, "en", { numeric: true });
 
 /**
- * From one id to another in the order shown, both included; the last alone where the first is not shown.
+ * Ids from one to another in the order shown, both included; only the last where the first is not shown.
  * @param {number[]} shown
  * @param {number | null} from
  * @param {number} to
@@ -83,5 +83,5 @@ export function meanOf(lane) {
   return lane.size ? [...lane.values()].reduce((sum, sure) => sum + sure, 0) / lane.size : null;
 }
 
-/** Whether the object's masks are being found, or wait for it. @param {{ segment: string }} object */
+/** Whether the object's masks are being found or are queued for it. @param {{ segment: string }} object */
 export const isComing = ({ segment }) => segment === "waiting" || segment === "running";

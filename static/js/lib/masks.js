@@ -1,4 +1,4 @@
-/** Masks as the server sends them: base64 of zlib of packed bits of a bounding box. */
+/** Decoding and drawing of the server's masks: base64 of zlib of packed bits of a bounding box. */
 
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 
@@ -19,7 +19,7 @@ export async function decodeBox(mask) {
 }
 
 /**
- * RGBA of the box: the colour inside, a stronger rim, nothing outside.
+ * RGBA of the box: the colour inside, an opaque rim, transparent outside.
  * @param {Uint8Array} pixels
  * @param {number} width
  * @param {number} height

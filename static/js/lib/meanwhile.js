@@ -1,10 +1,10 @@
-/** What is told while a list is on its way may be newer than that list: it is taken at once, and again after it. */
+/** Live updates while a list is loading: they may be newer than the list, so they are applied at once and again after it. */
 
 export class Meanwhile {
-  /** @type {Set<(() => void)[]>} of each list that is on its way */
+  /** @type {Set<(() => void)[]>} updates received during each pending load */
   #late = new Set();
 
-  /** @param {() => void} act that may be done twice */
+  /** @param {() => void} act update that may be applied twice */
   take(act) {
     act();
     for (const late of this.#late) late.push(act);
@@ -13,7 +13,7 @@ export class Meanwhile {
   /**
    * @template T
    * @param {Promise<T>} list
-   * @param {(list: T) => void} fill takes the place of what was known
+   * @param {(list: T) => void} fill replaces the known state
    */
   async during(list, fill) {
     /** @type {(() => void)[]} */

@@ -1,7 +1,7 @@
-/** Names after a sign: what is being typed, and the text with a name put in its place. */
+/** Mentions ("@name") in a text: the name being typed, and its completion. */
 
 /**
- * The name being typed right before the caret, with where its sign stands; null where none is.
+ * The name being typed right before the caret, with the position of its "@"; null without one.
  * @param {string} text
  * @param {number} caret
  */

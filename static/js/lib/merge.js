@@ -1,12 +1,12 @@
-/** Two people changed one thing: which fields really disagree. */
+/** Conflict of changes by two users: the fields that disagree. */
 
 /** @typedef {Record<string, unknown>} Fields */
 
 /**
- * Fields that I set and that somebody else has set to something else since I looked.
- * @param {Fields} seen what I saw when I changed it
- * @param {Fields} mine what I want
- * @param {Fields} theirs what is stored now
+ * Fields set by this user that another user has set to a different value since this user saw them.
+ * @param {Fields} seen values that this user saw when changing them
+ * @param {Fields} mine values wanted by this user
+ * @param {Fields} theirs values stored now
  */
 export function disagreements(seen, mine, theirs) {
   return Object.keys(mine).filter((name) => !same(theirs[name], seen[name]) && !same(theirs[name], mine[name]));

@@ -1,7 +1,10 @@
-/** A box that is moved by hand, in the words of who stands in front of it: right, back, up, turned. Matrices are rows of four. */
+/** Manual moves of a box as seen by a person in front of it: right, back, up, turned. Matrices are rows of four. */
 
 /** @typedef {number[][]} Matrix */
-/** @typedef {{ right: number, back: number, up: number, turn: number }} Shift metres along the box's own axes, radians about its vertical */
+/**
+ * Metres along the box's own axes, radians about its vertical.
+ * @typedef {{ right: number, back: number, up: number, turn: number }} Shift
+ */
 
 /** @type {Shift} */
 export const NOWHERE = { right: 0, back: 0, up: 0, turn: 0 };
@@ -21,7 +24,7 @@ export function moved(pose, { right, back, up, turn }) {
 }
 
 /**
- * How a pose got from one to the other; the inverse of `moved`.
+ * Shift from one pose to the other; the inverse of `moved`.
  * @param {Matrix} from
  * @param {Matrix} to
  * @returns {Shift}

@@ -1,4 +1,4 @@
-/** Of what is made one after the other, the newest; whatever it replaces or overtakes is closed. */
+/** Holder of the newest set of resources created asynchronously; replaced and outdated ones are closed. */
 
 /** @template {{ close(): void }} T */
 export class Newest {
@@ -7,8 +7,8 @@ export class Newest {
   held = [];
 
   /**
-   * @param {Promise<T>[]} making all of a set that takes the place of what is held
-   * @returns {Promise<boolean>} whether it did: no newer one was begun meanwhile
+   * @param {Promise<T>[]} making a set that replaces the current one
+   * @returns {Promise<boolean>} whether it did; false if a newer set was started before it was complete
    */
   async take(making) {
     const turn = ++this.#begun;

@@ -1,9 +1,9 @@
-/** What people marked of how far leaves stand open: a table of joints, each with its frames. */
+/** User marks of how far leaves stand open: a table of joints, each with its frames. */
 
 /** @typedef {import("../api-types").OverrideData["states"]} States */
 
 /**
- * With one frame marked anew; null takes its mark away. Marks by a joint's name become such of its part, which keeps its name.
+ * Table with the mark of one frame set; null removes it. Marks under a joint's name move to that of its part, which is stable.
  * @param {States} states
  * @param {{ joint: string, part: string }} leaf
  * @param {number} frame
@@ -18,5 +18,5 @@ export function withMark(states, { joint, part }, frame, state) {
   return marks.length ? { ...others, [part]: marks } : others;
 }
 
-/** Whether a person said where it stands. @param {{ value: number | null, sigma: number | null } | undefined} state */
+/** Whether a user marked the state. @param {{ value: number | null, sigma: number | null } | undefined} state */
 export const isMarked = (state) => Boolean(state && state.value !== null && state.sigma === null);

@@ -1,4 +1,7 @@
-/** An opening's lane: its angle or travel over the frames with twice its standard deviation; hatched where it is not known, a diamond where a person marked it. */
+/**
+ * Drawing of an opening's lane: its angle or travel over the frames with twice its standard deviation; hatched where unknown, a
+ * diamond where a user marked it.
+ */
 
 import { diamond } from "./diamond.js";
 import { readings, spansOf } from "./openings.js";
@@ -10,7 +13,7 @@ const MARK_PX = 4;
 
 /**
  * @param {HTMLCanvasElement} canvas
- * @param {{ width: number, height: number }} size it is shown at
+ * @param {{ width: number, height: number }} size on the page
  * @param {{ opening: Opening, colour: string }} lane
  * @param {number[]} indices of the recording's frames
  * @param {number} position of the frame that is shown
@@ -44,7 +47,7 @@ export function drawOpening(canvas, { width, height }, { opening, colour }, indi
   context.lineWidth = 1.5;
   context.beginPath();
   known.forEach(({ position: at, value }, k) => {
-    const gap = k === 0 || at - (known[k - 1]?.position ?? at) > 3; // it was out of sight between
+    const gap = k === 0 || at - (known[k - 1]?.position ?? at) > 3; // not visible in between
     if (gap) context.moveTo(x(at) - step / 2, y(value));
     context.lineTo(x(at), y(value));
   });

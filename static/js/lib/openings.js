@@ -1,14 +1,14 @@
-/** A front as it was filmed to move: what it does in a frame, in words, and its angle or travel over time. */
+/** Movement of a front in the recording: its state in a frame in words, and its angle or travel over time. */
 
 import { jointValue } from "./format.js";
 import { isMarked } from "./opening-marks.js";
 
 /** @typedef {import("../api-types").Opening} Opening */
 /** @typedef {"closed" | "opening" | "open" | "unknown"} Phase */
-/** @typedef {{ from: number, to: number, phase: Phase }} Span of positions in the list of frames, `to` beyond the last */
+/** @typedef {{ from: number, to: number, phase: Phase }} Span of positions in the list of frames, `to` exclusive */
 /** @typedef {{ position: number, value: number, sigma: number, marked: boolean }} Reading */
 
-const CLOSED = { revolute: 0.035, prismatic: 0.006 }; // 2 degrees, 6 mm: nearer to closed than states are known
+const CLOSED = { revolute: 0.035, prismatic: 0.006 }; // 2 degrees, 6 mm: within the accuracy of states
 const OPEN = 0.9; // of the widest state seen
 
 /** @param {Opening} opening @param {number | null} value @returns {Phase} */
@@ -32,7 +32,7 @@ export function stateIn(opening, frame) {
   return `${phase}, ${jointValue(opening.kind, state.value)}${spread}`;
 }
 
-/** The same, and whether a person said so. @param {Opening} opening @param {number} frame */
+/** State in a frame, and whether a user set it. @param {Opening} opening @param {number} frame */
 export function stateSaid(opening, frame) {
   const by = isMarked(opening.states.find((one) => one.frame === frame)) ? ", set by a person" : "";
   return stateIn(opening, frame) + by;
@@ -60,7 +60,7 @@ export function spansOf(opening, indices) {
   return spans;
 }
 
-/** What is known of it, where it is known. @param {Opening} opening @param {number[]} indices @returns {Reading[]} */
+/** Known states with their positions. @param {Opening} opening @param {number[]} indices @returns {Reading[]} */
 export function readings(opening, indices) {
   const at = new Map(indices.map((index, position) => [index, position]));
   return opening.states.flatMap(({ frame, value, sigma }) => {

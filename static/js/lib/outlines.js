@@ -1,4 +1,4 @@
-/** A proposal on a frame: a dashed outline over a dark one, so that it shows on any picture, and a chip with its name. */
+/** Drawing of a proposal on a frame: a dashed outline over a dark one, visible on any image, and a chip with its name. */
 
 import { toScreen } from "./view.js";
 
@@ -51,7 +51,7 @@ function trace(context, view, shape) {
 }
 
 /**
- * Just inside the upper edge of the shape's box, where it hides neither the handle nor the middle.
+ * Position just inside the upper edge of the shape's box, where the chip hides neither the handle nor the middle.
  * @param {import("./view.js").View} view
  * @param {number[][]} points
  */

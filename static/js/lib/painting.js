@@ -1,4 +1,4 @@
-/** Masks as they are painted: one byte a pixel of a whole frame, at any size; no DOM. */
+/** Masks for painting: one byte per pixel of a whole frame, at any size; no DOM. */
 
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {{ width: number, height: number, pixels: Uint8Array }} Mask */
@@ -16,11 +16,11 @@ export function wholeMask({ width, height, left, top, box_width, box_height }, i
   return { width, height, pixels };
 }
 
-/** Whether nothing is on it. @param {Mask} mask */
+/** Whether no pixel is set. @param {Mask} mask */
 export const isEmpty = ({ pixels }) => !pixels.includes(1);
 
 /**
- * Lengths of what is off it, on it, off it and so on, row by row: as prompts.json holds it.
+ * Run lengths, alternately off and on, starting with off, row by row, as in prompts.json.
  * @param {Mask} mask
  */
 export function runsOf({ width, height, pixels }) {
@@ -40,7 +40,7 @@ export function runsOf({ width, height, pixels }) {
 }
 
 /**
- * As masks come from the server: zlib of packed bits, here of the whole frame; no box where nothing is on it.
+ * Mask in the server's format: zlib of packed bits, here of the whole frame; an empty box if no pixel is set.
  * @param {Mask} mask
  * @returns {Promise<MaskBits>}
  */

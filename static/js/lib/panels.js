@@ -1,15 +1,15 @@
-/** How large a panel beside the picture is, as a person left it. */
+/** Size of a resizable panel, as the user left it. */
 
 /**
  * @typedef {object} Panel
  * @property {string} name
- * @property {string} label what its bar is called
+ * @property {string} label label of its bar
  * @property {"x" | "y"} along which way the bar moves
- * @property {1 | -1} grows as the bar moves right or down, or the other way
- * @property {number} least pixels; dragged to less than half of them it is folded
+ * @property {1 | -1} grows 1: as the bar moves right or down, -1: as it moves the other way
+ * @property {number} least pixels; when dragged to less than half of that, it is folded
  * @property {number} most pixels
  */
-/** @typedef {{ px: number | null, folded: boolean }} Size null: as the style sheet says */
+/** @typedef {{ px: number | null, folded: boolean }} Size null: as set by the style sheet */
 
 /** @param {number} px where the bar was moved to @param {Panel} panel @returns {Size} */
 export function moved(px, { least, most }) {
@@ -17,7 +17,7 @@ export function moved(px, { least, most }) {
   return { px: Math.round(Math.min(Math.max(px, least), most)), folded: false };
 }
 
-/** What was kept; what nobody could have left there counts as nothing. @param {string | null} kept @param {Panel} panel @returns {Size} */
+/** Stored size; one out of range or unreadable is ignored. @param {string | null} kept @param {Panel} panel @returns {Size} */
 export function read(kept, { least, most }) {
   try {
     const { px, folded } = JSON.parse(kept ?? "{}");

@@ -1,17 +1,16 @@
-/** Asking again for what the server refused as too much at once. No DOM: the way to the server and the waiting are given. */
+/** Retry of requests that the server refused because of too many at once. No DOM: request and wait are passed in. */
 
 const MOST_ASKED = 20;
 
 /**
- * What `ask` resolves to; as long as it is refused with a time to try again, it is asked again then. `told` hears of the first
- * refusal.
+ * Result of `ask`, retried up to a limit while it is refused with a retry time. `told` is called on the first refusal.
  * @template T
  * @param {() => Promise<T>} ask
  * @param {{
  *   retryMs: (error: unknown) => number | null,
  *   told: (error: unknown) => void,
  *   wait: (ms: number) => Promise<void>,
- * }} ways `retryMs` is null for an error that will not pass
+ * }} ways `retryMs` is null for an error that is not temporary
  * @returns {Promise<T>}
  */
 export async function patiently(ask, { retryMs, told, wait }) {

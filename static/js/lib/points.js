@@ -1,4 +1,4 @@
-/** A small cloud of points, drawn without a GPU. */
+/** Small point cloud, drawn without a GPU. */
 
 /** @typedef {{ positions: Int16Array, colours: Uint8Array, radius: number }} Cloud */
 
@@ -16,7 +16,7 @@ export function decodePoints(wire) {
 }
 
 /**
- * Draw the points turned about the vertical, then tilted; what is nearer hides what is farther. +Z is up.
+ * Draw the points turned about the vertical, then tilted; nearer points hide farther ones. +Z is up.
  * @param {Cloud} cloud
  * @param {{ yaw: number, pitch: number }} turn
  * @param {{ data: Uint8ClampedArray, width: number, height: number }} picture

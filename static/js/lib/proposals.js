@@ -1,13 +1,13 @@
-/** Which proposal comes next, and which are sure enough. */
+/** Selection of the next proposal, and of the proposals with enough confidence. */
 
 /** @typedef {import("../api-types").Proposal} Proposal */
 
 /**
- * The proposal after (or before) the current one, round the end; the first (or last) when none is current.
+ * The proposal after (or before) the current one, wrapping around; the first (or last) when none is current.
  * @param {Proposal[]} items
  * @param {string | null} current
  * @param {1 | -1} step
- * @param {Set<string>} [without] ids that are about to go
+ * @param {Set<string>} [without] ids to skip, about to be removed
  * @returns {Proposal | null}
  */
 export function neighbour(items, current, step, without = new Set()) {
@@ -21,8 +21,8 @@ export function neighbour(items, current, step, without = new Set()) {
 }
 
 /**
- * Those sure enough to be confirmed together, in whole percent as they are shown, and those left out though they are that sure:
- * something speaks against each, which a person should look at.
+ * Proposals with enough confidence to be confirmed together, compared in whole percent as shown, and those left out despite
+ * it: each has a doubt that a user should check.
  * @param {Proposal[]} items
  * @param {number} least confidence 0..1
  */

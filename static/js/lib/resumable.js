@@ -1,12 +1,12 @@
-/** Sending a file in pieces that survive a lost connection. No DOM: the ways to the server are given. */
+/** Upload of a file in pieces, resumable after a lost connection. No DOM: the requests are passed in. */
 
 export const PIECE = 4 << 20;
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 10_000;
 
 /**
- * Send what is missing; resolves when the server has it all. A failure that `mayPass` is waited out, and the server is asked
- * how much it has before going on.
+ * Send the missing part; resolves when the server has the whole file. After a failure that `mayPass`, it waits and requests the
+ * server's offset before continuing.
  * @param {Blob} file
  * @param {number} offset where the server's copy ends
  * @param {{
@@ -39,7 +39,7 @@ export async function sendRest(file, offset, ways) {
 }
 
 /**
- * The upload of this very file that stopped, if there is one.
+ * Interrupted upload of this same file, if there is one.
  * @template {{ file_name: string, size: number, modified: number | null, offset: number }} T
  * @param {{ name: string, size: number, lastModified: number }} file
  * @param {T[]} uploads

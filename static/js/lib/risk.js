@@ -1,4 +1,4 @@
-/** Which objects to look at first: those that something speaks against; no DOM. */
+/** Risk of objects, to review the problematic ones first; no DOM. */
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").SceneItem} SceneItem */
@@ -9,7 +9,7 @@ const POOR_IOU = 0.8;
 const FAR_M = 0.015;
 
 /**
- * What speaks against an object, in words, and how much all of it weighs.
+ * Risk of an object: its problems in words, and their total weight.
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item of the finished scene
  * @param {Finding[]} findings of the certificate about it
@@ -19,7 +19,7 @@ export function riskOf({ placement }, item, findings) {
   const defaults = (item?.joints ?? []).flatMap(({ sources }) =>
     Object.entries(sources).filter(([, source]) => source === "default"),
   );
-  /** @type {[number, boolean, string][]} weight, whether it is so, in words */
+  /** @type {[number, boolean, string][]} weight, whether it applies, text */
   const table = [
     [8, !placement, "not placed"],
     [6, findings.some(({ severity }) => severity === "error"), "failed in the certificate"],
@@ -35,7 +35,7 @@ export function riskOf({ placement }, item, findings) {
 }
 
 /**
- * The riskiest first; those alike stay in their order. Whether somebody accepted it changes nothing: the list keeps still.
+ * Objects with the highest risk first; equal ones stay in order. Accepting an object does not move it in the list.
  * @template {{ object: number }} T
  * @param {T[]} groups
  * @param {Map<number, Risk>} risks

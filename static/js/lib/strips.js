@@ -1,11 +1,11 @@
-/** Small plots of a recording over its frames: how tall each bar is, and which stand out. */
+/** Small bar charts of a recording over its frames: height of each bar, and outliers. */
 
 /** @typedef {import("../api-types").CaptureMoment} Moment */
 /** @typedef {{ frame: number, height: number, off: boolean, text: string }} Bar */
 /** @typedef {{ name: string, summary: string, bars: Bar[] }} Strip */
 
 /**
- * One strip for each thing measured; heights 0 to 1.
+ * One strip per measured quantity; heights 0 to 1.
  * @param {Moment[]} moments
  * @returns {Strip[]}
  */

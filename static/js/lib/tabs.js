@@ -1,13 +1,13 @@
 /**
- * Which tab owns what: each holds a lock of its own for as long as it lives, and who waits for that lock learns when it is gone,
- * closed or crashed. Browsers give locks to secure origins only; without them nothing is known of other tabs.
+ * Detection of closed tabs: each tab holds a lock for as long as it lives, and another tab that waits for that lock learns when
+ * it was closed or crashed. Browsers grant locks to secure origins only; without them nothing is known of other tabs.
  */
 
 /** @typedef {Pick<LockManager, "request">} Locks */
 
 export class Tabs {
   #locks;
-  /** Tabs that are waited for. @type {Set<string>} */
+  /** Tabs whose end is waited for. @type {Set<string>} */
   #waited = new Set();
 
   /**
@@ -17,17 +17,17 @@ export class Tabs {
   constructor(locks, mine) {
     this.#locks = locks;
     this.mine = mine;
-    locks?.request(nameOf(mine), () => new Promise(() => {})); // until this tab goes
+    locks?.request(nameOf(mine), () => new Promise(() => {})); // held until this tab is closed
   }
 
-  /** Whether the others can be told from those that are gone. */
+  /** Whether open tabs can be distinguished from closed ones. */
   get known() {
     return this.#locks !== undefined;
   }
 
   /**
-   * Do that once a tab is gone, or at once where that cannot be known; nobody else does it meanwhile, and whoever waits next begins
-   * should this tab go before it is done.
+   * Run `inherit` once a tab is closed, or at once where that cannot be known. No other tab runs it at the same time; if this
+   * tab is closed before it is done, the next waiting tab runs it.
    * @param {string} tab
    * @param {() => Promise<unknown>} inherit
    */

@@ -1,12 +1,12 @@
-/** Who else is here, said once a person. */
+/** Other people in the project, each listed once. */
 
 /** @typedef {{ tab: string, who: string, page: string, object: number | null }} Here */
 
 /**
- * The others, each with where they are; one's own other tabs are said so.
+ * Other people, each with their places; the user's own other tabs are labelled as such.
  * @param {Here[]} people
  * @param {string} tab this one
- * @param {Map<number, string>} names of objects; one that is not known is left out
+ * @param {Map<number, string>} names of objects by id; an unknown one is left out
  */
 export function together(people, tab, names) {
   const me = people.find((each) => each.tab === tab);

@@ -1,12 +1,12 @@
-/** Pictures of candidates from all sides, and how far one lies off another in words; no DOM. */
+/** Turntable images of candidates, and the deviation of one from another in words; no DOM. */
 
-/** Pictures in a strip, as the server draws them. */
+/** Number of images in a strip, as rendered by the server. */
 export const TURNS = 24;
-const PX_A_TURN = 12; // of a drag, to the next picture
+const PX_A_TURN = 12; // drag distance to the next image
 
 /**
- * @param {number} start the picture that was shown
- * @param {number} px by which a drag went to the right
+ * @param {number} start image shown at the start
+ * @param {number} px distance dragged to the right
  */
 export function turnedBy(start, px) {
   return start + Math.round(px / PX_A_TURN);

@@ -1,9 +1,9 @@
-/** What variants of a bundle take; no DOM. */
+/** Disk space and download size of variants of a bundle; no DOM. */
 
 import { bytes } from "./format.js";
 
 /**
- * What a wish takes, in words, and whether there is room for it.
+ * Space needed for a number of variants, in words, and whether the disk has room for it.
  * @param {import("../api-types").VariantsOffer} offer
  * @param {number} count 0: no number was given
  */

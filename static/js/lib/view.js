@@ -29,10 +29,10 @@ export function zoom(view, factor, at, least) {
 }
 
 /**
- * Zoom and pan with two fingers: what was between them stays between them.
+ * Zoom and pan with two fingers: the point between them stays between them.
  * @param {View} view
- * @param {{ x: number, y: number }[]} before where both were
- * @param {{ x: number, y: number }[]} after where both are
+ * @param {{ x: number, y: number }[]} before positions of both fingers before
+ * @param {{ x: number, y: number }[]} after positions of both fingers now
  * @param {number} least
  * @returns {View}
  */

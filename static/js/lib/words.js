@@ -1,4 +1,4 @@
-/** What the pipeline's stages and models are called on every page, in words of the field; no DOM. */
+/** Names of the pipeline's stages and models on every page, in standard terms; no DOM. */
 
 /** @type {Record<string, string>} */
 const STAGES = {
@@ -13,8 +13,8 @@ const STAGES = {
   vary: "Make variants",
 };
 
-/** @param {string} stage as the server calls it */
+/** @param {string} stage name used by the server */
 export const stageWord = (stage) => STAGES[stage] ?? stage;
 
-/** Whose outline is over a photo. */
+/** Models whose outline is drawn over a photo. */
 export const MODELS = { placed: "Generated mesh", primitive: "Before the fit", fitted: "After the fit" };
