@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from solids import overlap, true_solids
 
-from r2c2r_core.align.stage import AlignConfig, place_mesh
+from r2c2r_core.align.stage import Placer
 from r2c2r_core.errors import R2C2RError
 from r2c2r_core.evaluate.stage import evaluate_bundle
 from r2c2r_core.generate.completion import Completion
@@ -266,9 +266,9 @@ def seconds_figures(kitchen: Kitchen) -> dict[str, Any]:
         wall, cpu = time.perf_counter(), time.process_time()
         found = generate_candidates(capture, track, "completion", config)
         made = time.perf_counter()
-        place_mesh(capture, track, found.chosen, "sift", AlignConfig())
+        Placer()(capture, track, found.chosen)
         placed, spent = time.perf_counter(), time.process_time() - cpu
-        place_mesh(capture, track, replace(found.chosen, world_from_mesh=None), "sift", AlignConfig())
+        Placer()(capture, track, replace(found.chosen, world_from_mesh=None))
         figures[track.category] = {
             "candidates": made - wall,
             "placement": placed - made,

@@ -28,7 +28,7 @@ from stock import Article, as_candidate, assortment
 from r2c2r_core.align.hypotheses import signed_permutations
 from r2c2r_core.align.render import render_views
 from r2c2r_core.align.shape import Shape, prepare_shape
-from r2c2r_core.align.stage import AlignConfig, place_mesh
+from r2c2r_core.align.stage import AlignConfig, Placer
 from r2c2r_core.errors import PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.track import MaskTrack
@@ -126,7 +126,7 @@ def attempt(number: int, article: Article, seen: int | None, overlays: Path | No
     asset, truth = as_candidate(article, world, rng)
     started = time.process_time()
     try:
-        placement = place_mesh(capture, track, asset, "sift", AlignConfig(), seed=number)
+        placement = Placer(seed=number)(capture, track, asset)
     except PlacementFailed as error:
         seconds = time.process_time() - started
         return Trial(

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from recordings import TrueMask, clicked, record_of, recording_in, true_masks
 
-from r2c2r_core.align.stage import AlignConfig, place_mesh
+from r2c2r_core.align.stage import Placer
 from r2c2r_core.errors import R2C2RError
 from r2c2r_core.evaluate.extents import extent_errors
 from r2c2r_core.evaluate.iou import MIN_TRUTH_PX
@@ -164,7 +164,7 @@ class Case:
         if stage == "generate":
             return generate_candidates(self.capture, track, "completion", GenerateConfig(count=1))
         if stage == "align":
-            return place_mesh(self.capture, track, found.candidates[0], "sift", AlignConfig())
+            return Placer()(self.capture, track, found.candidates[0])
         names = [n for n in self.prompts if not isinstance(made[f"align/{n}"], str)]
         tracks, placements = ([made[f"{s}/{n}"] for n in names] for s in ("segment", "align"))
         assets = [made[f"generate/{n}"].candidates[0] for n in names]

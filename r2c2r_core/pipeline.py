@@ -286,7 +286,7 @@ def _earlier(
 
 
 def _placer(request: Request) -> Placer:
-    return Placer(matcher=request.tools.matcher, config=request.config.align, seed=request.seed)
+    return Placer(request.tools.matcher, request.config.align, request.seed)
 
 
 def _uploads(overrides: Overrides, name: str) -> tuple[Kept[Path], ...]:

@@ -100,8 +100,9 @@ def finish_contenders(trials: list[Trial], case: Case) -> list[Trial]:
 
 
 def finish_known(hypothesis: Hypothesis, case: Case) -> Trial:
-    """A known pose, refined as a contender is: unchanged where no better one is near."""
-    return _finish(_judged(hypothesis, case, case.observation.views), case)
+    """A known pose with its score. Fronts and appliances were measured over all frames; a thing's pose is refined."""
+    known = _judged(hypothesis, case, case.observation.views)
+    return _finish(known, case) if case.track.kind == "thing" else known
 
 
 def turned_otherwise(trial: Trial, best: Trial, shape: Shape) -> bool:

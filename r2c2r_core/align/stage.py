@@ -51,17 +51,45 @@ class AlignConfig:
     params: Changes = tuned_numbers("align")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Placer:
     """Placement of any candidate with these settings."""
 
-    matcher: str
-    config: AlignConfig
+    matcher: str = MATCHERS.default
+    config: AlignConfig = AlignConfig()
     seed: int = 0
 
     def __call__(self, capture: Capture, track: MaskTrack, asset: MeshAsset, *, progress: Progress = SILENT) -> Placement:
-        """Placement as by place_mesh."""
-        return place_mesh(capture, track, asset, self.matcher, self.config, seed=self.seed, progress=progress)
+        """Placement of a candidate with its evidence; raises PlacementFailed."""
+        config = self.config
+        rng = np.random.default_rng(self.seed)
+        progress.at(0.0, f"{asset.object_name}: selecting views")
+        observation = observe(capture, track, view_count=config.views, size_px=config.view_px, point_count=config.points)
+        _require_evidence(observation, track)
+        shape = prepare_shape(asset.mesh, point_count=config.surface_points, face_limit=config.face_limit, rng=rng)
+        if asset.world_from_mesh is not None:
+            return _place_known(
+                asset, asset.world_from_mesh, Case(shape=shape, observation=observation, track=track, lifted=[]), config
+            )
+        progress.at(0.15, f"{asset.object_name}: matching keypoints")
+        lifted = _match(capture, track, asset.mesh, observation, _loaded(self.matcher, config.weights), config)
+        case = Case(shape=shape, observation=observation, track=track, lifted=lifted)
+        scale_range = _scale_range(shape, observation)
+        votes = vote(lifted, shape.diameter, scale_range, rng)
+        progress.at(0.5, f"{asset.object_name}: trying poses")
+        boxes = box_hypotheses(shape, observation, track, capture.room.manhattan_yaw_rad)
+        proposals = settle(boxes, shape, observation, config.settled, outlines=track.kind != "front")
+        proposals += [Hypothesis(pose, _upright_axis(shape, pose), "features") for pose in votes.hypotheses]
+        trials = try_poses(proposals, case, scale_range, config.refined, progress.part(0.55, 0.9))
+        if not trials:
+            raise PlacementFailed(
+                f"{asset.object_name}: no pose of {asset.candidate_id} fits the visible size",
+                hint="choose another candidate, or check the mask",
+            )
+        progress.at(0.9, f"{asset.object_name}: finishing")
+        best, *others = finish_contenders(trials, case)
+        _require_cover(best, asset, config)
+        return record_placement(best, others, case, votes, asset, f"{best.hypothesis.source} + {self.matcher}")
 
 
 def place_candidate(
@@ -71,52 +99,11 @@ def place_candidate(
     return place(capture, track, found.candidate(candidate_id), progress=progress)
 
 
-def place_mesh(
-    capture: Capture,
-    track: MaskTrack,
-    asset: MeshAsset,
-    matcher: str,
-    config: AlignConfig,
-    *,
-    seed: int = 0,
-    progress: Progress = SILENT,
-) -> Placement:
-    """Placement of a candidate with its evidence; raises PlacementFailed."""
-    rng = np.random.default_rng(seed)
-    progress.at(0.0, f"{asset.object_name}: selecting views")
-    observation = observe(capture, track, view_count=config.views, size_px=config.view_px, point_count=config.points)
-    _require_evidence(observation, track)
-    shape = prepare_shape(asset.mesh, point_count=config.surface_points, face_limit=config.face_limit, rng=rng)
-    if asset.world_from_mesh is not None:
-        return _refined(
-            asset, asset.world_from_mesh, Case(shape=shape, observation=observation, track=track, lifted=[]), config
-        )
-    progress.at(0.15, f"{asset.object_name}: matching keypoints")
-    lifted = _match(capture, track, asset.mesh, observation, _loaded(matcher, config.weights), config)
-    case = Case(shape=shape, observation=observation, track=track, lifted=lifted)
-    scale_range = _scale_range(shape, observation)
-    votes = vote(lifted, shape.diameter, scale_range, rng)
-    progress.at(0.5, f"{asset.object_name}: trying poses")
-    boxes = box_hypotheses(shape, observation, track, capture.room.manhattan_yaw_rad)
-    proposals = settle(boxes, shape, observation, config.settled, outlines=track.kind != "front")
-    proposals += [Hypothesis(pose, _upright_axis(shape, pose), "features") for pose in votes.hypotheses]
-    trials = try_poses(proposals, case, scale_range, config.refined, progress.part(0.55, 0.9))
-    if not trials:
-        raise PlacementFailed(
-            f"{asset.object_name}: no pose of {asset.candidate_id} fits the visible size",
-            hint="choose another candidate, or check the mask",
-        )
-    progress.at(0.9, f"{asset.object_name}: finishing")
-    best, *others = finish_contenders(trials, case)
-    _require_cover(best, asset, config)
-    return record_placement(best, others, case, votes, asset, f"{best.hypothesis.source} + {matcher}")
-
-
-def _refined(asset: MeshAsset, pose: Similarity3, case: Case, config: AlignConfig) -> Placement:
-    """Placement refined from the generator's own pose."""
+def _place_known(asset: MeshAsset, pose: Similarity3, case: Case, config: AlignConfig) -> Placement:
+    """Placement at the generator's own pose."""
     best = finish_known(Hypothesis(pose, _upright_axis(case.shape, pose), "generator"), case)
     _require_cover(best, asset, config)
-    return record_placement(best, [], case, Votes((), {}), asset, "generator's pose, refined")
+    return record_placement(best, [], case, Votes((), {}), asset, "generator's pose")
 
 
 def _require_cover(best: Trial, asset: MeshAsset, config: AlignConfig) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from r2c2r_core.align.protocol import MATCHERS
-from r2c2r_core.align.stage import AlignConfig, place_mesh
+from r2c2r_core.align.stage import AlignConfig, Placer
 from r2c2r_core.generate.stage import GENERATORS, GenerateConfig, generate_candidates
 from r2c2r_core.overrides import NO_OVERRIDES
 from r2c2r_core.segment.geometric.session import GeometricSegmenter
@@ -33,7 +33,7 @@ def test_a_learned_track_goes_through_every_later_stage(tmp_path: Path) -> None:
     track = session.track(prompt("drawer_mid", "drawer", click_on(capture, middle, 60)))
     few = replace(GenerateConfig(), count=1, pool_frames=6)
     candidates = generate_candidates(capture, track, GENERATORS.default, few)
-    placement = place_mesh(capture, track, candidates.chosen, MATCHERS.default, QUICK)
+    placement = Placer(MATCHERS.default, QUICK)(capture, track, candidates.chosen)
     scene = build_scene(capture, [track], [placement], [candidates.chosen], NO_OVERRIDES, SynthesizeConfig())
     fitted = fit_meshes(scene, [track], [placement], [candidates.chosen], WarpConfig())
     (drawer,) = fitted.objects

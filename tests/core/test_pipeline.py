@@ -157,7 +157,7 @@ def test_meshes_from_elsewhere_are_placed_and_judged_by_the_frames(two_bottles):
     before = choose_candidate(pair)
     assert before.chosen_id == "c0"  # a tie
     config = AlignConfig(views=4, match_photos=1, match_views=8, settled=8, refined=2, points=400, surface_points=1500)
-    after = weighed(capture, track, before, Placer(matcher="sift", config=config), "medoid")
+    after = weighed(capture, track, before, Placer("sift", config), "medoid")
     assert after.chosen_id == "c1"
     assert after.chosen.metrics["mask_iou"] > 0.7
     assert "outline agrees" in after.reason

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from r2c2r_core.align import stage as stage_module
-from r2c2r_core.align.stage import AlignConfig, place_mesh
+from r2c2r_core.align.stage import AlignConfig, Placer
 from r2c2r_core.errors import Cancelled, InputError, PlacementFailed
 from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.progress import Progress
@@ -42,7 +42,7 @@ def assert_placed(placement: Any, truth: Similarity3, asset: Any) -> None:
 def test_a_textured_box_returns_from_any_frame(bench: Any, seed: int, config: AlignConfig) -> None:
     thing, capture, track = bench.free_box(textured=True)
     asset, truth = bench.as_candidate(thing, seed)
-    placement = place_mesh(capture, track, asset, "sift", config, seed=seed)
+    placement = Placer("sift", config, seed=seed)(capture, track, asset)
     assert_placed(placement, truth, asset)
     assert placement.inliers > 0.5 * placement.matches > 50
     assert sum(v > 0 for v in placement.votes.values()) >= 4
@@ -57,15 +57,24 @@ def nudged(truth: Similarity3, shift_m: float, turn_deg: float) -> Similarity3:
     return Similarity3(1.01 * truth.scale, turn @ truth.rotation, truth.translation + shift_m * np.array([0.6, -0.5, 0.6]))
 
 
-def test_a_pose_that_its_generator_knows_is_refined_and_not_searched_for(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_front_stays_where_it_was_measured(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     thing, capture, track = bench.blank_cabinet()
     asset, truth = bench.as_candidate(thing, 2)
     monkeypatch.setattr(stage_module, "box_hypotheses", None)  # a call would end in a TypeError
     monkeypatch.setattr(stage_module, "_loaded", None)
-    known = replace(asset, world_from_mesh=nudged(truth, 0.008, 0.8))
-    placement = place_mesh(capture, track, known, "sift", LIGHT)
+    measured = nudged(truth, 0.003, 0.3)
+    placement = Placer("sift", LIGHT)(capture, track, replace(asset, world_from_mesh=measured))
+    assert placement.world_from_mesh is measured
+    assert placement.method == "generator's pose"
+    assert placement.runner_up is None
+
+
+def test_a_thing_whose_generator_knows_its_pose_is_refined(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    thing, capture, track = bench.free_box(textured=True)
+    asset, truth = bench.as_candidate(thing, 2)
+    monkeypatch.setattr(stage_module, "box_hypotheses", None)
+    placement = Placer("sift", LIGHT)(capture, track, replace(asset, world_from_mesh=nudged(truth, 0.008, 0.8)))
     assert_placed(placement, truth, asset)
-    assert placement.method == "generator's pose, refined"
     assert placement.runner_up is None
 
 
@@ -73,13 +82,13 @@ def test_what_stands_elsewhere_than_its_masks_is_not_placed(bench: Any) -> None:
     thing, capture, track = bench.blank_cabinet()
     asset, truth = bench.as_candidate(thing, 2)
     with pytest.raises(PlacementFailed, match="covers the mask with IoU"):
-        place_mesh(capture, track, replace(asset, world_from_mesh=nudged(truth, 3.0, 0.0)), "sift", LIGHT)
+        Placer("sift", LIGHT)(capture, track, replace(asset, world_from_mesh=nudged(truth, 3.0, 0.0)))
 
 
 def test_a_blank_cabinet_is_placed_by_geometry_alone(bench: Any) -> None:
     thing, capture, track = bench.blank_cabinet()
     asset, truth = bench.as_candidate(thing, 2)
-    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    placement = Placer("sift", LIGHT)(capture, track, asset)
     assert placement.inliers < 5
     assert_placed(placement, truth, asset)
 
@@ -87,7 +96,7 @@ def test_a_blank_cabinet_is_placed_by_geometry_alone(bench: Any) -> None:
 def test_a_cabinet_without_a_handle_is_flat_and_its_orientation_unsure(bench: Any) -> None:
     thing, capture, track = bench.blank_cabinet(handle=False)
     asset, _ = bench.as_candidate(thing, 3)
-    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    placement = Placer("sift", LIGHT)(capture, track, asset)
     assert placement.unsure
     assert placement.condition > 1e4
     assert any("flat" in w for w in placement.warnings)
@@ -96,7 +105,7 @@ def test_a_cabinet_without_a_handle_is_flat_and_its_orientation_unsure(bench: An
 def test_a_blank_box_is_reported_unsure_but_stands_right(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=False)
     asset, _ = bench.as_candidate(thing, 4)
-    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    placement = Placer("sift", LIGHT)(capture, track, asset)
     assert placement.unsure
     assert placement.runner_up is not None
     assert placement.runner_up > 0.99
@@ -111,7 +120,7 @@ def test_a_blank_box_is_reported_unsure_but_stands_right(bench: Any) -> None:
 def test_a_bottle_stands_upright_and_its_yaw_is_no_doubt(bench: Any) -> None:
     thing, capture, track = bench.bottle()
     asset, truth = bench.as_candidate(thing, 5)
-    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    placement = Placer("sift", LIGHT)(capture, track, asset)
     turn = placement.world_from_mesh.rotation @ truth.rotation.T
     assert np.degrees(np.arccos(min(turn[2, 2], 1.0))) < 1.5
     assert placement.world_from_mesh.scale == pytest.approx(truth.scale, rel=0.02)
@@ -122,7 +131,7 @@ def test_a_bottle_stands_upright_and_its_yaw_is_no_doubt(bench: Any) -> None:
 def test_a_chair_is_placed(bench: Any) -> None:
     thing, capture, track = bench.chair()
     asset, truth = bench.as_candidate(thing, 6)
-    placement = place_mesh(capture, track, asset, "sift", LIGHT)
+    placement = Placer("sift", LIGHT)(capture, track, asset)
     assert_placed(placement, truth, asset)
     assert not placement.unsure
 
@@ -131,14 +140,14 @@ def test_a_chair_is_placed(bench: Any) -> None:
 def test_a_mug_finds_its_handle(bench: Any) -> None:
     thing, capture, track = bench.film_mug(MUG)
     asset, truth = bench.as_candidate(thing, 7)
-    assert_placed(place_mesh(capture, track, asset, "sift", LIGHT), truth, asset)
+    assert_placed(Placer("sift", LIGHT)(capture, track, asset), truth, asset)
 
 
 def test_a_wrong_mesh_shows_in_its_evidence(bench: Any) -> None:
     _, capture, track = bench.chair()
     wrong, _ = bench.as_candidate(bench.free_box(textured=True)[0], 8)
     try:
-        placement = place_mesh(capture, track, wrong, "sift", LIGHT)
+        placement = Placer("sift", LIGHT)(capture, track, wrong)
     except PlacementFailed:
         return
     assert placement.mask_iou < 0.7 or placement.rms_m > 0.03
@@ -149,7 +158,7 @@ def test_one_frame_alone_is_never_trusted(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=True)
     asset, _ = bench.as_candidate(thing, 9)
     alone = replace(track, masks={3: track.masks[3]})
-    placement = place_mesh(capture, alone, asset, "sift", LIGHT)
+    placement = Placer("sift", LIGHT)(capture, alone, asset)
     assert placement.unsure
     assert any("only one frame" in w for w in placement.warnings)
 
@@ -157,7 +166,7 @@ def test_one_frame_alone_is_never_trusted(bench: Any) -> None:
 def test_the_same_seed_gives_the_same_placement(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=True)
     asset, _ = bench.as_candidate(thing, 9)
-    first, second = (place_mesh(capture, track, asset, "sift", SAME, seed=1) for _ in range(2))
+    first, second = (Placer("sift", SAME, seed=1)(capture, track, asset) for _ in range(2))
     np.testing.assert_array_equal(first.world_from_mesh.matrix, second.world_from_mesh.matrix)
     assert first.votes == second.votes
 
@@ -166,7 +175,7 @@ def test_parameters_of_the_generator_are_not_looked_at(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=True)
     asset, _ = bench.as_candidate(thing, 9)
     told = replace(asset, parameters={"yaw": 1.0, "scale": 3.0}, metrics={"mask_iou": 0.1}, frames=(1,))
-    first, second = (place_mesh(capture, track, a, "sift", SAME) for a in (asset, told))
+    first, second = (Placer("sift", SAME)(capture, track, a) for a in (asset, told))
     np.testing.assert_array_equal(first.world_from_mesh.matrix, second.world_from_mesh.matrix)
 
 
@@ -174,13 +183,13 @@ def test_failures_say_what_to_do(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=False)
     asset, _ = bench.as_candidate(thing, 0)
     with pytest.raises(PlacementFailed, match="no frame"):
-        place_mesh(capture, replace(track, masks={}), asset, "sift", LIGHT)
+        Placer("sift", LIGHT)(capture, replace(track, masks={}), asset)
     empty = replace(asset, mesh=replace(asset.mesh, faces=np.zeros((0, 3), np.int64)))
     with pytest.raises(PlacementFailed, match="no surface") as failure:
-        place_mesh(capture, track, empty, "sift", LIGHT)
+        Placer("sift", LIGHT)(capture, track, empty)
     assert failure.value.hint
     with pytest.raises(InputError, match="unknown matcher"):
-        place_mesh(capture, track, asset, "nonesuch", LIGHT)
+        Placer("nonesuch", LIGHT)(capture, track, asset)
 
 
 def test_an_object_without_depth_fails_with_a_hint(bench: Any) -> None:
@@ -189,11 +198,11 @@ def test_an_object_without_depth_fails_with_a_hint(bench: Any) -> None:
     images = capture.images
     blind = type(images)(images.rgbs, {k: d._replace(valid=np.zeros_like(d.valid)) for k, d in images.depths.items()})
     with pytest.raises(PlacementFailed, match="depth points"):
-        place_mesh(replace(capture, images=blind), track, asset, "sift", LIGHT)
+        Placer("sift", LIGHT)(replace(capture, images=blind), track, asset)
 
 
 def test_it_stops_when_asked(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=False)
     asset, _ = bench.as_candidate(thing, 0)
     with pytest.raises(Cancelled):
-        place_mesh(capture, track, asset, "sift", LIGHT, progress=Progress(is_cancelled=lambda: True))
+        Placer("sift", LIGHT)(capture, track, asset, progress=Progress(is_cancelled=lambda: True))
