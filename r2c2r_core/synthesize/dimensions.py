@@ -41,7 +41,6 @@ class Params:
     """Tuned parameters of size and orientation."""
 
     samples: int = param(6000, "count", "Number of points sampled on a mesh's surface", ge=100)
-    level: float = param(0.7, "cosine", "Minimum vertical component of an axis for it to be the one that points up")
     sure_share: float = param(0.08, "share", "Standard deviation relative to the depth below which a depth counts as measured")
     sure_m: float = param(0.004, "m", "Standard deviation below which a depth counts as measured")
     as_tight: float = param(
@@ -211,8 +210,8 @@ def _mesh_rotation(samples: SurfaceSamples, outward: Vector3, search: BoxSearch)
     else:
         free = smallest_box(samples.points) if search == "hull" else powell_box(samples.points)
         axes = free.world_from_box.rotation
-    level = [sign * axis for axis in axes.T for sign in (-1.0, 1.0) if abs(axis[2]) < params.level]
-    nearest = max(level, key=lambda d: float(d @ outward), default=outward)
+    level = np.delete(axes.T, np.argmax(np.abs(axes[2])), axis=0)
+    nearest = max([*level, *-level], key=lambda d: float(d @ outward))
     facing, tightest = front_rotation(outward), front_rotation(np.array([nearest[0], nearest[1], 0.0]))
     as_tight = _plan_area(samples.points, facing) <= params.as_tight * _plan_area(samples.points, tightest)
     return facing if as_tight else tightest

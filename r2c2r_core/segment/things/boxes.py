@@ -16,9 +16,6 @@ class Params:
     """Tuned parameters of object boxes."""
 
     trim: float = param(0.01, "share", "Fraction of the points ignored at either end of each axis", ge=0, lt=0.5)
-    snap_rad: float = param(
-        float(np.radians(6.0)), "rad", "Maximum angle to the room's directions for a box to be aligned with them"
-    )
     snap_area: float = param(
         1.06, "ratio", "Maximum footprint of the room-aligned box, relative to the smallest box, for it to be preferred"
     )
@@ -41,9 +38,7 @@ def box_of(
         return _round_box(points_world, support_z_m, towards_world)
     smallest = upright_box(points_world, trim=params.trim)
     aligned = box_at_yaw(points_world, manhattan_yaw_rad, trim=params.trim)
-    off = abs((smallest.yaw_rad - manhattan_yaw_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4)
-    snap = off < params.snap_rad or aligned.size_m[:2].prod() < params.snap_area * smallest.size_m[:2].prod()
-    box = aligned if snap else smallest
+    box = aligned if aligned.size_m[:2].prod() < params.snap_area * smallest.size_m[:2].prod() else smallest
     centre = box.world_from_box.translation.copy()
     bottom, top = centre[2] - box.size_m[2] / 2, centre[2] + box.size_m[2] / 2
     if support_z_m is not None and support_z_m < top:
