@@ -7,19 +7,16 @@ from typing import Literal
 
 import numpy as np
 
-from r2c2r_core.arrays import Vector3
-from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.evidence import Evidence
 from r2c2r_core.generate.hypothesis import Hypothesis
-from r2c2r_core.generate.relief import NO_RELIEF, BoxPart, Relief, handle_parts, measure_relief
+from r2c2r_core.generate.relief import BoxPart, Relief, handle_parts, measure_relief
 from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.meshes import box_mesh, unite
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.depth import DepthBehind, DepthSource, depths_behind, distinct, next_sizes
 from r2c2r_core.kitchen.names import category_of
-from r2c2r_core.model.rectangle import Rectangle3
-from r2c2r_core.model.track import FrontPanel, ThingBox
+from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.tuning import param, tuned
 
 HandleStyle = Literal["bar", "block", "none"]
@@ -44,54 +41,38 @@ class Params:
     block_error: float = param(0.25, "ratio", "Error assigned to a handle drawn as a solid block, relative to its protrusion")
 
 
-def front_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
-    """A front's panel extruded to each candidate depth, with its handle and without; frame `front`."""
-    track, front = evidence.track, evidence.track.front
-    if front is None:
-        raise GenerationFailed(f"{track.name}: no front rectangle was measured", hint="add a click that faces it")
-    category = category_of(track.category)
-    known = depths_behind(evidence.capture, front, category)
-    depths = distinct([*known, *next_sizes(known[0].depth_m)])
+def box_hypotheses(evidence: Evidence, front: FrontPanel) -> tuple[Hypothesis, ...]:
+    """A measured front extruded to each candidate depth, with its handle and without; frame `front`."""
+    depths = _depths(evidence, front)
     relief = cache(partial(measure_relief, front))  # the guesses of one draw share it
 
     def shape(behind: DepthBehind, handle: HandleStyle, variation: Variation) -> Shape:
         depth = behind.depth_m * _scale(behind, variation)
-        low, high = front.corners_front[3], front.corners_front[1] + [0.0, depth, 0.0]
-        made = _box_with_relief(BoxPart(low, high), front.world_from_front, np.zeros(3), relief(variation), handle)
+        box = BoxPart(front.corners_front[3], front.corners_front[1] + [0.0, depth, 0.0])
+        made = _box_with_relief(box, front.world_from_front, relief(variation), handle)
         at_front = made.vertices_local[made.faces][:, :, 1].max(axis=1) < tuned(Params).front_zone_m
+        masked = at_front | (evidence.track.kind == "appliance")  # masks of fronts leave out their carcass
         error = abs(depth - depths[0].depth_m) + _handle_error(relief(variation), handle)
-        return replace(made, maskable=at_front, parameters={**made.parameters, "depth_m": depth}, unseen_error_m=error)
+        return replace(made, maskable=masked, parameters={**made.parameters, "depth_m": depth}, unseen_error_m=error)
 
     return _depths_and_handles(depths, front, shape)
 
 
-def appliance_hypotheses(evidence: Evidence) -> tuple[Hypothesis, ...]:
-    """An appliance's box at each candidate depth, with its handle and without; frame `object`."""
-    track, box = evidence.track, evidence.track.box
+def _depths(evidence: Evidence, front: FrontPanel) -> tuple[DepthBehind, ...]:
+    """Candidate depths: an appliance's observed one and those assumed behind the front; next to a front's, the sizes sold."""
+    box = evidence.track.box
+    assumed = depths_behind(evidence.capture, front, category_of(evidence.track.category))
     if box is None:
-        raise GenerationFailed(f"{track.name}: no box was measured", hint="add a click on a frame that shows it whole")
-    front = _local_front(track.front, box)
-    half = np.asarray(box.dimensions_m, dtype=np.float64) / 2
-    relief = cache(partial(measure_relief, front)) if front is not None else None
-    depths = _appliance_depths(evidence, box)
-
-    def shape(behind: DepthBehind, handle: HandleStyle, variation: Variation) -> Shape:
-        depth = behind.depth_m * _scale(behind, variation)
-        low, high = -half, half * [1.0, 0.0, 1.0] + [0.0, depth - half[1], 0.0]
-        found = relief(variation) if relief is not None else NO_RELIEF
-        at = box.world_from_object.inverse.apply(front.centre) if front is not None else low
-        made = _box_with_relief(BoxPart(low, high), box.world_from_object, at, found, handle)
-        error = abs(depth - depths[0].depth_m) + _handle_error(found, handle)
-        return replace(made, parameters={**made.parameters, "depth_m": depth}, unseen_error_m=error)
-
-    return _depths_and_handles(depths, front, shape)
+        return distinct([*assumed, *next_sizes(assumed[0].depth_m)])
+    observed = [DepthBehind(float(box.dimensions_m[1]), "box")] if box.depth_seen else []
+    return distinct([*observed, *assumed])
 
 
 def _depths_and_handles(
-    depths: Sequence[DepthBehind], front: FrontPanel | None, shape: Callable[[DepthBehind, HandleStyle, Variation], Shape]
+    depths: Sequence[DepthBehind], front: FrontPanel, shape: Callable[[DepthBehind, HandleStyle, Variation], Shape]
 ) -> tuple[Hypothesis, ...]:
     """Hypotheses: the candidate depths interleaved with the alternative handle styles at the most trusted depth."""
-    style: HandleStyle = "bar" if front is not None and front.handle is not None else "none"
+    style: HandleStyle = "bar" if front.handle is not None else "none"
     others = [Hypothesis("{depth_m:.2f} m deep, " + _TOLD[b.source], partial(shape, b, style)) for b in depths]
     if style == "none":
         return tuple(others)
@@ -101,19 +82,15 @@ def _depths_and_handles(
     return (*others[:2], handles[0], *others[2:], handles[1])
 
 
-def _box_with_relief(box: BoxPart, world_from_local: Rigid3, at: Vector3, relief: Relief, handle: HandleStyle) -> Shape:
-    """The box with the handle and the relief of a front centred at `at`; its frame must be parallel to the local one."""
-    added = [
-        *relief.raised,
-        *(handle_parts(relief.handle, as_bar=handle == "bar") if relief.handle and handle != "none" else ()),
-    ]
-    parts = [box, *(BoxPart(part.low + at, part.high + at) for part in added)]
-    removed = [box_mesh(part.low + at, part.high + at) for part in relief.sunk]
-    vertices, faces = unite([box_mesh(*part) for part in parts], removed)
+def _box_with_relief(box: BoxPart, world_from_front: Rigid3, relief: Relief, handle: HandleStyle) -> Shape:
+    """The box with the handle and the relief of its front."""
+    bars = handle_parts(relief.handle, as_bar=handle == "bar") if relief.handle and handle != "none" else ()
+    parts = [box_mesh(*part) for part in (box, *relief.raised, *bars)]
+    vertices, faces = unite(parts, [box_mesh(*part) for part in relief.sunk])
     return Shape(
         vertices_local=vertices,
         faces=faces,
-        world_from_local=world_from_local,
+        world_from_local=world_from_front,
         front_y_m=float(box.low[1]),
         maskable=np.ones(len(faces), dtype=bool),
         parameters={"raised_steps": float(len(relief.raised)), "sunk_steps": float(len(relief.sunk))},
@@ -131,22 +108,3 @@ def _scale(behind: DepthBehind, variation: Variation) -> float:
     """Depth factor of a draw: the full spread for a usual depth, less at a wall, none for an observed or catalogue depth."""
     spread = {"wall": tuned(Params).wall_spread, "worktop": 1.0, "category": 1.0}
     return 1.0 + spread.get(behind.source, 0.0) * (variation.depth_scale - 1.0)
-
-
-def _appliance_depths(evidence: Evidence, box: ThingBox) -> tuple[DepthBehind, ...]:
-    """Candidate depths: the observed one, and those assumed behind the front."""
-    width, depth, height = (float(side) for side in box.dimensions_m)
-    place = box.world_from_object @ Rigid3(np.eye(3), np.array([0.0, -depth / 2, 0.0]))
-    front = Rectangle3(world_from_front=place, width_m=width, height_m=height)
-    observed = [DepthBehind(depth, "box")] if box.depth_seen else []
-    return distinct([*observed, *depths_behind(evidence.capture, front, category_of(evidence.track.category))])
-
-
-def _local_front(front: FrontPanel | None, box: ThingBox) -> FrontPanel | None:
-    """The appliance's front in axes parallel to its box; None if the two differ in direction."""
-    if front is None:
-        return None
-    turn = box.world_from_object.rotation.T @ front.world_from_front.rotation
-    if turn[1, 1] < np.cos(np.radians(15.0)):
-        return None
-    return replace(front, world_from_front=Rigid3(box.world_from_object.rotation, front.centre))

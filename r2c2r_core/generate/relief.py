@@ -60,9 +60,6 @@ class Relief(NamedTuple):
     handle: FrontHandle | None
 
 
-NO_RELIEF = Relief((), (), None)
-
-
 def measure_relief(front: FrontPanel, variation: Variation) -> Relief:
     """Relief of a front from the views of one draw, in the front's frame."""
     points = [front.world_from_front.inverse.apply(masked_points(v, variation.erosion_px)) for v in variation.views]
