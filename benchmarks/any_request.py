@@ -1,12 +1,12 @@
-"""Whatever is sent to whichever operation by whomever, alone or one after the other: never a server error.
+"""Schema-based fuzzing of every API operation, in every role, one request at a time and in sequences: no server errors.
 
     python benchmarks/any_request.py [--examples 100] [--roles annotator reviewer admin nobody] [--walks 16]
                                      [--seed 0] [--json benchmarks/app.json]
 
-Schemathesis makes requests from the app's own OpenAPI document, such as it allows and such as it forbids; each role sends as
-many to each operation, most of them at things that exist, on a data folder of its own: a project with clicks, comments, nouns
-and two bundles as the exporter writes them. The queue stands still meanwhile: what is queued by thousands of requests is not
-what is looked at. Then it runs, and an admin walks from answer to request: what one operation made, others are asked about.
+Schemathesis generates valid and invalid requests from the app's own OpenAPI document. Each role sends the same number to each
+operation, most of them to objects that exist, on its own data folder: a project with clicks, comments, nouns and two bundles as
+the exporter writes them. The job queue does not run during this part: the jobs that thousands of requests queue are not under
+test. Then the queue runs, and an admin makes stateful walks: ids returned by one operation are used in requests to others.
 """
 
 import argparse
@@ -43,19 +43,19 @@ from tests.app.conftest import ORIGIN, Running, fake, running
 from tests.app.finished import finished_kitchen
 from tests.core.export.kitchen import reconstruction
 
-SAID_IN_ONE_LINE = (503, 507)  # a helper is down, the disk is full
+SAID_IN_ONE_LINE = (503, 507)  # a helper is down, or the disk is full
 ROLES = ("annotator", "reviewer", "admin", "nobody")
 PASSWORD = "correct horse battery"
-ABOUT_SESSIONS = ("signIn", "signOut", "changePassword")  # sent last, and by no walk: the session is needed by the others
-DELETES = ("deleteProject",)  # not at the project that the others need
-NOWHERE = 5  # of so many requests one is at what does not exist
-STEPS = 30  # of a walk
+ABOUT_SESSIONS = ("signIn", "signOut", "changePassword")  # sent last and not in walks: the others need the session
+DELETES = ("deleteProject",)  # not sent to the project that the others need
+NOWHERE = 5  # one of this many requests targets an object that does not exist
+STEPS = 30  # per walk
 
 
 def send_anything(
     folder: Path, project: str, *, examples: int, seed: int, roles: tuple[str, ...] = ROLES, every: int = 1
 ) -> dict[str, Any]:
-    """`examples` requests of each role to one operation in so many: what went wrong, and how many they were."""
+    """Send `examples` requests per role to one operation in `every`; return the failures and the number of requests."""
     began = time.monotonic()
     with ExitStack() as stack:
         apps = {role: stack.enter_context(_started(folder, role, run_jobs=False)) for role in roles}
@@ -71,7 +71,7 @@ def send_anything(
 
 
 def walk_anywhere(folder: Path, *, walks: int, seed: int) -> dict[str, Any]:
-    """An admin's walks of STEPS requests each while the queue runs: what went wrong, and how many steps they were."""
+    """Run an admin's walks of STEPS requests each while the queue runs; return the failures and the number of steps."""
     began, answers = time.monotonic(), Answers()
     with _started(folder, "walk", run_jobs=True) as (web, client):
         cut_short = _walk(web, client, answers, walks=walks, seed=seed)
@@ -87,29 +87,29 @@ def walk_anywhere(folder: Path, *, walks: int, seed: int) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What one role was answered."""
+    """Responses that one role received."""
 
     statuses: Counter[int] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
 
     def note(self, case: Any, answer: Any) -> None:
-        """Count an answer; keep it if something is wrong with it."""
+        """Count a response; store it if it has a fault."""
         self.statuses[answer.status_code] += 1
         if problem := complaint(case, answer):
             self.wrong.append(f"{_name(case.operation)}: {problem}")
 
     def figures(self) -> dict[str, Any]:
-        """For the report."""
+        """The counts and failures for the report."""
         return {"requests": self.statuses.total(), "statuses": _counted(self.statuses), "server_errors": len(self.wrong)}
 
 
 def make_template(folder: Path, bundle: Path | None = None) -> str:
-    """The data folder that every role gets a copy of; its project."""
+    """Build the data folder that is copied for every role; return its project."""
     if bundle is None:
         bundle = folder / "kitchen.zip"
         write_bundle(reconstruction(), bundle, ExportConfig())
     again = Path(shutil.copyfile(bundle, folder / "again.zip"))
-    with zipfile.ZipFile(again, "a") as archive:  # another version by its bytes
+    with zipfile.ZipFile(again, "a") as archive:  # another version: its bytes differ
         archive.comment = b"again"
     with running(folder / "template") as web:
         project = finished_kitchen(web, check_bundle(bundle), bundle, again)
@@ -121,7 +121,7 @@ def make_template(folder: Path, bundle: Path | None = None) -> str:
 
 @contextmanager
 def _started(folder: Path, role: str, run_jobs: bool) -> Iterator[tuple[Running, TestClient]]:
-    """The app on a copy of the template, and a browser of somebody of that role."""
+    """The app on a copy of the template, and a client signed in with that role."""
     data = folder / role
     shutil.copytree(folder / "template", data)
     viewer = Viewer(Settings(data_dir=data), fake("viewer"))
@@ -136,13 +136,13 @@ def _started(folder: Path, role: str, run_jobs: bool) -> Iterator[tuple[Running,
 
 
 async def _at_once(_: float) -> None:
-    """Wrong passwords are answered without the wait that slows guessing down."""
+    """No delay after wrong passwords (the app delays them to slow down guessing)."""
 
 
 def _send_to_each(
     apps: dict[str, tuple[Running, TestClient]], project: str, examples: int, seed: int, every: int
 ) -> tuple[int, dict[str, Answers]]:
-    """How many operations there are, and what each role was answered: the same requests, made once."""
+    """The number of operations, and each role's responses; the requests are generated once."""
     answers = {role: Answers() for role in apps}
     known = {"project": project, "object": 1, "job": 1, "frame": 7, "version": 1, "comment": 1, "candidate": "c0"}
     known |= {"name": "the-somebody", "side": "plan", "point": 1}
@@ -166,7 +166,7 @@ def _name(operation: Any) -> str:
 
 
 def _cases(operation: Any, known: dict[str, Any], examples: int, seed: int) -> list[Any]:
-    """Requests to an operation: half of them forbidden by its schema, where that can be; most at things that exist."""
+    """Requests to an operation: half of them violate its schema where possible; most target objects that exist."""
     parameters = {p.name for p in operation.path_parameters}
     here = {key: value for key, value in known.items() if key in parameters and _name(operation) not in DELETES} or None
     cases: list[Any] = []
@@ -183,22 +183,22 @@ def _counted(statuses: Counter[int]) -> dict[str, int]:
 
 
 def _forget_others(web: Running, project: str) -> None:
-    """Delete the projects that requests made, so that the next ones are answered as fast."""
+    """Delete the projects that requests created, so that response times do not grow."""
     for other in web.get("/api/projects"):
         if other["id"] != project:
             web.delete(f"/api/projects/{other['id']}")
 
 
 def _walk(web: Running, client: TestClient, answers: Answers, *, walks: int, seed: int) -> int:
-    """Pairs of walks from what was answered to what may be asked about it; how many were cut short.
+    """Pairs of walks from responses to requests that use them; return how many walks were cut short.
 
-    Where a walk may go depends on what the server holds by then, but the walks of one run of Hypothesis must be able to go
-    alike from the same beginning. So each run makes the least it can: one walk of the simplest choices, one of any.
+    The available transitions depend on the server's state, but Hypothesis requires walks of one run to be reproducible from the
+    same start. So each run is as small as possible: one walk of the simplest choices, and one random walk.
     """
     machine = schemathesis.openapi.from_dict(web.app.openapi()).exclude(operation_id=list(ABOUT_SESSIONS)).as_state_machine()
 
     class Walk(machine):  # type: ignore[misc,valid-type]
-        """One person who does anything."""
+        """One person who sends any request."""
 
         def call(self, case: Any, **_: Any) -> Response:
             answer = send(client, case)
@@ -207,19 +207,19 @@ def _walk(web: Running, client: TestClient, answers: Answers, *, walks: int, see
             return Response.from_any(answer)
 
         def validate_response(self, *_: Any, **__: Any) -> None:
-            """Nothing else is wrong."""
+            """No further validation."""
 
     cut_short = 0
     for number in range(walks):
         try:
             hypothesis.seed(seed + number)(Walk).run(settings=hypothesis.settings(_settings(2), stateful_step_count=STEPS))
-        except hypothesis.errors.FlakyStrategyDefinition:  # both set out alike, and were answered differently
+        except hypothesis.errors.FlakyStrategyDefinition:  # both walks began alike but received different responses
             cut_short += 1
     return cut_short
 
 
 def _made(strategy: Any, count: int, seed: int) -> list[Any]:
-    """Some requests of a strategy; none where nothing about the operation can be wrong."""
+    """Some requests of a strategy; none where no part of the operation can be invalid."""
     found: list[Any] = []
 
     @hypothesis.seed(seed)
@@ -245,7 +245,7 @@ def _settings(examples: int) -> hypothesis.settings:
 
 
 def send(client: TestClient, case: Any) -> Any:
-    """The answer to a made-up request; None where the client would not send such a thing."""
+    """The response to a generated request; None where the client refuses to send it."""
     body: dict[str, Any] = {}
     if isinstance(case.body, bytes | str):
         body["content"] = case.body
@@ -261,7 +261,7 @@ def send(client: TestClient, case: Any) -> Any:
 
 
 def complaint(case: Any, answer: Any) -> str:
-    """What is wrong with an answer; empty when nothing is."""
+    """The fault of a response; empty if there is none."""
     if answer.status_code < 500 or answer.status_code in SAID_IN_ONE_LINE:
         return ""
     asked = f"{case.method} {case.formatted_path} {case.query} {case.headers} {case.body!r}"
@@ -273,7 +273,7 @@ def _header(value: Any) -> str:
 
 
 def main() -> int:
-    """Send, report; 1 when a server error came back."""
+    """Send and report; 1 if any response was a server error."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--examples", type=int, default=100, help="of each role and operation")
     parser.add_argument("--roles", nargs="+", choices=ROLES, default=list(ROLES))
@@ -284,7 +284,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="r2c2r-any-") as name:
         project = make_template(folder := Path(name))
         sent = send_anything(folder, project, examples=options.examples, seed=options.seed, roles=tuple(options.roles))
-        failed = report("any_request", sent, options.json, failed=bool(sent["failures"]))  # kept before the walks begin
+        failed = report("any_request", sent, options.json, failed=bool(sent["failures"]))  # saved before the walks begin
         walked = walk_anywhere(folder, walks=options.walks, seed=options.seed)
         return report("any_request_walks", walked, options.json, failed=bool(failed or walked["failures"]))
 

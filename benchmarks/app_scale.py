@@ -1,15 +1,15 @@
-"""What each question to the app costs where there is much: 200 projects, one of 5,000 frames, 200 objects and 5,000 clicks.
+"""Cost of every API request on a large data folder: 200 projects, one with 5,000 frames, 200 objects and 5,000 clicks.
 
     python benchmarks/app_scale.py [--projects 200] [--objects 200] [--clicks 5000] [--json benchmarks/app_scale.json]
 
-The folder is made of rows and files at once. Every GET of the app's own OpenAPI document is asked in process, then a click, its
-undo and redo: processor time (the median, and what 95 % of the answers stay below), queries, bytes on the wire. The first time
-is kept apart, for it fills caches: `first_ms` after the app was started anew on a folder whose pages were opened before,
-`unseen_ms` on one that a run has just left. What the app does by itself when it starts, and between changes (it writes each
-project's project.json), is over before anything is counted. Then a real server is scrubbed (a frame and its masks) and clicked,
-and its processor time, what follows from the clicks by itself included, says how many such requests a core answers in a second
-of its processor time. The bars: 100 ms, 200 ms for 95 %, and 300 kB for every answer of /api, the first ones too, and 100
-requests a second a core.
+Rows and files of the folder are written directly. Every GET of the app's own OpenAPI document is sent in process, then a click,
+its undo and its redo; recorded are CPU time (median and 95th percentile), queries, and bytes on the wire. The first request is
+recorded separately because it fills caches: `first_ms` after a restart of the app on a folder whose pages were opened before,
+`unseen_ms` on a folder that a run has just finished in. The app's own work at startup and after changes (it writes each
+project's project.json) is finished before anything is measured. Then a real server receives scrubbing requests (a frame and its
+masks) and clicks; its CPU time, including the work that the clicks trigger, gives the number of such requests per second of CPU
+time. The bars: 100 ms, 200 ms for 95 %, and 300 kB for every response of /api, first ones included, and 100 requests per second
+and core.
 """
 
 import argparse
@@ -62,17 +62,17 @@ from tests.core.export.kitchen import CREATED, reconstruction
 
 BARS = {"cpu_ms": 100.0, "p95_ms": 200.0, "kb": 300.0, "requests_a_cpu_second": 100.0}
 FRAMES = 5000  # of every recording, at 960x720
-MASKED, STRETCH = 1000, 50  # frames with a mask, of each object of the large project: somebody walks by, again and again
-SMALL = 14  # objects of the other projects, a kitchen's
+MASKED, STRETCH = 1000, 50  # masked frames per object of the large project, in stretches, as when somebody walks by repeatedly
+SMALL = 14  # objects of the other projects: as many as a kitchen has
 REPEATS = 20
 REST_S = 2.0
-ROUNDS = 150  # of scrubs and of clicks, when the server's processor time is taken
+ROUNDS = 150  # scrubs and clicks while the server's CPU time is measured
 LARGE = "large"
 HEADERS = {"host": "127.0.0.1:8000", "accept-encoding": "gzip", "x-requested-with": "bench", "content-type": "application/json"}
 
 
 def main() -> int:
-    """Build, ask, report."""
+    """Build the folder, measure, report."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--projects", type=int, default=200)
     parser.add_argument("--objects", type=int, default=200)
@@ -98,7 +98,7 @@ def main() -> int:
 
 
 def _in_its_own_process(data: Path, changes: bool) -> list[dict[str, Any]]:
-    """`ask_everything` of an app that has answered nobody yet."""
+    """`ask_everything` on a freshly started app."""
     with ProcessPoolExecutor(1, get_context("spawn")) as process:
         return process.submit(_asked, data, changes).result()
 
@@ -108,7 +108,7 @@ def _asked(data: Path, changes: bool) -> list[dict[str, Any]]:
 
 
 def table(costs: list[dict[str, Any]]) -> str:
-    """The figures as Markdown."""
+    """The figures as a Markdown table."""
     lines = ["| request | status | CPU ms | 95 % | first | unseen | queries | kB |", "|---|---|---|---|---|---|---|---|"]
     for cost in sorted(costs, key=lambda cost: -float(cost["cpu_ms"])):
         cells = [cost[name] for name in ("request", "status", "cpu_ms", "p95_ms", "first_ms", "unseen_ms", "queries", "kb")]
@@ -117,7 +117,7 @@ def table(costs: list[dict[str, Any]]) -> str:
 
 
 def _within(cost: dict[str, Any]) -> bool:
-    """Whether an answer keeps to the bars; pictures and bundles are as large as they are, and drawn the first time."""
+    """Whether a response meets the bars; the size and first-time rendering of images and bundles are exempt."""
     said = cost["request"].split()[1].startswith("/api/")
     quick = all(float(cost[name]) <= BARS[name] for name in ("cpu_ms", "p95_ms"))
     return quick and (not said or (float(cost["kb"]) <= BARS["kb"] and float(cost["first_ms"]) <= BARS["cpu_ms"]))
@@ -127,7 +127,7 @@ def _within(cost: dict[str, Any]) -> bool:
 
 
 def build(data: Path, projects: int, objects: int, clicks: int) -> None:
-    """A folder with that many projects of a kitchen each, and the large one last."""
+    """A folder with that many projects of a kitchen each; the large one is the last."""
     settings = Settings(data_dir=data)
     data.mkdir(parents=True)
     engine = open_engine(settings.database)
@@ -149,7 +149,7 @@ def _objects(session: Session) -> list[SceneObject]:
 
 
 def _project(session: Session, rng: random.Random, name: str, objects: int, clicks: int) -> None:
-    """Rows as an import, some clicking, a run and a review leave them."""
+    """Rows as left by an import, some clicks, a run and a review."""
     now = time.time()
     project = Project(id=name, name=f"Kitchen {name}", status="ready", created=now, updated=now, source_name="scan.r3d")
     project.capture, project.notices, project.media_version = _capture(rng), ["the floor was found late"], "v1"
@@ -191,7 +191,7 @@ def _at(rng: random.Random, most: int) -> float:
 
 
 def _capture(rng: random.Random) -> dict[str, Any]:
-    """What the doctor says of a recording, of about the size it says it in."""
+    """A capture report of about the size that the capture doctor writes."""
     moments = [
         {
             "frame_index": k,
@@ -216,7 +216,7 @@ def _certificate(objects: int) -> dict[str, Any]:
 
 
 def _masks(rng: random.Random, path: Path) -> None:
-    """A drawer's front, about where it is on each frame."""
+    """Masks of a drawer's front, roughly in place on each frame."""
     shape = np.zeros((720, 960), bool)
     shape[300 : 300 + rng.randrange(20, 80), 400 : 400 + rng.randrange(20, 140)] = True
     bits = mask_bits(pack_mask(shape), 960)
@@ -232,7 +232,7 @@ def _masks(rng: random.Random, path: Path) -> None:
 
 
 def _files(data: Path, names: list[str]) -> None:
-    """Frames of the size a page shows, and what a run made of every object, for the large project."""
+    """For the large project: frames of the size that a page shows, and the run's results for every object."""
     files = project_files(data, LARGE)
     finish(files.work)
     files.bundles.mkdir(parents=True)
@@ -258,7 +258,7 @@ def _files(data: Path, names: list[str]) -> None:
 
 
 def _many(folder: Path, suffix: str, content: bytes) -> None:
-    """One file under the name of every frame."""
+    """Write one file under the name of every frame."""
     first = folder / f"{0:06d}.{suffix}"
     first.write_bytes(content)
     for k in range(1, FRAMES):
@@ -267,12 +267,12 @@ def _many(folder: Path, suffix: str, content: bytes) -> None:
         os.link(first, other)
 
 
-# One question after the other, in process
+# Requests one after the other, in process
 
 
 @dataclass
 class Asker:
-    """Speaks to the app without a server, as somebody who signed in."""
+    """In-process ASGI client of the app, signed in."""
 
     app: Any
     cookie: str = ""
@@ -296,7 +296,7 @@ class Asker:
         coming = iter([{"type": "http.request", "body": content, "more_body": False}])
 
         async def receive() -> Any:
-            return next(coming, None) or await asyncio.Event().wait()  # it stays until it is answered
+            return next(coming, None) or await asyncio.Event().wait()  # waits until the response is complete
 
         async def send(message: Any) -> None:
             sent.append(message)
@@ -307,8 +307,8 @@ class Asker:
 
 
 async def ask_everything(data: Path, *, changes: bool) -> list[dict[str, Any]]:
-    """The cost of every GET and, where it may change something, of a click, of its undo and its redo."""
-    key = f"key{changes}"  # a printed key is good for one browser
+    """The cost of every GET and, if `changes`, of a click, its undo and its redo."""
+    key = f"key{changes}"  # a printed key is valid for one browser
     settings = Settings(data_dir=data, launch_token=key, run_jobs=False, min_free_bytes=0, job_memory_bytes=0)
     app = create_app(settings, commands=FAKE_COMMANDS)
     async with app.router.lifespan_context(app):
@@ -334,7 +334,7 @@ async def ask_everything(data: Path, *, changes: bool) -> list[dict[str, Any]]:
 
 
 def rest(cpu_s: Callable[[], float]) -> None:
-    """Wait until a process does nothing any more."""
+    """Wait until a process is idle."""
     before = cpu_s()
     while True:
         time.sleep(REST_S)
@@ -345,7 +345,7 @@ def rest(cpu_s: Callable[[], float]) -> None:
 
 
 def _questions(document: dict[str, Any], item: int) -> Iterator[str]:
-    """Every address that can be asked, about the large project."""
+    """Every GET address, with the ids of the large project filled in."""
     values: dict[str, Any] = {"project": LARGE, "object": item, "frame": 250, "job": 1, "version": 2, "webhook": 1}
     values |= {
         "side": "plan",
@@ -384,7 +384,7 @@ async def _cost(asker: Asker, queries: list[str], method: str, target: str, body
 
 
 def serve_people(data: Path) -> dict[str, float]:
-    """Requests that a core of the server answers in a second, by what is asked."""
+    """Requests that one core of the server answers per second, by kind of request."""
     server = Server(data, real=False)
     server.start()
     try:
@@ -423,7 +423,7 @@ def _scrub(client: httpx.Client, project: str, k: int) -> int:
 
 
 def _click(client: httpx.Client, items: list[dict[str, Any]], k: int) -> int:
-    """A click as a page sends it."""
+    """A click as sent by a page."""
     item = items[k % len(items)]
     path = f"/api/projects/{item['project']}/objects/{item['id']}/points?infer=false"
     click = {"frame": 3, "x": 10.5 + k % 100, "y": 60.5, "label": 1}

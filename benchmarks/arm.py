@@ -1,7 +1,7 @@
-"""What an arm reaches and opens of finished bundles: python benchmarks/arm.py NAME=BUNDLE ... [-o benchmarks/arm.json]
+"""Reach and opening test of finished bundles with an arm: python benchmarks/arm.py NAME=BUNDLE ... [-o benchmarks/arm.json]
 
-A bundle is a zip or a folder that `r2c2r run` wrote. Each is written to the file as soon as it is known, and is not tried
-again while it is there.
+A bundle is a zip or a folder that `r2c2r run` wrote. Each result is written to the file as soon as it is known; bundles already
+in the file are skipped.
 """
 
 import argparse

@@ -1,10 +1,11 @@
-"""The exact box against the paper's Powell search and trimesh's oriented bounds: volume, size error, time.
+"""Minimum bounding boxes (exact, the paper's Powell search, trimesh's oriented bounds) by volume, size error and time.
 
     python benchmarks/boxes.py [--poses 10] [--update]
 
-Shapes are sampled on their surface (3000 points, 2 mm noise) in random poses. With gravity known only the yaw is random and
-calipers in plan compete; without it the whole orientation is. A ratio is the box's volume over the smallest any method found
-in that pose; size errors are against the shape's own box. --update writes benchmarks/boxes.json. About two minutes.
+Shapes are sampled on their surface (3000 points, 2 mm noise) in random poses. With known gravity only the yaw is random, and
+rotating calipers in plan are compared too; otherwise the whole orientation is random. The ratio is a box's volume over the
+smallest that any method found in that pose; size errors are relative to the shape's own box. --update writes
+benchmarks/boxes.json. Takes about two minutes.
 """
 
 import argparse
@@ -26,7 +27,7 @@ from r2c2r_core.geometry.meshes import box_mesh, sample_surface
 
 FIGURES = Path(__file__).resolve().parent / "boxes.json"
 POINTS, NOISE_M = 3000, 0.002
-Method = Callable[[Points], np.ndarray]  # sizes of the box
+Method = Callable[[Points], np.ndarray]  # returns the sizes of the box
 
 METHODS: dict[str, Method] = {
     "exact (hull faces)": lambda points: smallest_box(points).size_m,
@@ -36,9 +37,9 @@ METHODS: dict[str, Method] = {
 }
 UPRIGHT: dict[str, Method] = {
     "exact (calipers in plan)": lambda points: upright_box(points).size_m,
-    "the same, trimmed": lambda points: upright_box(points, trim=0.004).size_m,  # as the product measures
+    "the same, trimmed": lambda points: upright_box(points, trim=0.004).size_m,  # as the product measures it
 }
-PARTS: dict[str, list[tuple[tuple[float, float, float], tuple[float, float, float]]]] = {  # boxes: low, high corner
+PARTS: dict[str, list[tuple[tuple[float, float, float], tuple[float, float, float]]]] = {  # boxes: low and high corner
     "drawer front": [((-0.3, -0.01, -0.1), (0.3, 0.01, 0.1))],
     "base cabinet": [((-0.3, -0.29, -0.36), (0.3, 0.29, 0.36))],
     "square base with a handle": [((-0.3, -0.29, -0.36), (0.3, 0.3, 0.36)), ((0.22, -0.325, 0.0), (0.24, -0.29, 0.2))],
@@ -52,13 +53,13 @@ PARTS: dict[str, list[tuple[tuple[float, float, float], tuple[float, float, floa
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure, print, keep."""
+    """Measure, print, save."""
     parser = argparse.ArgumentParser(description="The exact box against Powell's and trimesh's.")
     parser.add_argument("--poses", type=int, default=10, help="random poses of each shape")
     parser.add_argument("--update", action="store_true", help=f"write {FIGURES.name}")
     options = parser.parse_args(arguments)
     rng = np.random.default_rng(0)
-    smallest_box(rng.random((50, 3)))  # the first call imports
+    smallest_box(rng.random((50, 3)))  # the first call imports its dependencies
     document = {"version": 1, "poses": options.poses, "points": POINTS, "noise_mm": 1000 * NOISE_M} | {
         "gravity_unknown": measured(METHODS, options.poses, rng, upright=False),
         "gravity_known": measured(UPRIGHT | METHODS, options.poses, rng, upright=True),
@@ -82,7 +83,7 @@ def measured(methods: Mapping[str, Method], poses: int, rng: np.random.Generator
 
 
 def one_pose(methods: Mapping[str, Method], points: Points, size: np.ndarray) -> dict[str, tuple[float, float, float]]:
-    """Per method: volume over the smallest found here, worst side's error (mm), time (ms)."""
+    """Per method: volume over the smallest found here, error of the worst side (mm), time (ms)."""
     sizes, spent = {}, {}
     for name, method in methods.items():
         started = time.perf_counter()

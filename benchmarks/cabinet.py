@@ -1,11 +1,11 @@
-"""A real cabinet (TUM fr3 cabinet, 58 key frames) from clicks to its size, beside the size its recording gives.
+"""Size of a real cabinet (TUM fr3 cabinet, 58 key frames) reconstructed from clicks, compared with its recording's own size.
 
     python benchmarks/cabinet.py FOLDER [--workdir DIR]
 
-FOLDER is shared/data/cabinet-tum-fr3-58. Writes cabinet.json beside this file: width, depth and height, of the placed mesh and
-of the scene's object, against the recording's own box (0.793 x 0.445 m, top 0.554 m above the floor), whether each is
-within 2 cm, and how much of that box the mesh fills (the cabinet is closed all round). The category is one that stands free on
-the floor and may be as long as this is: as a "cabinet" it would be taken for one of a row, whose depth no frame shows.
+FOLDER is shared/data/cabinet-tum-fr3-58. Writes cabinet.json beside this file: width, depth and height of the placed mesh and
+of the scene's object against the recording's own box (0.793 x 0.445 m, top 0.554 m above the floor), whether each is within
+2 cm, and which fraction of that box the mesh fills (the cabinet is closed all round). The category is one that is free-standing
+and allows this length: a "cabinet" would be treated as one of a row, whose depth no frame shows.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def measured(work: Workspace) -> dict[str, object]:
-    """Sizes in metres, sorted, and how far they are off."""
+    """Sizes in metres, sorted, and their errors."""
     placement, scene = work.load_latest("align", "cabinet"), work.load_latest("synthesize", "scene")
     found = work.load_latest("generate", "cabinet")
     if placement is None or scene is None or found is None:

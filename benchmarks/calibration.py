@@ -1,16 +1,16 @@
-"""Whether a confidence of 0.9 is right nine times in ten, over the sample kitchens of two generators.
+"""Calibration of confidences (is 0.9 right nine times in ten?) on the sample kitchens of two generators.
 
     python benchmarks/calibration.py [RECORDING...] [--check RECORDING...] [--until segment] [--claims FILE]
 
 A RECORDING is a folder with scan.r3d or capture.r3d, prompts.json, truth.json and true masks (`r2c2r sample` writes one). Each
-is reconstructed from one click an object as far as joints, or as far as masks alone; what the product claims, before any
-calibration, is written down with what is true (--claims; recordings in it are not computed again). The maps are fitted on all
-of them but those to --check: benchmarks/calibration.json, docs/calibration.md, docs/calibration.svg.
+is reconstructed from one click per object up to the joints, or up to the masks alone; the product's claims, before any
+calibration, are stored with their truth (--claims; recordings in that file are not computed again). The maps are fitted on all
+recordings except those of --check: benchmarks/calibration.json, docs/calibration.md, docs/calibration.svg.
 
-mask: the expected IoU of a mask with the truth, in every frame that shows 400 px of the object. edge: that an edge of a front
-of furniture is within 10 mm of the truth. seam: that a front reaches over a seam, by 35 mm or more, onto another one. hinge:
-that a door is hinged on the side told. pose: that an object that is not called unsure stands within 1.5 degrees and 15 mm along
-the axes that were seen. dimension: that a size is within 15 mm, by where it is said to come from.
+mask: the expected IoU of a mask with the truth, in every frame that shows 400 px of the object. edge: an edge of a front of
+furniture is within 10 mm of the truth. seam: a front extends over a seam, by 35 mm or more, onto another one. hinge: a door is
+hinged on the stated side. pose: an object not marked unsure is within 1.5 degrees and 15 mm along the observed axes. dimension:
+a size is within 15 mm, grouped by its stated source.
 """
 
 import argparse
@@ -49,17 +49,17 @@ from r2c2r_core.workspace import Workspace
 HERE = Path(__file__).resolve().parent
 RESULTS, PAGE, PICTURE = HERE / "calibration.json", *(HERE.parent / "docs" / f"calibration.{end}" for end in ("md", "svg"))
 MAPS = ("mask", "hinge")
-AS_CLAIMED = ("edge", "seam")  # network odds: measured, without a map
-SLOPE_SPREAD = 0.5  # standard deviation of a slope about 1 before any claim is known: few claims keep their order of sureness
-MOST_FRAMES = 45  # of a recording, spread over it
-LOOSE = (1.5, 0.015)  # degrees, metres: the accuracy that a placement is asked for
-EDGE_M = 0.01  # an edge is right within it
-SEAM_M = 0.035  # beyond the truth, a front holds some of the next one
+AS_CLAIMED = ("edge", "seam")  # network log-odds: evaluated, without a map
+SLOPE_SPREAD = 0.5  # standard deviation of the slope's prior about 1: with few claims the ranking of confidences is preserved
+MOST_FRAMES = 45  # per recording, spread over it
+LOOSE = (1.5, 0.015)  # degrees, metres: the accuracy required of a placement
+EDGE_M = 0.01  # tolerance of an edge
+SEAM_M = 0.035  # a front that extends this far beyond the truth includes a part of the next one
 Claim = dict[str, Any]
 
 
 def claims_of(folder: Path, work: Workspace, config: ReconstructConfig, until: Stage) -> list[Claim]:
-    """Everything that is claimed of a recording, and whether it is so; a run that is finished in `work` is taken as it is."""
+    """All claims of a recording, each with whether it is true; a run already finished in `work` is reused."""
     recording = recording_in(folder)
     if not work.names(until):
         reconstruct(Request(source=recording, prompts=Prompts(objects=()), config=config), work, until="ingest")
@@ -69,7 +69,7 @@ def claims_of(folder: Path, work: Workspace, config: ReconstructConfig, until: S
     capture = work.load_latest("ingest", "scene")
     truth = {item.name: item for item in read_truth(folder / "truth.json", capture.world_from_capture)}
     objects = work.load_latest("synthesize", "scene").objects if work.names("synthesize") else ()
-    built = {item.name: item for item in objects if item.name in truth}  # not the worktops that were added
+    built = {item.name: item for item in objects if item.name in truth}  # without the worktops that were added
     return [
         *_masks(folder, work, capture),
         *_edges(truth, work),
@@ -91,7 +91,7 @@ def _masks(folder: Path, work: Workspace, capture: Capture) -> Iterator[Claim]:
 
 
 def _edges(truth: Mapping[str, ObjectRecord], work: Workspace) -> Iterator[Claim]:
-    """Of fronts of furniture: each edge; and whether it reaches over a seam, onto another."""
+    """Claims of the fronts of furniture: each edge, and whether the front extends over a seam onto another."""
     for name in work.names("segment"):
         track, true = work.load_latest("segment", name), truth[name]
         if track.kind != "front" or track.front is None or not track.front.edges:
@@ -120,7 +120,7 @@ def _hinges(truth: Mapping[str, ObjectRecord], built: Mapping[str, SceneObject])
 
 
 def _handled(truth: Mapping[str, ObjectRecord], work: Workspace) -> Iterator[Claim]:
-    """Before anything is built: the sides that handles on fronts of furniture tell."""
+    """Claims before anything is built: the hinge sides inferred from handles on fronts of furniture."""
     for name in work.names("segment"):
         track, true = work.load_latest("segment", name), truth[name]
         turning = [joint for joint in true.joints if joint.type == "revolute"]
@@ -141,7 +141,7 @@ def _poses(truth: Mapping[str, ObjectRecord], work: Workspace, built: Mapping[st
         placement, true = work.load_latest("align", name), truth[name]
         turn = true.world_from_object.rotation.T @ item.world_from_object.rotation
         turned = 0.0 if true.turns_freely else float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))))
-        turned = min(turned, abs(turned - 90), abs(turned - 180)) if not true.joints else turned  # a thing has no front
+        turned = min(turned, abs(turned - 90), abs(turned - 180)) if not true.joints else turned  # things have no front
         off = item.world_from_object.translation - true.world_from_object.translation
         along = np.abs(true.world_from_object.rotation.T @ off)[list(true.observed_axes or (True, True, True))]
         right = turned <= LOOSE[0] and float(along.max(initial=0.0)) <= LOOSE[1]
@@ -165,9 +165,9 @@ def _dimensions(truth: Mapping[str, ObjectRecord], built: Mapping[str, SceneObje
 
 
 def figures(claims: Mapping[str, Sequence[Claim]], checked: Set[str]) -> dict[str, Any]:
-    """Of each confidence its map, and how right it is before and after; no kitchen is judged by a map fitted on it.
+    """For each confidence its map, and its calibration before and after; no recording is evaluated with a map fitted on it.
 
-    The maps are fitted on all but the recordings to be `checked`.
+    The maps are fitted on all recordings except those in `checked`.
     """
     fitted = {name: said for name, said in claims.items() if name not in checked}
     others = {name: claims[name] for name in checked}
@@ -193,7 +193,7 @@ def _all(claims: Mapping[str, Sequence[Claim]]) -> list[Claim]:
 
 
 def _measured(claims: Sequence[Claim]) -> dict[str, float]:
-    """How many claims, how sure and how right they are on average, and how far off."""
+    """The number of claims, mean confidence, accuracy, and calibration error."""
     if not claims:
         return {"claims": 0}
     return {
@@ -231,9 +231,9 @@ def _figures_of(own: Mapping[str, Sequence[Claim]], checked: Mapping[str, Sequen
 
 
 def fit(claims: Mapping[str, Sequence[Claim]]) -> tuple[float, float]:
-    """Slope and offset of the largest likelihood, the generators of equal weight.
+    """Maximum a posteriori slope and offset of the logistic map, with equal weight for both generators.
 
-    Claims that are right or wrong count as Platt's targets (1999), (n + 1) / (n + 2): all right is no proof of certainty.
+    Right and wrong claims count as Platt's targets (1999), (n + 1) / (n + 2): all right is no proof of certainty.
     """
     x, y, weight = [], [], []
     each = {name: len(said) for name, said in claims.items()}
@@ -259,7 +259,7 @@ def fit(claims: Mapping[str, Sequence[Claim]]) -> tuple[float, float]:
 
 
 def _bins(claims: Sequence[Claim]) -> list[dict[str, float]]:
-    """Tenths of the claims, at least ten each: their mean, how many, how right."""
+    """Deciles of the claims, at least ten claims each: mean confidence, count, accuracy."""
     ranked = sorted(claims, key=lambda claim: claim["claim"])
     parts = np.array_split(np.arange(len(ranked)), max(min(10, len(ranked) // 10), 1))
     bins = [[ranked[k] for k in part] for part in parts]
@@ -267,7 +267,7 @@ def _bins(claims: Sequence[Claim]) -> list[dict[str, float]]:
 
 
 def _off(claims: Sequence[Claim]) -> float:
-    """The expected calibration error: how far claims are from what is right, the mean over the bins."""
+    """The expected calibration error: the mean over the bins of the distance between confidence and accuracy."""
     bins = _bins(claims)
     return round(sum(b["claims"] * abs(b["claimed"] - b["right"]) for b in bins) / sum(b["claims"] for b in bins), 4)
 
@@ -277,12 +277,12 @@ def _mean(claims: Sequence[Claim], key: str) -> float:
 
 
 def _name(folder: Path) -> str:
-    """Which generator wrote it, and the folder."""
+    """Generator and folder name of a recording."""
     return f"{'own' if (folder / 'truth_masks').exists() else 'second'} {folder.name}"
 
 
 def _by_word(claims: Mapping[str, Sequence[Claim]]) -> list[dict[str, Any]]:
-    """What is claimed in a word: of each, how many claims, and how many of them are right."""
+    """Claims made as a word: for each word, the number of claims and the fraction that is right."""
     counts: dict[tuple[str, str, str], list[float]] = {}
     for name, said in claims.items():
         for claim in said:
@@ -295,7 +295,7 @@ def _by_word(claims: Mapping[str, Sequence[Claim]]) -> list[dict[str, Any]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Claims of what is given and not known yet; then the maps, the figures and the picture."""
+    """Collect the claims of recordings not computed yet; then write the maps, the figures and the plot."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="*", type=Path)
     parser.add_argument("--check", nargs="*", type=Path, default=[], help="recordings that no map is fitted on")
@@ -325,7 +325,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 _AS_IT_IS = {"slope": 1.0, "offset": 0.0}
-RAW: dict[str, Any] = {  # claims before any map
+RAW: dict[str, Any] = {  # claims before any map is applied
     "segment": {"params": {"expected_iou": _AS_IT_IS}},
     "synthesize": {"params": {"joints": _AS_IT_IS}},
     "generate": {"count": 1},

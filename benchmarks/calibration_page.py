@@ -1,4 +1,4 @@
-"""What confidences are worth, as a page of the documentation and a reliability diagram."""
+"""Documentation page and reliability diagram of the confidence calibration."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,7 @@ RIGHT = {
 
 
 def generator_of(name: str) -> str:
-    """Which generator drew a recording: own or second."""
+    """The generator that drew a recording: own or second."""
     return name.split()[0]
 
 
@@ -94,7 +94,7 @@ def _others(checked: Mapping[str, Any]) -> str:
 
 
 def picture(document: Mapping[str, Any]) -> str:
-    """The reliability diagram from 0.5 to 1, SVG: right over claimed; a circle's area is its number of claims."""
+    """The reliability diagram from 0.5 to 1 as SVG: accuracy over confidence; a circle's area is its number of claims."""
     side, gap = 220, 50
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{(side + gap) * len(document["maps"]) + gap}" height="{side + 90}" '

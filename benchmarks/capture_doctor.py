@@ -1,9 +1,9 @@
-"""Does the capture doctor tell right from wrong, and name the cause? Good recordings, and each of them corrupted.
+"""Accuracy of the capture doctor's verdicts and named causes, on good recordings and corrupted copies of each.
 
     python -m benchmarks.capture_doctor [--seeds 0-3] [--frames 50] [--size 480x360] [--data DIR] [--workdir DIR] [--json FILE]
 
-Samples are made in the workdir and kept. DIR of --data holds the real recordings, where they are at hand. Prints a Markdown
-table and writes its rows under "doctor" into benchmarks/capture.json. Exits 1 when one answer is wrong.
+Samples are made in the workdir and kept. DIR of --data holds the real recordings, where available. Prints a Markdown table and
+writes its rows under "doctor" into benchmarks/capture.json. Exits 1 if any verdict is wrong.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from tests.core.ingest.corruptions import CORRUPTIONS, Corruption, corrupt_r3d, 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULTS = Path(__file__).resolve().parent / "capture.json"
 KITCHEN = "kitchen-7scenes-redkitchen-seq01"
-REAL = {  # what a person who looked at them says
+REAL = {  # verdicts of a person who looked at them
     KITCHEN: ("good",),
     "cabinet-tum-fr3-58": ("good",),
     "record3d-exr-door-handle/EXR_RGBD": ("usable with care",),  # 0.4 m of path before one door, no floor
@@ -37,18 +37,18 @@ REAL = {  # what a person who looked at them says
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One recording, and whether the doctor was right."""
+    """One recording, and whether the doctor's verdict was right."""
 
     recording: str
     change: str
     verdict: str
-    first: str  # the cause named first
+    first: str  # the first cause named
     right: bool
     seconds: float
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run them all, print, save."""
+    """Run all recordings, print, save."""
     options = _parser().parse_args(arguments)
     with tempfile.TemporaryDirectory(prefix="r2c2r-doctor-") as scratch:
         rows = []
@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     right = sum(row.right for row in rows)
     print(f"\n{right} of {len(rows)} right; {max(row.seconds for row in rows):.1f} s at most")
     document = json.loads(options.json.read_text()) if options.json.exists() else {}
-    kept = [{name: value for name, value in asdict(row).items() if name != "seconds"} for row in rows]  # the machine's affair
+    kept = [{name: value for name, value in asdict(row).items() if name != "seconds"} for row in rows]  # machine-dependent
     document["doctor"] = {"right": right, "of": len(rows), "rows": kept}
     options.json.write_text(json.dumps(document, indent=1) + "\n")
     return 0 if right == len(rows) else 1
@@ -118,7 +118,7 @@ def _sample(options: argparse.Namespace, seed: int) -> Path:
 
 
 def _raw_kitchen(kitchen: Path, folder: Path) -> Path:
-    """The kitchen with its unregistered depth in the place of the registered."""
+    """The kitchen with its unregistered depth in place of the registered depth."""
     for name in ("color", "depth", "pose"):
         (folder / name).mkdir()
     for depth in sorted((kitchen / "depth_raw").glob("*.png")):

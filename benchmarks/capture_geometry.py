@@ -1,10 +1,10 @@
-"""Gravity, floor, yaw, poses and depth of recordings, against exact truth and against measured furniture.
+"""Accuracy of gravity, floor, yaw, poses and depth of recordings, against exact truth and measured furniture.
 
     python benchmarks/capture_geometry.py SAMPLES [--seeds 0-9] [--data DIR] [--update] [--workdir DIR]
 
-SAMPLES holds seed<N>/scan.r3d of `r2c2r sample --seed N` (180 frames); DIR the real recordings. --update writes the figures
-under "geometry" in benchmarks/capture.json after each recording, leaving those not measured.
-About half a minute of CPU for a sample.
+SAMPLES holds seed<N>/scan.r3d of `r2c2r sample --seed N` (180 frames); DIR holds the real recordings. --update writes the
+figures under "geometry" in benchmarks/capture.json after each recording, and keeps those of recordings not measured.
+Takes about half a minute of CPU time per sample.
 """
 
 import argparse
@@ -44,10 +44,10 @@ REAL = ("kitchen-7scenes-redkitchen-seq01", "cabinet-tum-fr3-58", "open3d-rgbd-5
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure, print, and keep the figures."""
+    """Measure, print, and save the figures."""
     options = _parser().parse_args(arguments)
     figures: dict[str, Any] = {"samples": {}, "real": {}}
-    if options.update and FIGURES.exists():  # one seed measured again leaves the others
+    if options.update and FIGURES.exists():  # measuring one seed again keeps the figures of the others
         figures |= json.loads(FIGURES.read_text(encoding="utf-8")).get("geometry", {})
     jobs = [("real", name) for name in REAL if options.data is not None] + [("samples", str(seed)) for seed in options.seeds]
     for kind, name in jobs:
@@ -82,7 +82,7 @@ def measure_sample(source: Path, seed: int, folder: Path) -> dict[str, Any]:
 
 
 def room_errors(world_from_capture: Rigid3, yaw_rad: float, truth: SampleTruth) -> dict[str, float]:
-    """Gravity and yaw in degrees, floor in millimetres."""
+    """Errors of gravity and yaw in degrees, of the floor in millimetres."""
     here = world_from_capture @ truth.capture_from_kitchen
     run = here.rotation[:, 0]
     off = np.mod(yaw_rad - np.arctan2(run[1], run[0]) + np.pi / 4, np.pi / 2) - np.pi / 4
@@ -113,7 +113,7 @@ def _share_off(truth: SampleTruth, points_capture: np.ndarray) -> float:
 
 
 def drift_figures(capture: Capture, truth: dict[int, Rigid3]) -> dict[str, Any]:
-    """Pose errors as recorded, with 3 cm and 1.5 deg of smooth drift, and exact: before and after refining."""
+    """Pose errors before and after refinement, for poses as recorded, with 3 cm and 1.5 deg of smooth drift, and exact."""
     recorded = list(capture.as_recorded.frames)
     exact = [replace(f, world_from_camera=truth[f.index]) for f in recorded]
     figures: dict[str, Any] = {}
@@ -130,7 +130,7 @@ def drift_figures(capture: Capture, truth: dict[int, Rigid3]) -> dict[str, Any]:
 
 
 def drifted(frames: Sequence[Frame], metres: float, degrees: float) -> list[Frame]:
-    """The frames with an error that grows along the path to that size, wandering on its way."""
+    """The frames with a pose error that grows along the path to that size, with some wander on the way."""
     from scipy.ndimage import gaussian_filter1d
 
     rng, count = np.random.default_rng(0), len(frames)
@@ -160,7 +160,7 @@ def odometry_figures(capture: Capture, truth: dict[int, Rigid3], *, every: int =
 
 
 class _Unsure:
-    """A recording's depth with its confidence withheld, as most formats come."""
+    """A recording's depth without its confidence, as in most formats."""
 
     def __init__(self, source: Path, *, cleaned: bool) -> None:
         self._recording, self._cleaned = open_recording(source), cleaned
@@ -181,7 +181,7 @@ class _Unsure:
 
 
 def flying_figures(source: Path, capture: Capture, truth: SampleTruth, *, every: int = 36) -> dict[str, Any]:
-    """Share of points off the true surface as recorded without confidence, after the single-frame and the many-frame test."""
+    """Fraction of points off the true surface: recorded without confidence, and after the single- and multi-frame filters."""
     raw, cleaned = _Unsure(source, cleaned=False), _Unsure(source, cleaned=True)
     distances: dict[str, list[np.ndarray]] = {"recorded": [], "single_frame": [], "many_frames": []}
     for position in range(10, len(capture.frames), every):
@@ -206,7 +206,7 @@ def flying_figures(source: Path, capture: Capture, truth: SampleTruth, *, every:
 
 
 def upsampling_figures(capture: Capture, truth: SampleTruth, *, every: int = 60) -> dict[str, Any]:
-    """Error at and away from edges, and the share of edge pixels left hanging between both sides."""
+    """Depth error at and away from edges, and the fraction of edge pixels interpolated between both sides."""
     rows: dict[str, list[tuple[float, float, float]]] = {}
     for frame in capture.frames[10::every]:
         rgb, depth = capture.images.rgb(frame.index), capture.images.depth(frame.index).metres
@@ -235,7 +235,7 @@ def upsampling_figures(capture: Capture, truth: SampleTruth, *, every: int = 60)
 
 
 def measure_real(source: Path, folder: Path) -> dict[str, Any]:
-    """What is known of a real recording: heights, a box, poses."""
+    """Figures available for a real recording: heights, a box, poses."""
     capture = read_capture(source, folder, CONFIG)
     truth = {f.index: f.world_from_camera for f in capture.as_recorded.frames}
     poses = capture.poses
@@ -255,7 +255,7 @@ def measure_real(source: Path, folder: Path) -> dict[str, Any]:
 
 
 def height_of(capture: Capture, low: float, high: float) -> float:
-    """Height (m) above the floor with most level surface within 12 mm, between the two."""
+    """Height (m) above the floor, between `low` and `high`, with the most level surface within 12 mm."""
     vertices, faces = capture.surface.vertices_world, capture.surface.faces
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     cross = np.cross(b - a, c - a)
@@ -266,7 +266,7 @@ def height_of(capture: Capture, low: float, high: float) -> float:
 
 
 def cabinet_box(capture: Capture, source: Path) -> dict[str, float]:
-    """The box of what stands on the floor around the measured cabinet's centre, against its measured size and yaw."""
+    """Size and yaw error of the box around the points above the floor near the measured cabinet's centre."""
     x, y, _, yaw, *half = (float(w) for w in (source / "truth_objects.txt").read_text().split()[:7])
     world = capture.world_from_capture
     centre = world.apply(np.array([[x, y, 0.0]]))[0, :2]

@@ -1,9 +1,9 @@
-"""What programs of others read in a bundle: run by consumers.py in an environment that has the one program.
+"""Probes of third-party programs that read a bundle: run by consumers.py in an environment that has that one program.
 
     python consumer_probes.py PROBE BUNDLE [DATASET]
 
-Each probe imports its library alone, reads one file as its documentation does, and returns what it counted. Nothing
-of r2c2r is imported.
+Each probe imports only its own library, reads one file as that library's documentation shows, and returns counts. Nothing of
+r2c2r is imported.
 """
 
 import json
@@ -140,7 +140,7 @@ def datumaro(_: Path, dataset: Path) -> Counts:
     from datumaro.components.annotation import AnnotationType
     from datumaro.components.dataset import Dataset
 
-    with tempfile.TemporaryDirectory() as scratch:  # it takes COCO in COCO's own folders only
+    with tempfile.TemporaryDirectory() as scratch:  # the library reads COCO in COCO's own folder layout only
         (folder := Path(scratch) / "annotations").mkdir()
         shutil.copy(dataset / "annotations.json", folder / "instances_default.json")
         (Path(scratch) / "images").symlink_to(dataset / "images")

@@ -1,9 +1,9 @@
-"""Programs of others that read bundles and datasets: each is installed in an environment of its own and run once.
+"""Compatibility test of bundles and datasets with third-party programs, each installed in its own environment and run once.
 
     python benchmarks/consumers.py BUNDLE DATASET [--only PROBE …] [--environments DIR] [--update]
 
-BUNDLE is a bundle's folder, DATASET what `r2c2r dataset` wrote of the same kitchen. What a program counts (joints, masks) is
-compared with what the files hold. --update writes the rows into benchmarks/consumers.json.
+BUNDLE is a bundle's folder, DATASET is written by `r2c2r dataset` from the same kitchen. A program's counts (joints, masks) are
+compared with the contents of the files. --update writes the rows into benchmarks/consumers.json.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from consumer_probes import PROBES
 
 HERE = Path(__file__).resolve().parent
 RESULTS, PROBE = HERE / "consumers.json", HERE / "consumer_probes.py"
-MINUTES = 15  # of one program's installation and of its run
+MINUTES = 15  # for one program's installation and run
 REQUIRES = {  # by probe: what pip installs; the probe's name with hyphens where it is not listed
     "pinocchio": ["pin"],
     "dm_control": ["dm_control", "mujoco<4"],  # 1.0.50 asks MuJoCo 4 for fields that it no longer has
@@ -36,7 +36,7 @@ REQUIRES = {  # by probe: what pip installs; the probe's name with hyphens where
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Install and run each program; exit 1 when one counts something else than the files hold."""
+    """Install and run each program; exit 1 if any count differs from the contents of the files."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bundle", type=Path)
     parser.add_argument("dataset", type=Path)
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def held_counts(bundle: Path, dataset: Path) -> dict[str, int]:
-    """What the files hold, by what a probe may count."""
+    """The true counts of the files, by the name of what a probe may count."""
     root = ET.parse(bundle / "scene.urdf").getroot()
     labels = json.loads((dataset / "annotations.json").read_text(encoding="utf-8"))
     return {
@@ -70,7 +70,7 @@ def held_counts(bundle: Path, dataset: Path) -> dict[str, int]:
 
 
 def tried(name: str, bundle: Path, dataset: Path, environment: Path, held: dict[str, int]) -> dict[str, Any]:
-    """The version of a program and what came of it: "read", or in one line what went wrong."""
+    """The version of a program and its outcome: "read", or the error in one line."""
     python = environment / "bin" / "python"
     packages = REQUIRES.get(name, [name.replace("_", "-")])
     if not python.exists():

@@ -1,14 +1,14 @@
-"""A kitchen that nothing cut, drawn front by front in the elevation editor, in a real Chromium, and how long hands are busy.
+"""Keystroke-level time to draw all fronts of an uncut kitchen in the elevation editor, in a real Chromium.
 
     r2c2r sample KITCHEN --style handleless --palette white --layout island --seed 1 --frames 150
     python benchmarks/elevation_hand.py KITCHEN [--json benchmarks/app.json]
 
-The person takes no panel that the machine cut and confirms no proposal. They know the fronts as someone who stands before
-them with a tape does (truth.json): runs are dragged by eye over the picture, doors of a run parted by a key where it shows
-or by typed widths, stacks by the number or the heights of their drawers, hinges said by a key at the hinge side, kinds by a
-digit, wall cabinets named together. Then the run, and the bundle's certificate. Machines and things are left out: they are
-clicked, not drawn. Hand time is that of benchmarks/hand.py from the import to the download; computing is beside it.
-Exit status 1: more than five minutes of hand time, or a certificate that failed.
+The simulated person uses no automatically cut panel and confirms no proposal. They know the fronts as if measured on site
+(truth.json): runs are dragged by eye over the picture, the doors of a run are divided by a key where seams show or by typed
+widths, stacks by the number or the heights of their drawers, hinges are set by a key at the hinge side, kinds by a digit, wall
+cabinets are named together. Then the reconstruction runs, and the bundle's certificate is checked. Appliances and free-standing
+objects are left out: they are clicked, not drawn. Hand time is that of benchmarks/hand.py from the import to the download;
+computing time is reported beside it. Exit status 1: more than five minutes of hand time, or a certificate that failed.
 """
 
 import argparse
@@ -35,17 +35,17 @@ from tests.browser.conftest import CHROMIUM, QUIET, served
 
 MOST_S = 300.0
 LONG_MS = 1_800_000
-MARGIN_PX = 16  # of the page around the plane where it is fitted
+MARGIN_PX = 16  # margin of the page around the fitted plane
 OFF_PLANE_M = 0.03
-JOINED_M = 0.008  # doors this near are parted by a seam; drawers of a handleless stack are further apart
-EVEN_M = 0.001  # drawers of one height
+JOINED_M = 0.008  # doors this close are divided by a seam; drawers of a handleless stack are further apart
+EVEN_M = 0.001  # tolerance within which drawers have the same height
 DRAWN = ("drawer", "cabinet", "wall_cabinet", "double_door_cabinet", "double_door_wall_cabinet")
-KINDS = {"double_door_cabinet": "4"}  # the digit, where it is not what the shape says
+KINDS = {"double_door_cabinet": "4"}  # the digit key, where the shape does not imply the kind
 
 
 @dataclass(frozen=True, slots=True)
 class Front:
-    """A front where it is on a plane: metres from its top left corner, y down."""
+    """A front's position on a plane: metres from the plane's top left corner, y down."""
 
     name: str
     category: str
@@ -56,8 +56,8 @@ class Front:
     bottom: float
 
 
-Column = list[Front]  # drawers over each other, or one door
-Row = list[Column]  # beside each other, between one upper and one lower edge
+Column = list[Front]  # drawers above each other, or one door
+Row = list[Column]  # columns side by side, between common lower and upper edges
 
 
 def draw_by_hand(kitchen: Path, data: Path) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def _import(hand: Hand, kitchen: Path) -> None:
     hand.think()
     with page.expect_file_chooser() as chooser:
         hand.click(page.get_by_role("button", name="Import a scan").first)
-    hand.click_elsewhere()  # the file in the system's dialog
+    hand.click_elsewhere()  # stands for choosing the file in the system's dialog
     chooser.value.set_files(kitchen / "scan.r3d")
     page.wait_for_url(re.compile(r"/p/\w+"))
     page.get_by_role("link", name="Click objects").wait_for()
@@ -115,7 +115,7 @@ def _import(hand: Hand, kitchen: Path) -> None:
 
 
 def _ask(page: Page, path: str) -> Any:
-    """What the app says of the project; a look, no action."""
+    """A GET request about the project; not counted as an action."""
     found = re.search(r"(https?://[^/]+)/p/(\w+)", page.url)
     assert found, page.url
     answer = page.context.request.get(f"{found.group(1)}/api/projects/{found.group(2)}{path}")
@@ -124,7 +124,7 @@ def _ask(page: Page, path: str) -> Any:
 
 
 def _fronts_by_plane(page: Page, kitchen: Path) -> dict[int, list[Front]]:
-    """What there is to draw, each front on the first plane it lies on."""
+    """The fronts to draw, each on the first plane that it lies on."""
     planes = _ask(page, "/elevations")["items"]
     found: dict[int, list[Front]] = {}
     for thing in json.loads((kitchen / "truth.json").read_text())["objects"]:
@@ -149,7 +149,7 @@ def _on_plane(plane: dict[str, Any], thing: dict[str, Any]) -> Front | None:
 
 
 def _rows(fronts: list[Front]) -> list[Row]:
-    """Columns, joined where nothing but a seam is between them and they are as high."""
+    """Columns, joined where only a seam separates them and their heights are equal."""
     rows: list[Row] = []
     columns = itertools.groupby(sorted(fronts, key=lambda one: (round(one.left, 2), one.top)), lambda one: round(one.left, 2))
     for _, column in columns:
@@ -169,7 +169,7 @@ def _joined(left: Column, right: Column) -> bool:
 
 @dataclass(slots=True)
 class _Plane:
-    """Where positions of a fitted plane are on the screen."""
+    """Screen positions of points on a fitted plane."""
 
     page: Page
     size: tuple[float, float]
@@ -189,7 +189,7 @@ def _draw_plane(hand: Hand, number: int, fronts: list[Front]) -> None:
     plane = _Plane(page, (item["columns"] * item["cell_m"], item["rows"] * item["cell_m"]))
     hand.think()
     hand.click(page.locator(f".planes [data-plane='{number}']"))
-    page.wait_for_timeout(500)  # the picture
+    page.wait_for_timeout(500)  # let the picture load
     for count, row in enumerate(_rows(fronts)):
         _draw_row(hand, plane, row, typed=bool((number + count) % 2))
     for front in fronts:
@@ -203,7 +203,7 @@ def _draw_plane(hand: Hand, number: int, fronts: list[Front]) -> None:
 
 
 def _draw_row(hand: Hand, plane: _Plane, row: Row, *, typed: bool) -> None:
-    """Dragged as one and parted, where a stack's drawers are alike; else columns by themselves."""
+    """Drag the row as one rectangle; divide it into columns by typed widths or a key at each seam, and these into drawers."""
     hand.think()
     hand.drag(plane.at(row[0][0].left, row[0][0].top), plane.at(row[-1][0].right, row[-1][-1].bottom))
     if typed and len(row) > 1:
@@ -221,7 +221,7 @@ def _draw_row(hand: Hand, plane: _Plane, row: Row, *, typed: bool) -> None:
 
 
 def _draw_stack(hand: Hand, plane: _Plane, drawers: Column) -> None:
-    """Its drawers by number where they are alike, else by their heights."""
+    """Divide a stack by the number of its drawers if they are alike, otherwise by their heights."""
     first, last = drawers[0], drawers[-1]
     hand.think()
     hand.press_at(*plane.at((first.left + first.right) / 2, (first.top + last.bottom) / 2))
@@ -247,7 +247,7 @@ def _say_kind_and_hinge(hand: Hand, plane: _Plane, front: Front) -> None:
 
 
 def _edges_off_mm(page: Page, planes: dict[int, list[Front]]) -> list[float]:
-    """How far each edge of each drawn front is from where it is; fails where one is missing or two are there."""
+    """Distance of each drawn front's edges from the truth; fails if a front is missing or drawn twice."""
     drawn = [entry["front"] for entry in _ask(page, "/prompts.json")["objects"] if entry.get("front")]
     items = {item["id"]: item for item in _ask(page, "/elevations")["items"]}
     off: list[float] = []
@@ -271,7 +271,7 @@ def _rect(plane: dict[str, Any], corners: list[list[float]]) -> np.ndarray | Non
 
 
 def _run(hand: Hand) -> Any:
-    """The certificate of the bundle."""
+    """Run the reconstruction; the bundle's certificate."""
     page = hand.page
     hand.think()
     hand.click(page.get_by_role("link", name="Run", exact=True))
@@ -287,7 +287,7 @@ def _run(hand: Hand) -> Any:
 
 
 def main() -> int:
-    """Go, report; 1 when it took hands too long or the certificate failed."""
+    """Measure and report; 1 if it took too much hand time or the certificate failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kitchen", type=Path)
     parser.add_argument("--data", type=Path, help="keep the app's folder here, with a picture of the fronts; empty")

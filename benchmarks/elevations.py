@@ -1,11 +1,11 @@
-"""Elevations of a recording as pictures: what each front was cut on, for a person who looks for the cause of a wrong one.
+"""Elevations of a recording as pictures, with the evidence that each front was cut on, for debugging wrong fronts.
 
     python benchmarks/elevations.py RECORDING [--prompts FILE] [--truth FILE] [--workdir DIR] -o DIR
 
 Each vertical plane of the scan gives DIR/plane_NN.png, the largest plane first, with four pictures one below the other:
-the orthomosaic; the same with what was cut on it (green), the fronts that clicks found (orange, by name) and the true ones
-(white); the odds of edges (red upright, blue level) and handles (green) that the cut read; and what the scan has depth for.
-A table says how large each plane is, what was cut and which clicks lie on it. What was prepared is kept in --workdir.
+the orthomosaic; the same with the cut fronts (green), the fronts found from clicks (orange, by name) and the true ones (white);
+the odds of edges (red upright, blue level) and handles (green) that the cut used; and the area with depth.
+A table lists each plane's size, what was cut, and which clicks lie on it. Prepared data is kept in --workdir.
 """
 
 import argparse
@@ -26,8 +26,8 @@ from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell, PlaneGrid
 from r2c2r_core.segment.prompts import read_prompts
 from r2c2r_core.segment.runs.run import Run
 
-LEAST_SIDE_M = 0.3  # of a plane that is drawn: a single front is as large
-ON_PLANE_M = 0.03  # of a true front's face from a plane that it is drawn on
+LEAST_SIDE_M = 0.3  # minimum side of a plane that is drawn: about the size of a single front
+ON_PLANE_M = 0.03  # maximum distance of a true front's face from the plane that it is drawn on
 GREEN, ORANGE, WHITE = (90, 200, 90), (40, 140, 255), (255, 255, 255)  # BGR
 
 
@@ -59,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def front_of(session: Any, prompt: ObjectPrompt) -> FoundFront | None:
-    """What its clicks mean, where that is a front; why not is printed."""
+    """The front that a prompt's clicks give; otherwise None, with the error printed."""
     try:
         found = session.find(prompt)
     except R2C2RError as error:

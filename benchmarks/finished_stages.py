@@ -1,4 +1,4 @@
-"""Whether what a finished stage stored stays what it was while servers die."""
+"""Check that the stored outputs of a finished stage stay unchanged while servers are killed."""
 
 import contextlib
 import time
@@ -8,7 +8,7 @@ from kill_server import SetUp
 
 
 class FinishedStages:
-    """What a finished stage stored stays what it was as long as the same run goes on."""
+    """Monitor of stored stage outputs: they must not change while the same run continues."""
 
     def __init__(self, journey: Journey, server: SetUp) -> None:
         self._journey, self._server = journey, server
@@ -17,14 +17,14 @@ class FinishedStages:
         self._looked = 0.0
 
     def look(self) -> None:
-        """Note the files of stages that a running job has finished; compare those noted before."""
+        """Record the files of a running job's finished stages and compare them with earlier records, at most every 0.5 s."""
         if time.monotonic() - self._looked < 0.5:
             return
         self._looked = time.monotonic()
         self.compare()
 
     def compare(self) -> None:
-        """Note and compare."""
+        """Record and compare now."""
         journey = self._journey
         if not journey.ready:
             return

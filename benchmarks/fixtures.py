@@ -1,8 +1,9 @@
-"""Our own carcasses beside NVIDIA Scene Synthesizer's: boards, mass, travel of a drawer and time to build.
+"""Carcasses of this project and of NVIDIA Scene Synthesizer compared: boards, mass, travel of a drawer and build time.
 
     python benchmarks/fixtures.py
 
-Every category that opens, at its usual size, with either provider (`pip install 'r2c2r[scene-synthesizer]'`). Some ten seconds.
+Every category that opens, at its usual size, with either provider (`pip install 'r2c2r[scene-synthesizer]'`). Takes about ten
+seconds.
 """
 
 import time
@@ -32,7 +33,7 @@ def _row(category: Category) -> tuple[str, ...]:
 
 
 def _built(category: Category, provider: str) -> tuple[Build, float]:
-    """The fixture, and the milliseconds of the fastest of some builds."""
+    """The fixture, and the milliseconds of the fastest of several builds."""
     fixture = fixture_of(category)
     assert fixture is not None
     carcass = CARCASSES.load(provider)

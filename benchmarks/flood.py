@@ -1,10 +1,10 @@
-"""One person asks for 44 heavy things at once, twice over: how long others wait, and how long the server takes to end.
+"""Latency for other users and shutdown time of the server while one person requests 44 expensive operations at once, twice.
 
     python benchmarks/flood.py SAMPLE [--json benchmarks/app.json]
 
-SAMPLE holds scan.r3d, as `r2c2r sample` writes it. It is uploaded 44 times by one person, whose 44 finishes, each a look at the
-recording by a process of its own, come at once with 44 requests to show the scan in the 3D view. Meanwhile another person asks
-for /api/health and /api/system, one after the other; when both have been answered for a while, the server gets SIGTERM.
+SAMPLE holds scan.r3d, as `r2c2r sample` writes it. One person uploads it 44 times; the 44 requests to finish the uploads, each
+of which examines the recording in its own process, arrive at once with 44 requests to show the scan in the 3D view. Meanwhile
+another person requests /api/health and /api/system in turn; after enough responses of both, the server gets SIGTERM.
 """
 
 import argparse
@@ -31,13 +31,13 @@ from waiting import until
 from app.serve import new_address
 
 CROWD = 44
-ASKED = 100  # times each, while the flood lasts
+ASKED = 100  # times each, during the flood
 HEADERS = {"X-Requested-With": "flood"}
 COMMAND = "import sys; from r2c2r_core.cli import main; sys.exit(main())"
 
 
 def flood(sample: Path, data: Path) -> dict[str, Any]:
-    """Worst seconds of an answer, what the flood was answered, and seconds from SIGTERM to the end."""
+    """Worst response time in seconds, the status codes of the flood, and seconds from SIGTERM to the end."""
     words = [sys.executable, "-c", COMMAND, "serve", "--port", "0", "--data", str(data)]
     server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
@@ -98,12 +98,12 @@ def _upload(client: httpx.Client, name: str, content: bytes) -> str:
 
 
 def _ask(client: httpx.Client, path: str, body: Any, statuses: Counter[int]) -> None:
-    with contextlib.suppress(httpx.HTTPError):  # the server ended
+    with contextlib.suppress(httpx.HTTPError):  # the server has ended
         statuses[client.post(path, json=body).status_code] += 1
 
 
 def main() -> int:
-    """Flood, report; a wait of more than 5 s, or an end of more than 10 s, is a failure."""
+    """Flood, report; fails if a response takes more than 5 s, or the shutdown more than 10 s."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sample", type=Path)
     add_options(parser)

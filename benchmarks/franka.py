@@ -1,10 +1,10 @@
-"""The Franka kitchen of the `gymnasium-robotics` wheel (1.4.2) as a phone's recording with a truth.
+"""Converter of the `gymnasium-robotics` wheel's Franka kitchen (1.4.2) into a phone recording with ground truth.
 
     python benchmarks/franka.py WHEEL_OR_FOLDER OUT [--frames 120] [--size 640x480] [--seed 0] [--scale 0.575]
 
 WHEEL_OR_FOLDER is the wheel, or a folder it was unpacked to. Shapes, colours, textures and joints come from its MJCF
-(Apache-2.0), its robot is left out. As modelled the worktop is 1.6 m high and the oven 1 m wide; `--scale` makes 0.92 m and
-0.58 m of them. The MJCF hangs no door in the oven: it has no joint to find.
+(Apache-2.0); its robot is left out. As modelled, the worktop is 1.6 m high and the oven 1 m wide; `--scale` makes them 0.92 m
+and 0.58 m. The MJCF has no oven door, so there is no joint to find.
 """
 
 import argparse
@@ -21,15 +21,15 @@ from worlds import Surface, World, box_of, joint_of, record, room
 from r2c2r_core.synthetic.truth import TrueObject
 
 _MODEL = "gymnasium_robotics/envs/assets/kitchen_franka/kitchen_assets/kitchen_env_model.xml"
-_DRAWN = 1  # the group of geoms that are seen; the others collide
-_GRIPS = (int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_CAPSULE))  # a model holds plain numbers
-_BODIES = {  # name and category: the bodies it is made of, the one that may move last; the knobs on the hood are nobody's
+_DRAWN = 1  # group of the visual geoms; the others are colliders
+_GRIPS = (int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_CAPSULE))  # a model stores plain numbers
+_BODIES = {  # name and category: its bodies, the one that may move last; the knobs on the hood belong to no object
     ("oven_0", "range"): ("Burner 1", "Burner 2", "Burner 3", "Burner 4", "ovenroot"),
     ("hood_0", "hood"): ("hoodroot",),
     ("microwave_0", "microwave"): ("microroot", "microdoorroot"),
     ("kettle_0", "kettle"): ("kettleroot",),
 }
-_FRONTS = {  # name and category: the front's body and that of the carcass it closes
+_FRONTS = {  # name and category: the body of the front, and of the carcass that it closes
     ("wall_cabinet_0", "wall_cabinet"): ("hingeleftdoor", "hingecab"),
     ("wall_cabinet_1", "wall_cabinet"): ("hingerightdoor", "hingecab"),
     ("wall_cabinet_2", "wall_cabinet"): ("slidelink", "slide"),
@@ -45,7 +45,7 @@ _TARGETS = (
 
 
 def main() -> None:
-    """Draw it."""
+    """Draw the recording."""
     parser = argparse.ArgumentParser(description="The Franka kitchen as a recording.")
     parser.add_argument("source", type=Path)
     parser.add_argument("out", type=Path)
@@ -94,7 +94,7 @@ def _is_drawn(model: Any, geom: int) -> bool:
 
 
 def _mesh(model: Any, data: Any, geom: int, scale: float) -> trimesh.Trimesh:
-    """A geom in the world; its own frame's vertices are kept in `metadata` for the texture."""
+    """A geom's mesh in the world; its vertices in its own frame are kept in `metadata` for the texture."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         at = model.geom_dataid[geom]
@@ -136,7 +136,7 @@ def _things(model: Any, data: Any, drawn: dict[int, trimesh.Trimesh], scale: flo
 def _thing(
     model: Any, data: Any, name: str, category: str, whole: np.ndarray, front: np.ndarray, body: str, scale: float
 ) -> TrueObject:
-    """What is true of the thing whose moving part is `body`."""
+    """Ground truth of the object whose moving part is `body`."""
     turn = data.body(body).xmat.reshape(3, 3)
     size, pose = box_of(whole, front, 0.0 if category == "kettle" else float(np.arctan2(turn[1, 0], turn[0, 0])))
     joints, first = [], model.body(body).jntadr[0]
@@ -149,7 +149,7 @@ def _thing(
 
 
 def _owner(model: Any, data: Any, geom: int, things: tuple[TrueObject, ...], scale: float) -> int:
-    """Index of the thing a geom belongs to: a carcass goes with the front that it lies behind."""
+    """Index of the object that a geom belongs to: a carcass belongs to the front that it lies behind."""
     body = model.body(model.geom_bodyid[geom]).name
     lines = [*_BODIES.values(), *_FRONTS.values()]
     for index, (thing, names) in enumerate(zip(things, lines, strict=True)):
@@ -160,7 +160,7 @@ def _owner(model: Any, data: Any, geom: int, things: tuple[TrueObject, ...], sca
 
 
 def _surface(model: Any, geom: int, mesh: trimesh.Trimesh, thing: int) -> Surface:
-    """With its material's colour, gloss and texture, laid on by the main direction of each face."""
+    """The surface with its material's colour, gloss and texture, mapped by the dominant axis of each face's normal."""
     material = model.geom_matid[geom]
     rgba = model.mat_rgba[material] * (model.geom_rgba[geom] if (model.geom_rgba[geom][:3] != 0.5).any() else 1.0)
     number = model.mat_texid[material][mujoco.mjtTextureRole.mjTEXROLE_RGB]

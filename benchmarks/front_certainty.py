@@ -1,11 +1,11 @@
-"""The numbers by which a front's edges are held for right: a logistic model fitted on kitchens with truth.
+"""Fit of the logistic model for the confidence of a front's edges, on kitchens with ground truth.
 
     python benchmarks/front_certainty.py KITCHEN… [--clicks 5] [--workdir DIR]
 
-Clicks, edges and what is right are those of segment_fronts.py. What the model looks at is `evidence` of
-r2c2r_core/segment/fronts/certainty.py; the numbers it prints belong into that module's Params. A front counts once, however
-often it was clicked, and the wrong ones of a kitchen as no more than MOST_WRONG: they mostly have one cause. With the numbers:
-of the fronts that a model fitted on all other kitchens holds for less sure than the product asks, how many are wrong.
+Clicks, edges and the criterion for a right front are those of segment_fronts.py. The model's features are `evidence` of
+r2c2r_core/segment/fronts/certainty.py; the printed coefficients belong into that module's Params. A front counts once, however
+often it was clicked, and the wrong fronts of a kitchen weigh no more than MOST_WRONG: they mostly share one cause. Also prints
+how many of the wrong and of the right fronts are less sure than the product's threshold, with their kitchen held out.
 """
 
 import argparse
@@ -24,13 +24,13 @@ from r2c2r_core.segment.contradictions import Params, has_seams
 from r2c2r_core.segment.fronts.certainty import evidence
 from r2c2r_core.segment.fronts.found import FoundFront
 
-MOST_WRONG, PRIOR = 4.0, 1.0  # PRIOR: of the numbers, in terms of what each looks at in units of its spread
+MOST_WRONG, PRIOR = 4.0, 1.0  # PRIOR: precision of the coefficients' prior, in units of each feature's standard deviation
 NAMES = ("faint", "contrast", "rival", "front", "offset")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A front as it was found: what is seen of its edges (4, 5), which of them are wrong, and of a seam inside."""
+    """A front as found: features of its four edges (4, 5), which edges are wrong, and the probability of a seam inside."""
 
     kitchen: str
     seen: np.ndarray
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def found(kitchen: Path, folder: Path, clicks: int) -> list[Case]:
-    """The unlike fronts that clicks on a kitchen's give."""
+    """The distinct fronts found from clicks in a kitchen."""
     session, capture = opened(kitchen, folder)
     rng, cases = np.random.default_rng(0), {}
     for front in true_fronts(kitchen / "truth.json", capture.world_from_capture):
@@ -74,7 +74,7 @@ def found(kitchen: Path, folder: Path, clicks: int) -> list[Case]:
 
 
 def fitted(cases: Sequence[Case]) -> np.ndarray:
-    """The five numbers of the largest posterior, by Newton's method."""
+    """The five coefficients of the maximum a posteriori logistic regression, by Newton's method."""
     seen, wrong = np.stack([case.seen for case in cases]), np.stack([case.wrong for case in cases])
     bad = {case.kitchen: sum(other.wrong.any() for other in cases if other.kitchen == case.kitchen) for case in cases}
     weight = np.array([min(1.0, MOST_WRONG / bad[case.kitchen]) if case.wrong.any() else 1.0 for case in cases])
@@ -89,7 +89,7 @@ def fitted(cases: Sequence[Case]) -> np.ndarray:
 
 
 def unsure(case: Case, numbers: np.ndarray) -> bool:
-    """Whether the product would ask about it."""
+    """Whether the product would mark the front as unsure."""
     edges = 1 / (1 + np.exp(-(case.seen @ numbers)))
     return bool(np.prod(edges) * (1 - case.seam) < Params().unsure_front)
 

@@ -1,7 +1,7 @@
-"""Inputs that are almost right: valid ones of every kind, changed in one or a few places by a seeded generator.
+"""Mutated inputs: valid ones of every kind, changed in one or a few places by a seeded generator.
 
-Structured text is changed as a structure (a value of another type or size, a key lost, twice or unknown), archives by their
-members, folders by their files, everything as bytes; paths and numbers on the command line are replaced.
+Structured text is mutated as a structure (a value of another type or size, a key removed, duplicated or unknown), archives by
+their members, folders by their files, everything as bytes; paths and numbers on the command line are replaced.
 """
 
 import json
@@ -36,7 +36,7 @@ _COMMANDS = {module.name.replace("_", "-") for module in pkgutil.iter_modules(co
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One command and what it is given; `run` names who takes the arguments."""
+    """One command and its arguments; `run` names the process that takes them."""
 
     run: str  # "cli", "worker" or "probe"
     kind: str  # of input
@@ -44,7 +44,7 @@ class Case:
 
     @property
     def command(self) -> str:
-        """What is run, for the counts."""
+        """The command's name, for the counts."""
         if self.run != "cli":
             return self.run
         first = self.arguments[0] if self.arguments else ""
@@ -76,14 +76,14 @@ class Inputs:
 
 
 def case_of(inputs: Inputs, folder: Path, seed: int, number: int) -> Case:
-    """Case `number` of a seed: its files are written into the folder."""
+    """Case `number` of a seed; its files are written into the folder."""
     rng = random.Random(f"{seed}:{number}")
     maker = rng.choices([maker for maker, _ in MAKERS], [weight for _, weight in MAKERS])[0]
     return maker(inputs, folder, rng)
 
 
 def _documents(inputs: Inputs, folder: Path, rng: random.Random) -> Case:
-    """prompts, overrides, config: everything is read before a recording that is none."""
+    """prompts, overrides, config: each is read before the recording, which is invalid."""
     kind = rng.choice(("prompts", "overrides", "config"))
     files = {name: _written(inputs.documents[name], folder / f"{name}.json") for name in ("prompts", "overrides", "config")}
     _damaged_json(inputs.documents[kind], files[kind], rng)
@@ -140,7 +140,7 @@ def _mesh(inputs: Inputs, folder: Path, rng: random.Random) -> Case:
 
 
 def _paths(inputs: Inputs, folder: Path, rng: random.Random) -> Case:
-    """A path that is no such file, no file at all, or no path."""
+    """A path to no such file, to something that is not a file, or that is not a path."""
     (folder / "empty").write_bytes(b"")
     (folder / "folder").mkdir()
     os.mkfifo(folder / "pipe")
@@ -170,7 +170,7 @@ def _paths(inputs: Inputs, folder: Path, rng: random.Random) -> Case:
 
 
 def _numbers(inputs: Inputs, folder: Path, rng: random.Random) -> Case:
-    """A number on the command line; servers are told an address that is none, so that none of them starts."""
+    """A number on the command line; servers get an invalid address, so that none of them starts."""
     odd = rng.choice(
         ("-1", "99999", "65536", "9" * 5000, "1e9", "nan", "", " ", "0x10", "١٢", "٣x٤", "1_0", "-0", "½", "\udcff")
     )
@@ -294,7 +294,7 @@ def _damaged_json(document: Any, path: Path, rng: random.Random) -> None:
 
 
 def _changed(value: Any, rng: random.Random) -> Any:
-    """The same with one place, at any depth, made another thing."""
+    """The same value with one place, at any depth, replaced."""
     if isinstance(value, dict) and value and rng.random() < 0.9:
         key = rng.choice(sorted(value))
         how = rng.random()
@@ -312,7 +312,7 @@ def _changed(value: Any, rng: random.Random) -> Any:
 
 
 def _damaged(content: bytes, rng: random.Random) -> bytes:
-    """The bytes, cut, flipped, repeated, or with one word become another."""
+    """The bytes cut, flipped, repeated, or with one word replaced."""
     at = rng.randrange(len(content) + 1)
     how = rng.randrange(9)
     if how == 0:
@@ -328,7 +328,7 @@ def _damaged(content: bytes, rng: random.Random) -> bytes:
         return content.replace(word, rng.choice(_WORDS), rng.choice((1, 1, -1)))
     flipped = bytearray(content)
     for _ in range(rng.choice((1, 1, 4, 30))):
-        if flipped:  # most formats tell what they hold at their start
+        if flipped:  # most formats have their type at the start
             place = rng.randrange(min(len(flipped), 64)) if rng.random() < 0.5 else rng.randrange(len(flipped))
             flipped[place] = rng.choice((0, 255, flipped[place] ^ 1 << rng.randrange(8)))
     return bytes(flipped)
@@ -338,7 +338,7 @@ def _damaged_folder(folder: Path, rng: random.Random) -> None:
     files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
     if not files:
         return
-    sorts = sorted({(path.parent, path.suffix) for path in files})  # the one text weighs as much as the hundred pictures
+    sorts = sorted({(path.parent, path.suffix) for path in files})  # the one text is as likely as the hundred pictures
     sort = rng.choice(sorts)
     path = rng.choice([file for file in files if (file.parent, file.suffix) == sort])
     how = rng.random()
@@ -348,7 +348,7 @@ def _damaged_folder(folder: Path, rng: random.Random) -> None:
         if is_json:
             try:
                 _damaged_json(json.loads(content), path, rng)
-            except (ValueError, RecursionError):  # it was damaged before: cut short, or 100,000 deep
+            except (ValueError, RecursionError):  # already damaged: cut short, or nested 100,000 deep
                 path.write_bytes(_damaged(content, rng))
         else:
             path.write_bytes(_damaged(content, rng))

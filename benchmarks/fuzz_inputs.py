@@ -1,10 +1,10 @@
-"""Inputs that are almost right, to every command: each must end in an exit code and one line, soon, in bounded memory.
+"""Mutation fuzzing of every command: each run must end in time and in bounded memory, with an exit code and a one-line message.
 
     python benchmarks/fuzz_inputs.py [--minutes 60 | --count 300] [--seed 0] [--json benchmarks/fuzz.json]
 
-The cases (fuzz_cases.py) run one after the other in a process of their own, which says which one it begins; when it falls
-silent or ends, that one is suspected, tried again alone, and only then counted. Case N of a seed is always the same:
-`--only N` shows it with its traceback.
+The cases (fuzz_cases.py) run one after the other in a worker process, which announces each case that it begins; when it stops
+reporting or ends, that case is a suspect: it is run again alone, and counts only then. Case N of a seed is always the same:
+`--only N` runs it with its traceback.
 """
 
 import argparse
@@ -30,15 +30,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from waiting import PATIENCE
 
-SILENT_S, ALONE_S = 40.0, 150.0  # on a busy machine; the slowest honest case takes some 5 s
+SILENT_S, ALONE_S = 40.0, 150.0  # on a busy machine; the slowest valid case takes some 5 s
 MOST_BYTES = 6 << 30
 _LINE = re.compile(r"^(r2c2r(?: \w+)*: |usage: )")
 
 
 def fuzz(seed: int, *, count: int | None = None, minutes: float | None = None, patience: float = PATIENCE) -> dict[str, Any]:
-    """Run cases 0, 1, … until that many are done or the time is up; counts, and every case that ended wrongly.
+    """Run cases 0, 1, … up to that count or time limit; the counts, and every case that ended wrongly.
 
-    `patience` times the silence after which a case is suspected, and then taken for one that hangs.
+    `patience` scales the silence after which a case is a suspect, and the limit after which it counts as hanging.
     """
     began, number = time.monotonic(), 0
     faults: list[dict[str, Any]] = []
@@ -46,7 +46,7 @@ def fuzz(seed: int, *, count: int | None = None, minutes: float | None = None, p
     peak_mb, slowest = 0.0, (0.0, -1)
     while (count is None or number < count) and (minutes is None or time.monotonic() - began < 60 * minutes):
         for said in _worker(seed, number, patience * SILENT_S):
-            if "end" in said:  # it fell silent, or died
+            if "end" in said:  # the worker stopped reporting, or died
                 alone = list(_worker(seed, number, patience * ALONE_S, only=True))
                 if "end" in alone[-1] and not any("done" in line for line in alone):
                     faults.append({"case": number, "wrong": alone[-1]["end"], "said": ""})
@@ -83,7 +83,7 @@ def fuzz(seed: int, *, count: int | None = None, minutes: float | None = None, p
 
 
 def _worker(seed: int, first: int, silent_s: float, *, only: bool = False) -> Iterator[dict[str, Any]]:
-    """What a process that runs the cases from `first` on says; at last {"end": why}, unless it ended when it should."""
+    """Messages of a worker that runs the cases from `first` on; last {"end": why}, unless it ended as expected."""
     words = [sys.executable, __file__, "--worker", str(first), "--seed", str(seed), *(["--alone"] if only else [])]
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=log, stdin=subprocess.DEVNULL)
@@ -117,12 +117,12 @@ def _listen(stream: Iterable[bytes], lines: "queue.Queue[bytes]") -> None:
 
 
 def work(seed: int, first: int, *, alone: bool) -> int:
-    """Run the cases from `first` on, or that one alone, and say of each how it ended."""
+    """Run the cases from `first` on, or only that one, and report how each ended."""
     from fuzz_cases import Inputs, case_of
 
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_BYTES, MOST_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    out = os.fdopen(os.dup(1), "w")  # what the cases print goes elsewhere
+    out = os.fdopen(os.dup(1), "w")  # output of the cases goes elsewhere
     with tempfile.TemporaryDirectory(prefix="r2c2r-fuzz-") as root:
         (Path(root) / "good").mkdir()
         inputs, number = Inputs(Path(root) / "good"), first
@@ -144,7 +144,7 @@ def work(seed: int, first: int, *, alone: bool) -> int:
 
 
 def judged(case: Any, *, debug: bool = False) -> tuple[int, str, str]:
-    """Exit code of a case run in this process, what was wrong with its end (nothing: empty), and its last words."""
+    """Exit code of a case run in this process, the fault in how it ended, and its last output; the last two empty if none."""
     runners = {"cli": _cli, "worker": _job_worker, "probe": _probe}
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", errors=e) for e in ("strict", "backslashreplace"))
     failure = ""
@@ -179,7 +179,7 @@ def _job_worker(arguments: list[str]) -> int:
 
 
 def _probe(arguments: list[str]) -> int:
-    """As app.jobs.probe looks, without its limits: they would hold for all cases that follow."""
+    """Examine a recording as app.jobs.probe does, without its limits, which would also apply to all later cases."""
     from app.jobs.messages import run_stage
     from app.jobs.probe import LOOKS
 
@@ -198,7 +198,7 @@ def _tell(out: Any, **message: object) -> None:
 
 
 def main() -> int:
-    """Fuzz, and keep what was counted."""
+    """Fuzz, and save the counts."""
     from kept import add_options, report
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)

@@ -1,11 +1,11 @@
-"""Two finished kitchens as one room of 20 objects or more: how long synthesis, warp, export and certificate really take.
+"""Duration of synthesis, warp, export and certificate for a room of 20 objects or more, made of two finished kitchens.
 
     python benchmarks/galley.py --workdir DIR [--kitchens seed0,seed1] [--objects 20] [--json FILE]
 
-The second kitchen is turned round and stands opposite the first, as in a galley: every noun that a stage hands on (tracks,
-placements, frames, the scanned surface) is moved with it, so the four stages work on real measurements and pictures of 20
-objects. DIR holds the workdirs of finished `r2c2r run`s, as benchmarks/scene.py reads them. Times count on an idle machine:
-the load is written beside them.
+The second kitchen is rotated and placed opposite the first, as in a galley kitchen: every noun that a stage passes on (tracks,
+placements, frames, the scanned surface) is transformed with it, so the four stages work on real measurements and pictures of 20
+objects. DIR holds the workdirs of finished `r2c2r run`s, as benchmarks/scene.py reads them. Times are meaningful on an idle
+machine only: the load is recorded beside them.
 """
 
 import argparse
@@ -29,12 +29,12 @@ from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace
 
 _AISLE_M = 2.0
-_SECOND = 1_000_000  # added to the second recording's frame numbers
+_SECOND = 1_000_000  # offset of the second recording's frame numbers
 
 
 @dataclass(frozen=True, slots=True)
 class _BothImages:
-    """Pixels of two captures."""
+    """Pixels of both captures."""
 
     first: FrameImages
     second: FrameImages
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def timed(placed: Placed) -> dict[str, Any]:
-    """Seconds of each stage, and what the certificate says of the room."""
+    """Seconds of each stage, and the certificate's figures for the room."""
     load = os.getloadavg()[0]
     with tempfile.TemporaryDirectory(prefix="r2c2r-galley-") as folder:
         proof = prove(placed, Path(folder) / "bundle.zip")
@@ -78,7 +78,7 @@ def timed(placed: Placed) -> dict[str, Any]:
 
 
 def galley(first: Placed, second: Placed, objects: int) -> Placed:
-    """One room: all of the first kitchen and as many of the second, opposite, as are needed."""
+    """One room: all of the first kitchen and, opposite, as many objects of the second as are needed."""
     moved = _moved(second, _opposite(_fronts(first), _fronts(second)))
     joined = Capture(
         name=f"{first.capture.name} and {second.capture.name}",
@@ -104,7 +104,7 @@ def _fronts(placed: Placed) -> list[Rigid3]:
 
 
 def _opposite(fronts: list[Rigid3], others: list[Rigid3]) -> Rigid3:
-    """The motion after which the other fronts face these ones across the aisle."""
+    """The rigid motion after which the second kitchen's fronts face the first's across the aisle."""
 
     def middle_and_yaw(poses: list[Rigid3]) -> tuple[np.ndarray, float]:
         outward = -np.sum([pose.rotation[:, 1] for pose in poses], axis=0)
@@ -118,7 +118,7 @@ def _opposite(fronts: list[Rigid3], others: list[Rigid3]) -> Rigid3:
 
 
 def _moved(placed: Placed, new_from_old: Rigid3) -> Placed:
-    """Everything of a kitchen that has a place in the world, moved; names and frame numbers made its own."""
+    """A kitchen with every world coordinate transformed, and with names and frame numbers made unique."""
     capture, tracks, placements, assets = placed
     frames = tuple(
         replace(f, index=f.index + _SECOND, world_from_camera=new_from_old @ f.world_from_camera) for f in capture.frames

@@ -1,14 +1,14 @@
-"""Candidates against truth: extents, centre and yaw of the scene, how well the choice is made, and what an object takes.
+"""Completed shapes against truth: extents, centre and yaw of the scene, quality of the ranking, and time per object.
 
     python benchmarks/generate.py [--seeds 0-9] [--samples DIR] [--workdir DIR] [--parts a,b] [--json FILE] [--update]
 
---workdir holds workspaces named seedN, finished or not: what they hold is used again, the rest is computed there. --samples
+--workdir holds workspaces named seedN, finished or not: their results are reused, the rest is computed there. --samples
 holds samples named seedN. --update rewrites benchmarks/generate.json. Parts: scene, ranking, seconds.
 
-Truth of the scene are the sample's boxes; of the ranking the solids the sample was drawn from (a bottle's profile, else the
-box without its handle), round things with their middles laid upon each other. The paper's tables are given beside, in its
-metrics: E_avg (eq. 17-20, along the object's axes instead of the world's) and IoU, here of exact solids instead of voxels
-of unstated size (a point cloud has no volume).
+The truth of the scene is the sample's boxes; that of the ranking is the solids the sample was drawn from (a bottle's profile,
+otherwise the box without its handle), with the centres of round objects aligned. The paper's tables are given for comparison,
+in its metrics: E_avg (eq. 17-20, along the object's axes instead of the world's) and IoU, here of exact solids instead of
+voxels of unstated size (a point cloud has no volume).
 """
 
 import argparse
@@ -44,9 +44,9 @@ from r2c2r_core.synthetic.stage import write_sample
 from r2c2r_core.workspace import Workspace
 
 RESULTS = Path(__file__).resolve().parent / "generate.json"
-COUNT = 10  # candidates of an object
-NEAR_BEST = 0.9  # of the best candidate's overlap with the truth
-FURNITURE = 2  # fronts of a kitchen that are ranked: their candidates differ in hidden depth alone
+COUNT = 10  # candidates per object
+NEAR_BEST = 0.9  # fraction of the best candidate's overlap with the truth
+FURNITURE = 2  # fronts ranked per kitchen: their candidates differ in hidden depth only
 PARTS = ("scene", "ranking", "seconds")
 PAPER = {
     "E_avg": {"drawer": 4.192, "bottle": 3.264, "microwave": 5.182, "refrigerator": 5.172},  # Table 1, percent
@@ -68,7 +68,7 @@ class Kitchen:
         return Workspace(self.work).load_latest("ingest", "scene")  # type: ignore[return-value]  # main() made sure
 
     def tracks(self) -> Iterator[MaskTrack]:
-        """Every object's masks."""
+        """Every object's mask track."""
         work = Workspace(self.work)
         for name in work.names("segment"):
             track = work.load_latest("segment", name)
@@ -104,7 +104,7 @@ def scene_figures(kitchens: list[Kitchen]) -> dict[str, Any]:
 
 
 def _scene_rows(kitchen: Kitchen) -> list[dict[str, Any]]:
-    """One entry an object; the overlap is that of the mesh as placed, before it is fitted to the scene."""
+    """One entry per object; the overlap is that of the placed mesh, before it is fitted to the scene."""
     found = evaluate_bundle(Workspace(kitchen.work).bundle, kitchen.sample / "truth.json")
     solids = true_solids(kitchen.seed, kitchen.sample / "truth.json", kitchen.capture.world_from_capture)
     rows = []
@@ -136,14 +136,14 @@ def _means(rows: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def _worst(rows: list[dict[str, Any]]) -> list[str]:
-    """The ten objects whose observed extents are furthest off."""
+    """The ten objects with the largest errors of the observed extents."""
     known = [row for row in rows if row["extents_observed"] is not None]
     known.sort(key=lambda row: -row["extents_observed"])
     return [f"seed {row['seed']} {row['name']}: {row['extents_observed']:.1f} %" for row in known[:10]]
 
 
 def _paper_tables(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Ours beside the paper's own, percent."""
+    """Our figures beside the paper's, in percent."""
     tables: dict[str, Any] = {}
     for title, ours in (("E_avg", "extents"), ("IoU", "solid_iou")):
         tables[title] = {}
@@ -155,7 +155,7 @@ def _paper_tables(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def ranking_figures(kitchens: list[Kitchen], processes: int) -> dict[str, Any]:
-    """How near the chosen candidate comes to the best one by truth, and what other rules would have chosen."""
+    """Distance of the chosen candidate from the truly best one, and of the choices of other rules."""
     with ProcessPoolExecutor(processes) as pool:
         rows = [row for found in pool.map(_ranked, kitchens) for row in found]
     figures: dict[str, Any] = {"candidates": COUNT, "objects": len(rows)}
@@ -175,7 +175,7 @@ def ranking_figures(kitchens: list[Kitchen], processes: int) -> dict[str, Any]:
 
 
 def _ranked(kitchen: Kitchen) -> list[dict[str, Any]]:
-    """Every chosen object's candidates, judged by truth."""
+    """The candidates of every selected object, evaluated against the truth."""
     capture = kitchen.capture
     solids = true_solids(kitchen.seed, kitchen.sample / "truth.json", capture.world_from_capture)
     tracks = list(kitchen.tracks())
@@ -219,7 +219,7 @@ def _judged(capture: Capture, track: MaskTrack, solid: Any) -> dict[str, Any]:
 
 
 def _rank_correlation(order: list[int], overlaps: list[float]) -> float:
-    """Spearman's between our order and the true one; nan where all are alike."""
+    """Spearman's rank correlation of our order with the true one; nan if all overlaps are equal."""
     if np.ptp(overlaps) < 1e-6:
         return float("nan")
     place = np.argsort(order)
@@ -228,7 +228,7 @@ def _rank_correlation(order: list[int], overlaps: list[float]) -> float:
 
 
 def _asset(name: str, candidate_id: str, metrics: dict[str, float], assumes: str = "") -> MeshAsset:
-    """What the choice reads of a candidate; its picture is not needed to judge its shape."""
+    """An asset with the fields that the choice reads; its mesh is not needed to rank its shape."""
     nothing = TexturedMesh(
         vertices=np.zeros((0, 3)),
         faces=np.zeros((0, 3), np.int64),
@@ -256,7 +256,7 @@ def _shape_only(asset: MeshAsset) -> MeshAsset:
 
 
 def seconds_figures(kitchen: Kitchen) -> dict[str, Any]:
-    """Wall and CPU time of ten candidates, the choice and the placement, for one object of every category."""
+    """Wall and CPU time of ten candidates, the choice and the placement, for one object per category."""
     capture, seen, figures = kitchen.capture, set[str](), {}
     config = GenerateConfig(count=COUNT)
     for track in kitchen.tracks():
@@ -274,13 +274,13 @@ def seconds_figures(kitchen: Kitchen) -> dict[str, Any]:
             "placement": placed - made,
             "total": placed - wall,
             "cpu": spent,
-            "search": time.perf_counter() - placed,  # of the same mesh, as one from elsewhere
+            "search": time.perf_counter() - placed,  # of the same mesh, treated as one from another source
         }
     return {"candidates": COUNT, "cores": os.cpu_count(), "by_category": figures}
 
 
 def _rounded(value: Any) -> Any:
-    """The document with four decimals, and null where a figure does not exist."""
+    """The document rounded to four decimals, with null for missing figures."""
     if isinstance(value, float):
         return round(value, 4) if np.isfinite(value) else None
     if isinstance(value, dict):
@@ -296,7 +296,7 @@ def _headline(value: Any) -> Any:
 
 
 def _kitchen(seed: int, options: argparse.Namespace) -> Kitchen:
-    """The sample and the finished workspace, made where they are missing."""
+    """The sample and the finished workspace, computed if they are missing."""
     sample, work = options.samples / f"seed{seed}", options.workdir / f"seed{seed}"
     if not (sample / "scan.r3d").exists():
         write_sample(sample, seed=seed)

@@ -1,7 +1,7 @@
-"""What the gripper opens of finished bundles: python benchmarks/gripper.py NAME=BUNDLE ... [-o benchmarks/gripper.json]
+"""Opening test of finished bundles with a gripper: python benchmarks/gripper.py NAME=BUNDLE ... [-o benchmarks/gripper.json]
 
-A bundle is a zip or a folder that `r2c2r run` wrote. Each is written to the file as soon as it is known, and is not tried
-again while it is there.
+A bundle is a zip or a folder that `r2c2r run` wrote. Each result is written to the file as soon as it is known; bundles already
+in the file are skipped.
 """
 
 import argparse

@@ -3,13 +3,13 @@
     python benchmarks/guard.py [KITCHEN...] [--workdir DIR] [--second PATH/make_kitchen.py] [--franka WHEEL] [--fast] [--update]
 
 Kitchens: sample-0..4 (own clicks), second-100..104 and franka (random clicks), opened-ours-21 and opened-second-101 (filmed
-while fronts open) go through `r2c2r run`, `check` and `evaluate`; of STYLE-120 and STYLE-121 only the edges of clicked fronts
-are measured. Each kitchen is drawn once into DIR/KITCHEN; stages whose code did not change are read from there, so that a run
-after a change to one stage recomputes that stage and the later ones. --fast takes six kitchens up to the scene, from the masks
-that an earlier run stored, and leaves out whatever needs masks or a bundle.
+while fronts open) go through `r2c2r run`, `check` and `evaluate`; for STYLE-120 and STYLE-121 only the edges of clicked fronts
+are measured. Each kitchen is drawn once into DIR/KITCHEN; stages with unchanged code are read from there, so that a run after a
+change to one stage recomputes only that stage and the later ones. --fast takes six kitchens up to the scene, from the masks
+that an earlier run stored, and leaves out the measures that need masks or a bundle.
 
-Exits 1 where an object is worse than in benchmarks/baseline.json by more than a measure's tolerance, where a found one is now
-missing, where a certificate is lost, or where a measure gets worse on significantly more objects than it gets better on (sign
+Exits 1 if an object is worse than in benchmarks/baseline.json by more than a measure's tolerance, if a previously found object
+is missing, if a certificate is lost, or if a measure gets worse on significantly more objects than it gets better on (sign
 test). --update stores the kitchens that were run.
 """
 
@@ -37,23 +37,23 @@ from r2c2r_core.segment.prompts import read_prompts
 from r2c2r_core.workspace import Workspace
 
 BASELINE = Path(__file__).resolve().parent / "baseline.json"
-MEASURES = {  # the change of one object's figure that is reported; negative where larger is better
+MEASURES = {  # smallest change of an object's figure that is reported; negative where larger is better
     **dict.fromkeys(("width_error", "depth_error", "height_error"), 0.5),  # %
     **dict.fromkeys(("centre", "front_centre", "pivot", "edge"), 3.0),  # mm
     "inner_depth": 2.0,  # mm
     "yaw": 0.3,  # deg
-    **dict.fromkeys(("joint_type", "hinge_side", "stop", "limit_source"), -1e-6),  # share right
+    **dict.fromkeys(("joint_type", "hinge_side", "stop", "limit_source"), -1e-6),  # fraction right
     "false_motion": 1e-6,  # joints
-    **dict.fromkeys(("mask_iou", "mask_iou_open", "state"), -0.02),  # share
+    **dict.fromkeys(("mask_iou", "mask_iou_open", "state"), -0.02),  # fraction
 }
-DRIFT_P = 0.01  # of the one-sided sign test
+DRIFT_P = 0.01  # significance level of the one-sided sign test
 USABLE_PERCENT = 5.0
 Row = dict[str, float] | None  # figures by measure; None: the object is missing
 Kitchen = dict[str, Any]  # certified: bool | None; objects: {name: Row}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the kitchens, print what became worse, and a table."""
+    """Run the kitchens, print the regressions and a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kitchens", nargs="*", metavar="KITCHEN", help=f"of {', '.join(KITCHENS)}")
     parser.add_argument("--workdir", type=Path, default=Path("build/guard"))
@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def regressions(measured: Mapping[str, Kitchen], stored: Mapping[str, Kitchen]) -> list[str]:
-    """One line for every object, certificate and measure that became worse; figures that either side lacks are not compared."""
+    """One line for every object, certificate and measure that became worse; figures missing on either side are not compared."""
     lines: list[str] = []
     changes: dict[str, list[float]] = {}
     for name, kitchen in measured.items():
@@ -107,7 +107,7 @@ def regressions(measured: Mapping[str, Kitchen], stored: Mapping[str, Kitchen]) 
 
 
 def _drift(measure: str, changes: Sequence[float]) -> str | None:
-    """A line where significantly more objects became worse than better; changes below a hundredth of the tolerance are ties."""
+    """A line if significantly more objects became worse than better; changes below a hundredth of the tolerance are ties."""
     worse, better = sum(change > 0.01 for change in changes), sum(change < -0.01 for change in changes)
     if worse + better == 0 or binomtest(worse, worse + better, alternative="greater").pvalue > DRIFT_P:
         return None
@@ -136,7 +136,7 @@ def _measure(name: str, folder: Path, *, fast: bool) -> Kitchen:
 
 
 def _bundle(folder: Path, prompts: Prompts) -> Kitchen:
-    """What the bundle says of every clicked object."""
+    """The bundle's figures for every clicked object."""
     work, clicks = folder / "run", folder / "clicks.json"
     write_prompts(prompts, clicks)
     outcome = whole_way(recording_in(folder), clicks, folder / "truth.json", work, anew=False)
@@ -151,7 +151,7 @@ def _bundle(folder: Path, prompts: Prompts) -> Kitchen:
 
 
 def _scene(folder: Path, prompts: Prompts) -> Kitchen:
-    """What the scene says of every clicked object, without masks and without a bundle."""
+    """The scene's figures for every clicked object, without masks and without a bundle."""
     work, truth = Workspace(folder / "run" / "work"), folder / "truth.json"
     reconstruct(Request(source=recording_in(folder), prompts=prompts), work, until="warp", workers=0)
     scene, capture = work.load_latest("warp", "scene"), work.load_latest("ingest", "scene")
@@ -164,7 +164,7 @@ def _scene(folder: Path, prompts: Prompts) -> Kitchen:
 
 
 def _front_edges(folder: Path) -> dict[str, Row]:
-    """The worst edge, mm, of every front clicked once at a random place."""
+    """The worst edge error (mm) of every front, clicked once at a random place."""
     session, capture = opened(folder, folder / "work")
     rng = np.random.default_rng(zlib.crc32(folder.name.encode()))
     rows: dict[str, Row] = {}
@@ -180,7 +180,7 @@ def _row(values: Mapping[str, float | None]) -> Row:
 
 
 def _document(kitchens: Mapping[str, Kitchen]) -> str:
-    """JSON with a line for each object."""
+    """JSON with one line per object."""
     parts = []
     for name in sorted(kitchens):
         rows = ",\n".join(f"  {json.dumps(thing)}: {json.dumps(row)}" for thing, row in kitchens[name]["objects"].items())

@@ -1,4 +1,4 @@
-"""Ways in which a recording can be broken or mean harm, each with random choices of its own."""
+"""Generators of broken or malicious recordings, each with random choices of its own."""
 
 import io
 import json
@@ -31,7 +31,7 @@ def packed(members: Members, method: int = zipfile.ZIP_DEFLATED) -> bytes:
 
 
 def bomb(good: Members, rng: random.Random) -> bytes:
-    """A member that unpacks to hundreds of times its size."""
+    """A decompression bomb: a member that unpacks to hundreds of times its size."""
     size = rng.choice([66, 70, 80]) << 20
     return packed({**good, rng.choice(["metadata", "rgbd/0.jpg", "zeros"]): bytes(size)})
 
@@ -81,7 +81,7 @@ def nested(good: Members, rng: random.Random) -> bytes:
 
 
 def traversal(good: Members, rng: random.Random) -> bytes:
-    """A name that leads out."""
+    """A member name that leads out of the target folder (path traversal)."""
     names = [
         "../evil",
         "a/../../evil",
@@ -95,7 +95,7 @@ def traversal(good: Members, rng: random.Random) -> bytes:
 
 
 def link(good: Members, rng: random.Random) -> bytes:
-    """A symbolic link or a device in the archive."""
+    """A symbolic link or a device file in the archive."""
     buffer = io.BytesIO(packed(good))
     info = zipfile.ZipInfo(rng.choice(["rgbd/0.jpg", "metadata", "secret"]) + "x")
     info.external_attr = (rng.choice([stat.S_IFLNK, stat.S_IFCHR, stat.S_IFIFO, stat.S_IFBLK]) | 0o777) << 16
@@ -105,13 +105,13 @@ def link(good: Members, rng: random.Random) -> bytes:
 
 
 def truncated(good: Members, rng: random.Random) -> bytes:
-    """Cut short somewhere."""
+    """An archive cut short at a random place."""
     content = packed(good)
     return content[: rng.randrange(1, len(content) - 30)]
 
 
 def wrong_type(good: Members, rng: random.Random) -> bytes:
-    """Something else altogether."""
+    """A file of a different type."""
     tar = io.BytesIO()
     with tarfile.open(fileobj=tar, mode="w:gz") as archive:
         archive.addfile(tarfile.TarInfo("metadata"), io.BytesIO())
@@ -135,7 +135,7 @@ def wrong_type(good: Members, rng: random.Random) -> bytes:
 
 
 def poisoned_numbers(good: Members, rng: random.Random) -> bytes:
-    """Calibration or poses that are no numbers."""
+    """Calibration or poses with invalid numbers."""
     metadata: dict[str, Any] = json.loads(good["metadata"])
     value = rng.choice([float("nan"), float("inf"), -float("inf"), 1e308, -1.0, 0.0, None, "1", [], {}, 10**400])
     where = rng.choice(["K", "w", "h", "poses", "all"])
@@ -143,7 +143,7 @@ def poisoned_numbers(good: Members, rng: random.Random) -> bytes:
         metadata = dict.fromkeys(metadata, value)
     elif where == "poses":
         metadata["poses"] = [[value] * 7 for _ in metadata["poses"]]
-        if value in (0.0, -1.0, 1e308):  # legal numbers, impossible poses
+        if value in (0.0, -1.0, 1e308):  # valid numbers, impossible poses
             metadata["poses"] = [[0.0] * 7 for _ in metadata["poses"]]
     elif where == "K":
         metadata["K"] = [value] * 9
@@ -156,7 +156,7 @@ def poisoned_numbers(good: Members, rng: random.Random) -> bytes:
 
 
 def poisoned_text(good: Members, rng: random.Random) -> bytes:
-    """Metadata that no parser should follow."""
+    """Metadata that no parser should process."""
     texts = [
         b"[" * 100_000,
         b'{"a":' * 50_000 + b"1" + b"}" * 50_000,
@@ -174,7 +174,7 @@ def poisoned_text(good: Members, rng: random.Random) -> bytes:
 
 
 def huge_images(good: Members, rng: random.Random) -> bytes:
-    """Colour whose header claims more pixels than any memory holds, or pictures that are none."""
+    """Colour images whose header claims more pixels than any memory can hold, or invalid pictures."""
     jpeg = bytearray(good["rgbd/0.jpg"])
     at = jpeg.index(b"\xff\xc0")
     jpeg[at + 5 : at + 9] = b"\xff\xff\xff\xff"
@@ -187,7 +187,7 @@ def huge_images(good: Members, rng: random.Random) -> bytes:
 
 
 def huge_depth(good: Members, rng: random.Random) -> bytes:
-    """Depth that is cut, random, of another size, or a bomb in LZFSE."""
+    """Depth that is cut short, random, of another size, or an LZFSE bomb."""
     some = next(content for name, content in good.items() if name.endswith(".depth"))
     others = [
         some[: len(some) // 2],
@@ -204,12 +204,12 @@ def huge_depth(good: Members, rng: random.Random) -> bytes:
 
 @cache
 def _depth_bomb() -> bytes:
-    """64 MB of zeros in 48 kB of LZFSE, as blocks of 1 MB: to compress them in one takes half a minute."""
+    """64 MB of zeros in 48 kB of LZFSE, as blocks of 1 MB: compressing them in one block takes half a minute."""
     return 64 * lzfse.compress(bytes(1 << 20))[:-4] + b"bvx$"
 
 
 def lying_table(good: Members, rng: random.Random) -> bytes:
-    """A table of contents that does not tell the truth."""
+    """An archive with a false table of contents."""
     content = bytearray(packed(good))
     choice = rng.randrange(5)
     first = content.index(b"PK\1\2")
@@ -218,12 +218,12 @@ def lying_table(good: Members, rng: random.Random) -> bytes:
     elif choice == 1:
         at = first
         while (at := content.find(b"PK\1\2", at)) >= 0:
-            struct.pack_into("<H", content, at + 10, rng.choice([12345, 99, 6]))  # a method nobody knows
+            struct.pack_into("<H", content, at + 10, rng.choice([12345, 99, 6]))  # an unknown compression method
             at += 4
     elif choice == 2:
         at = first
         while (at := content.find(b"PK\1\2", at)) >= 0:
-            struct.pack_into("<I", content, at + 42, rng.randrange(2**31))  # bodies elsewhere
+            struct.pack_into("<I", content, at + 42, rng.randrange(2**31))  # wrong offsets of the bodies
             at += 4
     elif choice == 3:
         end = content.rindex(b"PK\5\6")
@@ -237,7 +237,7 @@ def lying_table(good: Members, rng: random.Random) -> bytes:
 
 
 def damaged_bodies(good: Members, rng: random.Random) -> bytes:
-    """Every body of the archive has wrong bytes in it."""
+    """Wrong bytes in every body of the archive."""
     content = bytearray(packed(good, zipfile.ZIP_STORED))
     for info in zipfile.ZipFile(io.BytesIO(bytes(content))).infolist():
         at = info.header_offset + 30 + len(info.filename) + rng.randrange(max(info.file_size, 1))
@@ -246,13 +246,13 @@ def damaged_bodies(good: Members, rng: random.Random) -> bytes:
 
 
 def stripped(good: Members, rng: random.Random) -> bytes:
-    """A part that is needed is missing."""
+    """An archive that lacks its metadata, colour or depth."""
     part = rng.choice(["metadata", ".jpg", ".depth", "rgbd"])
     return packed({name: content for name, content in good.items() if part not in name})
 
 
 def nothing_measured(good: Members, rng: random.Random) -> bytes:
-    """Depth that is no number anywhere."""
+    """No valid depth anywhere: NaN, infinite, zero or negative."""
     value = rng.choice([float("nan"), float("inf"), -float("inf"), -1.0, 0.0])
     size = next(len(lzfse.decompress(content)) for name, content in good.items() if name.endswith(".depth"))
     depth = lzfse.compress(np.full(size // 4, value, "<f4").tobytes())
@@ -260,7 +260,7 @@ def nothing_measured(good: Members, rng: random.Random) -> bytes:
 
 
 def huge_headers(good: Members, rng: random.Random) -> bytes:
-    """Names, comments and extra fields as long as the format allows, over and over."""
+    """Many names, comments and extra fields as long as the format allows."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for number in range(rng.randint(30, 60)):
@@ -274,7 +274,7 @@ def huge_headers(good: Members, rng: random.Random) -> bytes:
 
 
 def deep_folders(good: Members, rng: random.Random) -> bytes:
-    """Folders in folders, hundreds deep."""
+    """Folders nested hundreds deep."""
     deep = "d/" * rng.randint(40, 10_000)
     where = rng.choice(["beside", "around"])
     inner = {**good, deep + "f": b"x"} if where == "beside" else {deep + name: content for name, content in good.items()}
@@ -282,7 +282,7 @@ def deep_folders(good: Members, rng: random.Random) -> bytes:
 
 
 def many_files(good: Members, rng: random.Random) -> bytes:
-    """More files than any recording has, all of them empty."""
+    """Many more files than any recording has, all empty."""
     count = rng.choice([200_001, 260_000])
     local = struct.pack("<4sHHHHHIIIHH", b"PK\3\4", 20, 0, 0, 0, 33, 0, 0, 0, 6, 0) + b"000000"
     return local + _empty_files(count) + struct.pack("<4sHHHHIIH", b"PK\5\6", 0, 0, 0xFFFF, 0xFFFF, 52 * count, len(local), 0)
@@ -290,22 +290,22 @@ def many_files(good: Members, rng: random.Random) -> bytes:
 
 @cache
 def _empty_files(count: int) -> bytes:
-    """A table of contents of so many."""
+    """A zip of `count` empty files."""
     entry = struct.pack("<4sHHHHHHIIIHHHHHII", b"PK\1\2", 20, 20, 0, 0, 0, 33, 0, 0, 0, 6, 0, 0, 0, 0, 0, 0)
     return b"".join(entry + b"%06d" % number for number in range(count))
 
 
 def twice_the_same_name(good: Members, rng: random.Random) -> bytes:
-    """Two files of one name: which one is meant?"""
+    """Two files with one name: an ambiguous archive."""
     buffer = io.BytesIO(packed(good))
     with zipfile.ZipFile(buffer, "a") as archive, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it warns of just that
+        warnings.simplefilter("ignore")  # Python warns of exactly that
         archive.writestr(rng.choice(list(good)), rng.randbytes(rng.randint(1, 300)))
     return buffer.getvalue()
 
 
 def names_of_no_encoding(good: Members, rng: random.Random) -> bytes:
-    """Names that claim to be UTF-8 and are not."""
+    """Names flagged as UTF-8 that are not valid UTF-8."""
     content = bytearray(packed(good))
     for mark, flags, name in ((b"PK\1\2", 8, 46), (b"PK\3\4", 6, 30)):
         at = -1

@@ -1,9 +1,9 @@
-"""Uploads that mean harm or are broken: each must end in 4xx with one line, and leave nothing behind.
+"""Robustness test of malicious or broken uploads: each must end in 4xx with a one-line message, and leave nothing behind.
 
     python benchmarks/hostile_uploads.py [--count 1000] [--seed 0] [--json benchmarks/app.json]
 
 A good recording (a tiny room as a .r3d) is damaged in every way listed in hostile_kinds.py, each with its own random choices,
-and the protocol of resumable uploads is abused. After each: no file, no row, no process; at the end: no memory kept.
+and the protocol of resumable uploads is misused. After each: no file, no row, no process left; at the end: no memory leaked.
 """
 
 import argparse
@@ -32,19 +32,19 @@ from tests.app.conftest import Running, running
 from tests.core.ingest.tiny import TinyRoom, write_r3d
 
 ABUSE = "abused_protocol"
-ENDED_S = 60.0  # what a request started ends with it: long after, it is taken for left behind
+ENDED_S = 60.0  # processes of a request end with it: one that is still there after this long counts as left behind
 NAMES = ("scan.r3d", "scan.zip", "../../etc/passwd", "a\nb.r3d", "<img src=x onerror=alert(1)>.zip", "\u202egpj.zip", "x" * 300)
 
 
 def good_members(folder: Path) -> Members:
-    """A recording that is read without complaint."""
+    """Members of a valid recording."""
     path = write_r3d(folder / "good.r3d", replace(TinyRoom(), count=4))
     with zipfile.ZipFile(path) as archive:
         return {info.filename: archive.read(info) for info in archive.infolist() if not info.is_dir()}
 
 
 def send_all(folder: Path, count: int, seed: int) -> dict[str, Any]:
-    """Send `count` of them to an app of its own; what was wrong, what was left, and how long it took."""
+    """Send `count` hostile uploads to a separate app; the faults, what was left behind, memory and time."""
     rng = random.Random(seed)
     good = good_members(folder)
     statuses, wrong, slowest, by_kind = Counter[int](), [], (0.0, ""), Counter[str]()
@@ -56,7 +56,7 @@ def send_all(folder: Path, count: int, seed: int) -> dict[str, Any]:
             web.delete(f"/api/projects/{project['id']}")
             web.delete(f"/api/trash/{project['id']}")
         memory = [_memory_mb()]
-        ours = set(psutil.Process().children(recursive=True))  # of whoever measures
+        ours = set(psutil.Process().children(recursive=True))  # processes of this benchmark
         for number in range(count):
             name = names[number % len(names)]
             sent = time.monotonic()
@@ -81,22 +81,22 @@ def send_all(folder: Path, count: int, seed: int) -> dict[str, Any]:
         "wrong": wrong,
         "slowest_s": round(slowest[0], 2),
         "slowest_kind": slowest[1],
-        "memory_mb": [round(size) for size in memory],  # before, after each quarter, at the end
+        "memory_mb": [round(size) for size in memory],  # before, after each quarter, and at the end
         "seconds": round(time.monotonic() - began, 1),
     }
 
 
 def upload(web: Running, content: bytes, name: str) -> Any:
-    """One upload, in one piece."""
+    """One upload in one piece."""
     return web.client.post("/api/projects/upload", params={"filename": name}, content=content)
 
 
 def abused_protocol(web: Running, good: Members, rng: random.Random) -> list[Any]:
-    """What a resumable upload must refuse; an upload that was announced for it is given up at the end."""
+    """Requests that a resumable upload must refuse; the upload announced for them is deleted at the end."""
     ask = web.client.request
     announce = {"file_name": rng.choice(NAMES), "size": rng.randint(40, 4000)}
     size = announce["size"]
-    if rng.random() < 0.3:  # nothing is even announced
+    if rng.random() < 0.3:  # no upload is announced at all
         impossible = rng.choice([-1, -(2**31), 0, 2**53, 2**63, 10**30, 1.5, "12", None, True, [], 2**50])
         strangers = rng.choice(["0" * 12, "..", "%2e%2e%2fr2c2r.db", "a" * 500, "\u202e", "-1"])
         return [
@@ -117,13 +117,13 @@ def abused_protocol(web: Running, good: Members, rng: random.Random) -> list[Any
     offset = int(ask("HEAD", at).headers["upload-offset"])
     rest = packed(good)[offset:size].ljust(size - offset, b"\0")
     assert ask("PATCH", at, content=rest, headers={"Upload-Offset": str(offset)}).status_code == 204
-    answers.append(ask("POST", f"{at}/finish"))  # complete, and no recording: refused, and gone
+    answers.append(ask("POST", f"{at}/finish"))  # complete but not a recording: refused and deleted
     answers.append(ask("DELETE", at))
     return answers
 
 
 def complaint(web: Running, answer: Any) -> str:
-    """What is wrong with an answer to a hostile upload; empty when nothing is."""
+    """The fault of a response to a hostile upload; empty if there is none."""
     if not 400 <= answer.status_code < 500:
         return f"{answer.status_code}: {answer.text[:200]}"
     said = answer.json()
@@ -138,11 +138,11 @@ def complaint(web: Running, answer: Any) -> str:
 
 
 def left_behind(web: Running, before: set[psutil.Process]) -> str:
-    """Files, rows or processes that a refused upload left; `before`: processes that ran already."""
+    """Files, rows or processes that a refused upload left behind; `before`: processes that already ran."""
     data = web.settings.data_dir
     files = [path for place in ("projects", "uploads") for path in (data / place).rglob("*") if path.is_file()]
     for place, rows in (("projects", web.get("/api/projects")), ("uploads", web.get("/api/uploads"))):
-        for row in rows:  # so that the next one is not blamed for it
+        for row in rows:  # so that they are not attributed to the next upload
             web.client.delete(f"/api/{place}/{row['id']}")
             web.client.delete(f"/api/trash/{row['id']}")
             files.append(Path(row["id"]))
@@ -155,12 +155,12 @@ def left_behind(web: Running, before: set[psutil.Process]) -> str:
 
 def _memory_mb() -> float:
     gc.collect()
-    ctypes.CDLL(None).malloc_trim(0)  # what was freed goes back to the system
+    ctypes.CDLL(None).malloc_trim(0)  # returns freed memory to the system
     return float(psutil.Process().memory_info().rss) / 1e6
 
 
 def main() -> int:
-    """Send, report; 1 when something was wrong."""
+    """Send and report; 1 if there was any fault."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)

@@ -1,8 +1,8 @@
-"""Axis and pivot errors as others define them, beside this project's, so that tables can be compared.
+"""Axis and pivot errors by the definitions of other papers, beside this project's, so that tables can be compared.
 
-DTA stands for PARIS, DigitalTwinArt and ArtGS, which share one: the pivot is a distance between lines, in tenths of a metre.
-iTACO's and Real2Code's divide by the length of the axes' cross product: parallel axes, the right answer, give 0/0, and nearly
-parallel ones the distance along an arbitrary normal. Arti4D's is the distance of the found point to the true line.
+DTA stands for PARIS, DigitalTwinArt and ArtGS, which share a definition: the pivot error is a distance between lines, in tenths
+of a metre. iTACO's and Real2Code's divide by the length of the axes' cross product: parallel axes, the right answer, give 0/0,
+and nearly parallel ones the distance along an arbitrary normal. Arti4D's is the distance of the found point to the true line.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Line:
 
 
 def definitions(true: Line, found: Line) -> dict[str, float]:
-    """Every definition's error by its name and unit; nan where a definition has none."""
+    """The error by every definition, keyed by name and unit; nan where a definition gives none."""
     cosine = min(abs(float(true.axis @ found.axis)), 1.0)
     return {
         "axis deg": float(np.degrees(np.arccos(cosine))),
@@ -48,7 +48,7 @@ def _lines_apart(a: Line, b: Line) -> float:
 
 
 def _along_normal(a: Line, b: Line) -> float:
-    """The same without the case of parallel lines: nan there."""
+    """The distance along the axes' common normal; nan for parallel lines."""
     normal = np.cross(a.axis, b.axis)
     length = float(np.linalg.norm(normal))
     return abs(float(normal @ (b.origin - a.origin))) / length if length > 0 else float("nan")

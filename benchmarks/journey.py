@@ -1,15 +1,15 @@
-"""From upload to an approved bundle as a practised person goes, in a real Chromium, with the clock running.
+"""Time and clicks of a practised person from upload to an approved bundle, in a real Chromium.
 
     python benchmarks/journey.py SAMPLE [--json benchmarks/app.json]
 
-SAMPLE is what `r2c2r sample` writes (180 frames, 14-15 objects). The person knows the room as well as its truth does: after all
-proposals from 80 % up are confirmed with one key, what is still missing gets a click where a person would click (prompts.json),
-what is no object is deleted, a wrong category is written anew. Then run, accept every object, send to review, approve,
-download.
+SAMPLE is a folder that `r2c2r sample` writes (180 frames, 14-15 objects). The simulated person knows the room's ground truth:
+after all proposals from 80 % confidence up are confirmed with one key, each missing object gets a click where a person would
+click (prompts.json), false objects are deleted, wrong categories are corrected. Then run, accept every object, send to review,
+approve, download.
 
-The app's own figures count the clicks (GET …/figures): each point, each proposal confirmed (also when one key confirms them
-all), dismissed or deleted, each new name or category, each undo is one. Key presses and mouse presses on the whole way are
-counted here beside it, and so is the time of computing in it. Exit status 1: more than 10 minutes, or 1.2 clicks an object.
+Clicks are counted by the app (GET …/figures): each point, each proposal confirmed (also when one key confirms them all),
+dismissed or deleted, each new name or category, and each undo is one. Key and mouse presses on the whole way are counted here
+as well, and so is computing time. Exit status 1: more than 10 minutes, or 1.2 clicks per object.
 """
 
 import argparse
@@ -36,13 +36,13 @@ from app.jobs.mask_wire import bits_mask
 from tests.browser.conftest import CHROMIUM, QUIET, served
 
 MOST_MINUTES, MOST_CLICKS = 10.0, 1.2
-SAME = 0.5  # IoU from which a mask is that object
+SAME = 0.5  # minimum IoU for a mask to count as that object
 LONG_MS = 1_800_000
 
 
 @dataclass
 class Person:
-    """A pair of hands whose presses are counted, and what they know of the room."""
+    """A simulated person: counts presses, and knows the room's ground truth."""
 
     page: Page
     sample: Path
@@ -58,7 +58,7 @@ class Person:
         return f"/api/projects/{found.group(1)}"
 
     def ask(self, path: str) -> Any:
-        """What the app says; a look, no action."""
+        """A GET request to the app; not counted as an action."""
         origin = re.match(r"https?://[^/]+", self.page.url)
         assert origin
         answer = self.page.context.request.get(origin.group() + path)
@@ -66,31 +66,31 @@ class Person:
         return answer.json()
 
     def press(self, key: str) -> None:
-        """One key."""
+        """Press one key."""
         self.keys += 1
         self.page.keyboard.press(key)
 
     def click(self, target: Any, **where: Any) -> None:
-        """One press of the mouse."""
+        """Press the mouse button once."""
         self.mouse += 1
         target.click(timeout=LONG_MS, **where)
 
     def write(self, target: Any, text: str) -> None:
-        """Into a field, and Enter."""
+        """Type into a field and press Enter."""
         self.click(target)
         self.keys += len(text) + 1
         target.fill(text)
         target.press("Enter")
 
     def answer(self, target: Any, text: str) -> None:
-        """Into the field of a question, which has the focus, and Ctrl+Enter."""
+        """Type into the focused field of a dialog and press Ctrl+Enter."""
         self.keys += len(text) + 1
         target.fill(text)
         target.press("Control+Enter")
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
-        """Minutes of a part of the way."""
+        """Record the minutes of one phase."""
         began = time.monotonic()
         yield
         self.minutes[name] = round((time.monotonic() - began) / 60, 2)
@@ -158,7 +158,7 @@ def _confirm(person: Person) -> None:
 
 
 def _masks_come(person: Person) -> None:
-    """Until every object's masks are there."""
+    """Wait until every object has its masks."""
     while True:
         items = person.ask(f"{person.project}/objects")
         if items and all(item["segment"] in ("done", "failed") for item in items):
@@ -167,7 +167,7 @@ def _masks_come(person: Person) -> None:
 
 
 def _correct(person: Person) -> int:
-    """Delete what is nothing or twice, write categories anew, click what is missing; how many of the truth's are there then."""
+    """Delete false and duplicate objects, correct categories, click missing ones; return the resulting number of true objects."""
     wanted = {item["name"]: item["category"] for item in json.loads((person.sample / "truth.json").read_text())["objects"]}
     found = _looked_at(person)
     for item, name in found:
@@ -184,7 +184,7 @@ def _correct(person: Person) -> int:
 
 
 def _looked_at(person: Person) -> list[tuple[dict[str, Any], str | None]]:
-    """Each object of the app, and which of the room's it shows on the frame it was clicked on."""
+    """Each object of the app, and the true object that it shows on the frame it was clicked on."""
     names = [item["name"] for item in json.loads((person.sample / "truth.json").read_text())["objects"]]
     found: list[tuple[dict[str, Any], str | None]] = []
     for item in person.ask(f"{person.project}/objects"):
@@ -210,7 +210,7 @@ def _iou(mask: np.ndarray, truth: np.ndarray) -> float:
 
 
 def _click_object(person: Person, name: str, category: str) -> None:
-    """On the frame where it is seen best: its category, then one click on it."""
+    """On the frame that shows it best: set its category, then click it once."""
     page = person.page
     prompts = json.loads((person.sample / "prompts.json").read_text())["objects"]
     point = next(item["points"][0] for item in prompts if item["name"] == name)
@@ -227,7 +227,7 @@ def _click_object(person: Person, name: str, category: str) -> None:
     scale = min(box["width"] / facts["width"], box["height"] / facts["height"])
     left, top = (box["width"] - facts["width"] * scale) / 2, (box["height"] - facts["height"] * scale) / 2
     at = {"x": left + point["x"] * scale, "y": top + point["y"] * scale}
-    person.click(canvas, position=at, modifiers=["Control"])  # also where another one's mask is
+    person.click(canvas, position=at, modifiers=["Control"])  # also where another object's mask is
     while len(person.ask(f"{person.project}/objects")) == before:
         page.wait_for_timeout(50)
 
@@ -240,7 +240,7 @@ def _run(person: Person) -> None:
 
 
 def _review(person: Person) -> list[str]:
-    """Accept every object with one key each, then through the states; what was unmet when it was approved."""
+    """Accept every object with one key each, then step through the states; the unmet requirements at approval."""
     page = person.page
     person.click(page.get_by_role("link", name="Review").first)
     groups = person.ask(f"{person.project}/candidates")
@@ -249,7 +249,7 @@ def _review(person: Person) -> list[str]:
         if number < len(groups):
             person.press("y")
     while not all(group["accepted"] for group in person.ask(f"{person.project}/candidates")):
-        page.wait_for_timeout(300)  # they are shown at once and stored one after the other
+        page.wait_for_timeout(300)  # shown at once, but stored one after the other
     unmet: list[str] = []
     for text in ("Send to review", "Start the review", "Approve"):
         button = page.get_by_role("button", name=text, exact=True)
@@ -272,7 +272,7 @@ def _download(person: Person) -> None:
 
 
 def main() -> int:
-    """Go, report; 1 when it took too long or too many clicks."""
+    """Measure and report; 1 if it took too long or too many clicks."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sample", type=Path)
     add_options(parser)

@@ -1,4 +1,4 @@
-"""The app's figures in one file: each script owns a part of it, and prints what it keeps."""
+"""Shared JSON file of the app's benchmark figures: each script prints its figures and replaces its own part of the file."""
 
 import argparse
 import json
@@ -9,17 +9,17 @@ from typing import Any
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """--json FILE, the same in every script."""
+    """Add the option --json FILE, the same in every script."""
     parser.add_argument("--json", type=Path, help="keep the figures in this file (benchmarks/app.json), beside those of others")
 
 
 def report(part: str, figures: dict[str, Any], file: Path | None, *, failed: bool = False) -> int:
-    """Print the figures, replace that part of the file, and say by the exit status whether a bar was missed."""
+    """Print the figures, replace that part of the file, and return the exit status: whether a bar was missed."""
     figures = {
         "commit": _commit(),
         **figures,
         "load_average": round(os.getloadavg()[1], 1),
-    }  # times mean little on a busy machine
+    }  # times are not meaningful on a busy machine
     print(json.dumps(figures, indent=1))
     if file is not None:
         parts = json.loads(file.read_text()) if file.exists() else {}
@@ -31,6 +31,6 @@ def report(part: str, figures: dict[str, Any], file: Path | None, *, failed: boo
 
 
 def _commit() -> str:
-    """What was measured, as git names it: with "-dirty" where files were changed since; empty outside a clone."""
+    """The commit that was measured, as git describes it: with "-dirty" if files were changed; empty outside a clone."""
     command = ["git", "describe", "--always", "--dirty", "--exclude", "*"]
     return subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False).stdout.strip()

@@ -1,4 +1,4 @@
-"""What one person does from upload to download while servers die, what was acknowledged, and whether it is still there."""
+"""Simulated user from upload to download while servers are killed, with a check that acknowledged changes are still stored."""
 
 import contextlib
 import hashlib
@@ -16,7 +16,7 @@ import httpx2 as httpx
 from kill_server import SetUp
 from waiting import PATIENCE, until
 
-PIECES = 12  # that a recording is uploaded in
+PIECES = 12  # number of parts that a recording is uploaded in
 
 
 class Refused(Exception):
@@ -29,22 +29,22 @@ class Refused(Exception):
 
 @dataclass(frozen=True)
 class Change:
-    """A change on its way: the same request under the same key until an answer comes."""
+    """A pending change: the same request is repeated under the same key until a response arrives."""
 
     what: str
     method: str
     path: str
     body: Any
     key: str
-    took: Callable[[Any], None]  # what the answer says is true from now on
+    took: Callable[[Any], None]  # applies the response to the expected state
 
 
 class Journey:
-    """One person, and everything the server said is stored."""
+    """One simulated user, and everything that the server acknowledged."""
 
     def __init__(self, server: SetUp, rng: random.Random, real: Path | None) -> None:
         self.server, self.rng, self.real = server, rng, real
-        self.client = httpx.Client(timeout=60 * PATIENCE, follow_redirects=True)  # to the store, for a bundle
+        self.client = httpx.Client(timeout=60 * PATIENCE, follow_redirects=True)  # bundles are at the store
         self.recording = (real / "scan.r3d").read_bytes() if real else _any_zip()
         self.upload: tuple[str, int] | None = None  # id, acknowledged bytes
         self.project, self.ready, self.stood_in = "", False, False
@@ -55,7 +55,7 @@ class Journey:
         self.state = "draft"
         self.jobs: set[int] = set()
         self.bundles: dict[int, str] = {}  # version: checksum
-        self.part: tuple[int, bytes] | None = None  # of a bundle that is being downloaded
+        self.part: tuple[int, bytes] | None = None  # of a bundle being downloaded
         self.pending: Change | None = None
         self.acknowledged, self.sent_again, self.job_ends = Counter[str](), Counter[str](), Counter[str]()
         self.lost: list[str] = []
@@ -66,7 +66,7 @@ class Journey:
         return f"/api/projects/{self.project}"
 
     def ask(self, method: str, path: str, **options: Any) -> Any:
-        """One request; raises httpx.HTTPError when the server vanished meanwhile, Refused when it says no."""
+        """One request; raises httpx.HTTPError if the server dies during it, Refused if it returns an error."""
         headers = {"X-Requested-With": "kills", "Host": self.server.host, **options.pop("headers", {})}
         answer = self.client.request(method, self.server.address_for(path) + path, headers=headers, **options)
         if answer.status_code >= 500 and answer.status_code != 503 and not answer.history:
@@ -76,12 +76,12 @@ class Journey:
         return answer.json() if answer.content and "json" in answer.headers["content-type"] else answer
 
     def change(self, what: str, method: str, path: str, body: Any, took: Callable[[Any], None]) -> None:
-        """One change; it stays pending when the server vanishes before it answers."""
+        """Send one change; it stays pending if the server dies before it responds."""
         self.pending = Change(what, method, path, body, f"{self.rng.getrandbits(96):x}", took)
         self._send(self.pending)
 
     def send_again(self) -> None:
-        """The change whose answer was lost, under the key it had."""
+        """Repeat the change whose response was lost, under the same key."""
         change = self.pending
         if change is None:
             return
@@ -95,11 +95,11 @@ class Journey:
             self._read_again(change)
 
     def sign_in(self) -> None:
-        """The session outlives every server."""
+        """Sign in; the session survives server restarts."""
         self.client.get(f"{self.server.address_for('/')}/", params={"token": "key"})
 
     def act(self) -> None:
-        """The next thing this person does; nothing new before what is pending was answered."""
+        """Do the next action; a pending change is resolved first."""
         with contextlib.suppress(Refused):
             if self.pending is not None:
                 self.send_again()
@@ -111,7 +111,7 @@ class Journey:
                 self.rng.choice(self._choices())()
 
     def compare(self) -> None:
-        """What is stored is what was acknowledged, no more and no less."""
+        """Check that exactly the acknowledged state is stored."""
         self._compare_upload()
         if not self.ready:
             return
@@ -124,7 +124,7 @@ class Journey:
         self._compare_review()
 
     def settles(self, seconds: float) -> bool:
-        """Whether every job and every object's masks come to an end with nobody asking for it."""
+        """Whether every job and every object's masks finish without further requests."""
 
         def quiet() -> bool:
             jobs = self.ask("GET", f"/api/jobs?project={self.project}&limit=500")
@@ -144,14 +144,14 @@ class Journey:
         return False
 
     def _choices(self) -> list[Callable[[], None]]:
-        """What makes sense now; what is more frequent in life is there more often."""
+        """The currently possible actions, repeated in proportion to how frequent they are in use."""
         there = [number for number, item in self.objects.items() if not item["deleted"]]
         review = [self._comment, self._resolve, self._step, self._download, self._run]
         judged = [number for number in self.reviews if number in there]
         if judged:
             of = self.rng.choice(judged)
             review += [lambda: self._judge(of)] * 3 + [lambda: self._correct(of)] * (1 if self.real else 2)
-        if self.real:  # a click anywhere would be an object more to reconstruct
+        if self.real:  # a click at a random place would add an object to reconstruct
             return review
         number = self.rng.choice([n for n in self.objects if n not in self.reviews] or [0])  # a deleted one may be undone
         edits = [self._change_side_upload] + [self._add] * (2 if len(there) < 9 else 0)
@@ -163,7 +163,7 @@ class Journey:
         return review + edits
 
     def _import(self) -> None:
-        """Upload in pieces, then finish."""
+        """Upload in parts, then finish."""
         if self.upload is None:
             wish = {"file_name": "scan.r3d", "size": len(self.recording)}
             self.upload = (self.ask("POST", "/api/uploads", json=wish)["id"], 0)
@@ -182,13 +182,13 @@ class Journey:
         self.acknowledged["piece of a recording"] += 1
 
     def _change_side_upload(self) -> None:
-        """Another recording is on its way meanwhile, and never complete."""
+        """Continue another upload, which is never completed."""
         if self.upload is None:
             self.upload = (self.ask("POST", "/api/uploads", json={"file_name": "next.zip", "size": 1 << 20})["id"], 0)
         self._send_piece(*self.upload, bytes(1 << 20), 64)
 
     def _open(self) -> None:
-        """Once the import is done: the objects, and (for stand-ins) the nouns of a first reconstruction."""
+        """Once the import is done: create the objects, and (with stand-in stages) the nouns of a first reconstruction."""
         project = self.ask("GET", self.at)
         if project["status"] != "ready":
             return
@@ -196,7 +196,7 @@ class Journey:
         if self.real is not None:
             prompts = json.loads((self.real / "prompts.json").read_text())
             first = {**prompts, "objects": prompts["objects"][:3]}
-            self.ask("POST", f"{self.at}/prompts.json", json=first)  # by name: twice is once
+            self.ask("POST", f"{self.at}/prompts.json", json=first)  # keyed by name, so repeating it is harmless
             self._run()
         elif not self.stood_in:
             self._stand_in_for_a_first_run()
@@ -225,7 +225,7 @@ class Journey:
 
     def _click(self) -> dict[str, Any]:
         frame = self.rng.choice(self.frames)
-        # the stand-in segmenter holds what is clicked at the right edge: its masks never come to an end
+        # the stand-in segmenter blocks on clicks at the right edge: their masks never finish
         x, y = self.rng.uniform(0, 0.95 * frame["width"]), self.rng.uniform(0, frame["height"] - 1)
         return {"frame": frame["index"], "x": x, "y": y, "label": 1}
 
@@ -259,7 +259,7 @@ class Journey:
         self.change("run", "POST", f"{self.at}/run", {}, lambda job: self.jobs.add(job["id"]))
 
     def _download(self) -> None:
-        """Half a bundle now, the other half another time, perhaps from another server."""
+        """Download half of a bundle now, the other half later, perhaps from another server."""
         if self.part is None:
             found = self.ask("GET", f"{self.at}/bundles")
             self.bundles.update({bundle["version"]: bundle["sha256"] for bundle in found})
@@ -307,7 +307,7 @@ class Journey:
         self.pending = None
 
     def _read_again(self, change: Change) -> None:
-        """A change that is stored but was never answered: what it made is read from what is there."""
+        """Re-read the result of a change that was stored but never answered."""
         self.pending = None
         self.acknowledged[change.what] += 1
         if change.what in ("object", "click or edit", "undo"):
@@ -326,7 +326,7 @@ class Journey:
         number, acknowledged = self.upload
         try:
             length = int(self.ask("HEAD", f"/api/uploads/{number}").headers["upload-offset"])
-        except Refused:  # it is a project by now: finishing was not answered, and is asked for again
+        except Refused:  # already a project: the response to finishing was lost, and it was requested again
             length = len(self.recording) if not self.project else 0
         self._expect("upload", length >= acknowledged, f"{acknowledged} bytes acknowledged, {length} found")
         self.upload = (number, length)
@@ -356,12 +356,12 @@ class Journey:
 
 
 def _said(group: dict[str, Any]) -> tuple[Any, ...]:
-    """What people said about an object."""
+    """The fields of an object's group that people set."""
     return group["version"], group["override"], {c["id"]: (c["verdict"], c["verdict_reason"]) for c in group["candidates"]}
 
 
 def _any_zip() -> bytes:
-    """A zip that the stand-in for the import takes."""
+    """A zip that the import's stand-in accepts."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         archive.writestr("metadata", b"{}")

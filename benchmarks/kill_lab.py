@@ -1,4 +1,4 @@
-"""A laboratory's set-up on one machine: two servers that compute nothing, two seats, an object store, Ray; each is hit."""
+"""A laboratory's deployment on one machine: two servers without compute, two seats, an object store, Ray; all can be killed."""
 
 import contextlib
 import json
@@ -48,13 +48,13 @@ KINDS = (
     "the object store",
 )
 RAY = "Ray's node"
-SEATS = 2  # the second computes on Ray where there is any
-FROZEN_S = 8.0  # longer than the others wait for a sign of life
+SEATS = 2  # the second computes on Ray where available
+FROZEN_S = 8.0  # longer than the others wait for a heartbeat
 STORE_IS_GONE_S = 2.0
 
 
 class Lab:
-    """Begun again, part by part, after a hit."""
+    """A laboratory's deployment, whose parts can be killed and restarted."""
 
     def __init__(self, folder: Path, real: bool, rows: PostgresServer, store: ObjectServer, ray: RayNode | None) -> None:
         self.real, self.hits, self.kinds = real, Counter[str](), (*KINDS, *(RAY,) * (ray is not None))
@@ -72,22 +72,22 @@ class Lab:
 
     @property
     def runs(self) -> bool:
-        """Whether somebody answers."""
+        """Whether a server answers."""
         return any(web.runs for web in self._webs)
 
     @property
     def whole(self) -> bool:
-        """Whether everything runs."""
+        """Whether every part runs."""
         parts = [self._store.process, *self._seats.values(), *([self._ray.process] if self._ray else [])]
         return all(web.runs for web in self._webs) and len(self._seats) == SEATS and all(part.poll() is None for part in parts)
 
     @property
     def host(self) -> str:
-        """What browsers call both of them."""
+        """The host name that browsers use for both servers."""
         return self._first.host
 
     def address_for(self, path: str) -> str:
-        """As the proxies of deploy/ send it: to who answered last, while that lives; parts of an upload to the same always."""
+        """Route as the proxies of deploy/ do: to the last server that answered, if alive; all parts of an upload to the same one."""
         if path.startswith("/api/uploads"):
             return self._first.address
         if not self._webs[0].runs:
@@ -95,7 +95,7 @@ class Lab:
         return self._webs[0].address
 
     def start(self) -> None:
-        """Start what does not run."""
+        """Start the parts that do not run."""
         if self._store.process.poll() is not None:
             time.sleep(STORE_IS_GONE_S)
             self._store.start()
@@ -109,7 +109,7 @@ class Lab:
                 self._seats[number] = self._seat(number)
 
     def kill(self, what: str) -> None:
-        """Hit a part; the server that answers where that part is at nothing now."""
+        """Kill a part; if that part is idle, kill the server that answers."""
         seats = [psutil.Process(seat.pid) for seat in self._seats.values() if seat.poll() is None]
         at_work = [seat for seat in seats if seat.children()]
         drawing = self._webs[0].workers("live")
@@ -134,7 +134,7 @@ class Lab:
         self.hits[what] += 1
 
     def stop(self) -> None:
-        """The end of all of it."""
+        """Stop all parts."""
         for timer in self._thawing:
             timer.join()
         for web in self._webs:
@@ -145,7 +145,7 @@ class Lab:
             seat.wait()
 
     def stored(self, project: str) -> dict[str, str]:
-        """What the store has of the project: the content of each file."""
+        """The object store's files of the project: the digest of each file's content."""
         try:
             found = self._objects.read(f"projects/{project}/manifest.json")
         except Unavailable as error:
@@ -153,13 +153,13 @@ class Lab:
         return {path: entry[0] for path, entry in json.loads(found.content)["files"].items()} if found else {}
 
     def digests(self, project: str, stage: str) -> dict[str, str]:
-        """What is stored of a stage."""
+        """Digests of a stage's stored nouns."""
         within = f"work/nouns/{stage}/"
         return {path.removeprefix(within): sha for path, sha in self.stored(project).items() if path.startswith(within)}
 
     @contextlib.contextmanager
     def writing(self, project: str) -> Iterator[Path]:
-        """A folder of its own, as of one more machine, whose files are kept in the store."""
+        """A separate copy of the project's folder, as on a further machine, which is written back to the store."""
         mirror = Mirror(self._objects, self._folder / "by-hand")
         try:
             mirror.fetch(project)
@@ -169,7 +169,7 @@ class Lab:
             raise Refused(503, str(error)) from error
 
     def twice(self) -> list[str]:
-        """Jobs that came to more than one end, and bundles of which no job knows."""
+        """Jobs that ended more than once, and bundles that belong to no job."""
         with opened(self._database) as engine, reading(engine) as session:
             return [*_ended_twice(session), *_too_many_bundles(session)]
 
@@ -182,7 +182,7 @@ class Lab:
         return subprocess.Popen(command, env=environment, cwd=ROOT, stdout=subprocess.DEVNULL)
 
     def _freeze(self, seat: psutil.Process) -> None:
-        """It stops in the middle of what it does, and goes on when others took it for dead."""
+        """Suspend a seat in the middle of its work, and resume it after others have taken it for dead."""
         frozen = [seat, *seat.children(recursive=True)]
         for process in frozen:
             with contextlib.suppress(psutil.Error):
@@ -198,9 +198,9 @@ class Lab:
 
 @contextlib.contextmanager
 def lab(folder: Path, *, real: bool, ray: bool) -> Iterator[Lab]:
-    """One in a folder of its own."""
+    """A laboratory in a folder of its own."""
     with server() as rows, object_server() as store:
-        known = {"RAY_GCS_SERVER_PORT": str(free_port()), "RUST_LOG": "error", **store.environment}  # where it is found again
+        known = {"RAY_GCS_SERVER_PORT": str(free_port()), "RUST_LOG": "error", **store.environment}  # fixed across restarts
         with ray_node(**known) if ray else contextlib.nullcontext() as node:
             yield Lab(folder, real, rows, store, node)
 

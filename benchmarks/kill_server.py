@@ -1,4 +1,4 @@
-"""A server that is started again whenever it was killed, always at the same address."""
+"""A server that is restarted whenever it was killed, always at the same address."""
 
 import contextlib
 import hashlib
@@ -36,48 +36,48 @@ uvicorn.run(create_app(settings, commands=commands), host="127.0.0.1", port=port
 
 
 class SetUp(Protocol):
-    """What is hit: all that answers one person, and computes for them."""
+    """The deployment under test: everything that serves one user and computes for them."""
 
     real: bool
-    kinds: tuple[str, ...]  # what of it can be hit
+    kinds: tuple[str, ...]  # names of the parts that can be killed
     hits: Counter[str]
 
     @property
     def runs(self) -> bool:
-        """Whether somebody answers."""
+        """Whether a server answers."""
 
     @property
     def whole(self) -> bool:
-        """Whether everything runs."""
+        """Whether every part runs."""
 
     @property
     def host(self) -> str:
-        """What a browser calls it."""
+        """The host name that browsers use."""
 
     def address_for(self, path: str) -> str:
-        """The address of who answers for the path."""
+        """The address of the server responsible for the path."""
 
     def start(self) -> None:
-        """Start what does not run, and wait until it answers."""
+        """Start the parts that do not run, and wait until a server answers."""
 
     def kill(self, what: str) -> None:
-        """Hit a part."""
+        """Kill a part."""
 
     def writing(self, project: str) -> contextlib.AbstractContextManager[Path]:
-        """The project's folder, to write into what a job would have made."""
+        """The project's folder, for writing results that a job would have made."""
 
     def digests(self, project: str, stage: str) -> dict[str, str]:
-        """What is stored of a stage: the content of each noun."""
+        """The stored outputs of a stage: the digest of each noun."""
 
     def twice(self) -> list[str]:
-        """What was done twice, as far as that can be seen."""
+        """Work that was done twice, as far as that can be detected."""
 
     def stop(self) -> None:
-        """The end."""
+        """Stop all parts."""
 
 
 class Server:
-    """One on a data folder."""
+    """A single server on a data folder."""
 
     kinds: tuple[str, ...] = ("server", "server and workers", "a job's process", "the live segmenter")
 
@@ -89,30 +89,30 @@ class Server:
 
     @property
     def runs(self) -> bool:
-        """Whether its process is there."""
+        """Whether its process runs."""
         return self.process is not None and self.process.poll() is None
 
     @property
     def whole(self) -> bool:
-        """Whether everything runs."""
+        """Whether every part runs."""
         return self.runs
 
     @property
     def address(self) -> str:
-        """Where it answers."""
+        """Its address."""
         return f"http://127.0.0.1:{self.port}"
 
     @property
     def host(self) -> str:
-        """What a browser calls it."""
+        """The host name that browsers use."""
         return f"127.0.0.1:{self.port}"
 
     def address_for(self, path: str) -> str:
-        """Its own."""
+        """Its own address, for every path."""
         return self.address
 
     def environment(self) -> dict[str, str]:
-        """What its processes are told."""
+        """Environment variables of its processes."""
         return {**os.environ, "PYTHONPATH": str(ROOT)}
 
     def start(self) -> None:
@@ -124,12 +124,12 @@ class Server:
         until(lambda: self._answers(), 120)
 
     def begin(self) -> subprocess.Popen:
-        """Its process, which will answer."""
+        """Start its process without waiting until it answers."""
         words = [sys.executable, "-c", SERVER, str(self.data), str(self.port), "real" if self.real else "fake"]
         return subprocess.Popen([*words, json.dumps(self.settings)], env=self.environment(), cwd=ROOT)
 
     def workers(self, *names: str) -> list[psutil.Process]:
-        """Its running workers whose command line holds one of the names."""
+        """Its running workers whose command line contains one of the names."""
         if self.process is None or self.process.poll() is not None:
             return []
         with contextlib.suppress(psutil.Error):
@@ -138,7 +138,7 @@ class Server:
         return []
 
     def kill(self, what: str) -> None:
-        """SIGKILL, and wait until what was hit is gone; the server when the wanted one does not run."""
+        """Send SIGKILL, and wait until the processes are gone; the server's own if the wanted one does not run."""
         assert self.process is not None
         hit = []
         if what == "a job's process":
@@ -156,7 +156,7 @@ class Server:
             self.process.wait()
 
     def digests(self, project: str, stage: str) -> dict[str, str]:
-        """What is stored of a stage: the content of each noun."""
+        """The stored outputs of a stage: the digest of each noun."""
         found = {}
         for path in sorted((self.data / "projects" / project / "work" / "nouns" / stage).glob("*.noun")):
             with contextlib.suppress(FileNotFoundError):
@@ -165,15 +165,15 @@ class Server:
 
     @contextlib.contextmanager
     def writing(self, project: str) -> Iterator[Path]:
-        """The project's folder, to write into what a job would have made."""
+        """The project's folder, for writing results that a job would have made."""
         yield self.data / "projects" / project
 
     def twice(self) -> list[str]:
-        """What was done twice, as far as that can be seen."""
+        """Work that was done twice, as far as that can be detected."""
         return []
 
     def stop(self) -> None:
-        """The end."""
+        """Stop the server."""
         if self.process is not None:
             self.process.terminate()
             self.process.wait()
@@ -185,7 +185,7 @@ class Server:
 
 
 def kill_all(processes: list[psutil.Process]) -> None:
-    """SIGKILL to each that is still there."""
+    """Send SIGKILL to each process that still exists."""
     for process in processes:
         with contextlib.suppress(ProcessLookupError):
             os.kill(process.pid, signal.SIGKILL)

@@ -1,16 +1,16 @@
-"""Kill the server and its workers at random moments of the journey: nothing acknowledged may be lost, work goes on by itself.
+"""Crash test of the server and its workers: after SIGKILL at random moments no acknowledged change is lost and work resumes.
 
     python benchmarks/kills.py [--kills 50] [--seed 0] [--real SCAN_FOLDER] [--lab [--ray]] [--json benchmarks/app.json]
 
-One person (kill_journey.py) uploads a recording, clicks, names, undoes, judges, corrects, comments, steps through the review,
-runs and downloads, one request after the other; SIGKILL comes at moments drawn from a seed and hits the server, all its
-workers with it, a job's process, or the live segmenter. The request whose answer was lost is sent again under its key. Then
-what is stored must be what was acknowledged: no more, no less. By default the stages are stand-ins that take a moment each;
-with --real (a folder with scan.r3d and prompts.json, as `r2c2r sample` writes) they are the real ones, and the moments are
-spread over them: every second and third kill waits until one or two more stages have finished. What a finished stage stored
-must stay what it was, byte by byte. With --lab rows are in a Postgres, files in an S3 server, two servers
-answer and two seats compute (kill_lab.py), with --ray one of them on a node of Ray: the hits are on each of these parts, a seat
-may also be frozen until others have taken up its job, and no job may come to two ends.
+One simulated user (kill_journey.py) uploads a recording, clicks, names, undoes, judges, corrects, comments, steps through the
+review, runs and downloads, one request after the other; SIGKILL comes at moments drawn from a seed and hits the server, all its
+workers with it, a job's process, or the live segmenter. A request whose response was lost is repeated under its key. Then the
+stored state must be exactly the acknowledged one. By default the stages are stand-ins that take a moment each; with
+--real (a folder with scan.r3d and prompts.json, as `r2c2r sample` writes) they are the real ones, and the moments are spread
+over them: every second and third kill waits until one or two more stages have finished. The stored outputs of a finished stage
+must stay the same, byte by byte. With --lab rows are in a Postgres, files in an S3 server, two servers answer and two seats
+compute (kill_lab.py), with --ray one of them on a Ray node: each of these parts is killed, a seat may also be frozen until
+others have taken over its job, and no job may end twice.
 """
 
 import argparse
@@ -36,13 +36,13 @@ from kill_server import Server, SetUp
 from waiting import PATIENCE
 
 MOST_ACTS = 16
-FIRST_KILLS = 3  # may hit the import; the others come when there is a project to work on
-MOST_STAGES = 2  # that are waited for before a kill
+FIRST_KILLS = 3  # may hit the import; later kills wait until there is a project to work on
+MOST_STAGES = 2  # number of stages to wait for before a kill
 PATIENCE_S = 240.0 * PATIENCE
 
 
 def kill_often(server: SetUp, *, kills: int, seed: int, real: Path | None = None) -> dict[str, Any]:
-    """The figures of one seeded session of kills."""
+    """Figures of one seeded session of kills."""
     rng = random.Random(seed)
     began, restarts = time.monotonic(), []
     latest, pause = (15.0, 0.5) if real else (1.2, 0.02)
@@ -54,9 +54,9 @@ def kill_often(server: SetUp, *, kills: int, seed: int, real: Path | None = None
         for kill in range(kills):
             while kill == FIRST_KILLS and not journey.ready:
                 _live(journey, stages, pause)
-            for _ in range(rng.randrange(MOST_ACTS)):  # moments are counted in what was done: a slow machine gets as far
+            for _ in range(rng.randrange(MOST_ACTS)):  # moments are counted in actions: a slow machine gets as far
                 _live(journey, stages, pause)
-            if real:  # a stage takes as long as many acts: some kills come after one or two more of them have finished
+            if real:  # a stage takes as long as many actions: some kills come after one or two more stages have finished
                 _live_through(journey, stages, pause, kill % (MOST_STAGES + 1))
             timer = threading.Timer(rng.uniform(0.0, latest), server.kill, (rng.choice(server.kinds),))
             timer.start()
@@ -94,7 +94,7 @@ def kill_often(server: SetUp, *, kills: int, seed: int, real: Path | None = None
 
 
 def _live(journey: Journey, stages: FinishedStages, pause: float) -> None:
-    """One thing this person does; the server may vanish meanwhile."""
+    """One action of the user; the server may die during it."""
     with contextlib.suppress(httpx.HTTPError, Refused):
         journey.act()
         stages.look()
@@ -102,7 +102,7 @@ def _live(journey: Journey, stages: FinishedStages, pause: float) -> None:
 
 
 def _live_while(starting: threading.Thread, journey: Journey, stages: FinishedStages, pause: float) -> None:
-    """Live until what was killed is there again; nothing can be done where it is the server."""
+    """Act until the killed part runs again; no actions while the server is down."""
     starting.start()
     while starting.is_alive():
         if journey.server.runs:
@@ -111,14 +111,14 @@ def _live_while(starting: threading.Thread, journey: Journey, stages: FinishedSt
 
 
 def _live_through(journey: Journey, stages: FinishedStages, pause: float, count: int) -> None:
-    """Live until so many more stages have finished."""
+    """Act until `count` more stages have finished."""
     wanted, deadline = len(stages.seen) + count, time.monotonic() + PATIENCE_S
     while len(stages.seen) < wanted and time.monotonic() < deadline:
         _live(journey, stages, pause)
 
 
 def main() -> int:
-    """Kill, report; 1 when something was lost."""
+    """Kill and report; 1 if anything was lost."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0)

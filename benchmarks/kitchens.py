@@ -1,4 +1,4 @@
-"""The kitchens of the accuracy guard, and the commands that draw them."""
+"""Kitchens of the accuracy guard, and the commands that draw them."""
 
 import shutil
 import subprocess
@@ -13,7 +13,7 @@ from whole_way import CLI, REPOSITORY
 from r2c2r_core.synthetic.choices import STYLES
 
 _SCRIPTS = Path(__file__).resolve().parent
-_WITH_LZFSE = (  # it imports the codec by the name of another package
+_WITH_LZFSE = (  # the generator imports the codec under another package's name
     "import lzfse, runpy, sys; sys.modules['liblzfse'] = lzfse; del sys.argv[0]; "
     "runpy.run_path(sys.argv[0], run_name='__main__')"
 )
@@ -21,7 +21,7 @@ _OPENED_FILM = ("--frames", "120", "--size", "480x360")
 
 
 class Generators(NamedTuple):
-    """Files of other makers that some kitchens are drawn from."""
+    """Third-party files that some kitchens are drawn from."""
 
     second: Path | None  # make_kitchen.py
     franka: Path | None  # the gymnasium-robotics wheel, 1.4.2 or later
@@ -29,11 +29,11 @@ class Generators(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GuardedKitchen:
-    """How a kitchen is drawn, clicked and measured."""
+    """Commands and options to draw, click and measure a kitchen."""
 
-    command: Callable[[Generators, str], list[str | Path | None]]  # from the generators and the folder to draw into
-    random_clicks: bool = False  # rather than those of its prompts.json
-    edges_only: bool = False  # the edges of fronts from the segmenter alone
+    command: Callable[[Generators, str], list[str | Path | None]]  # from the generators and the target folder
+    random_clicks: bool = False  # instead of those of its prompts.json
+    edges_only: bool = False  # only the edges of fronts, from the segmenter alone
 
 
 def _own(*options: str) -> Callable[[Generators, str], list[str | Path | None]]:
@@ -72,7 +72,7 @@ FAST = ("sample-0", "sample-3", "second-101", "second-103", "franka", "opened-ou
 
 
 def drawn(name: str, workdir: Path, generators: Generators) -> Path | None:
-    """The kitchen's folder, drawn where it is not there; None where its generator is not given."""
+    """The kitchen's folder, drawn if missing; None if its generator is not given."""
     folder, unfinished = workdir / name, workdir / f"unfinished-{name}"
     if folder.exists():
         return folder

@@ -1,9 +1,9 @@
-"""Layout and joints against exact truth: where the automatic layout puts things, without any override.
+"""Accuracy of the automatic layout and its joints against exact truth, without any override.
 
     python benchmarks/layout.py SAMPLES --workdir DIR [--seeds 0-9] [--json FILE] [--update]
 
 SAMPLES holds seed<N>/truth.json of `r2c2r sample`; DIR holds seed<N>, the workdir of a finished `r2c2r run` on each. Only
-the scene synthesis is run again (about three seconds a kitchen); the workdirs are left as they are. --update writes
+the scene synthesis is run again (about three seconds per kitchen); the workdirs are not modified. --update writes
 benchmarks/layout.json.
 """
 
@@ -36,7 +36,7 @@ BUILT_IN = ("drawer", "cabinet", "double_door_cabinet", "wall_cabinet")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bar:
-    """What issue 5 asks of a figure."""
+    """A required bound of a figure (issue 5)."""
 
     limit: float
     better: str = "lower"
@@ -57,7 +57,7 @@ BARS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure every finished seed, print, and keep the figures."""
+    """Measure every finished seed, print, and save the figures."""
     options = _parser().parse_args(arguments)
     seeds: dict[str, Any] = {}
     for seed in options.seeds:
@@ -110,7 +110,7 @@ def object_figures(true: ObjectRecord, found: ObjectRecord, scene: ArticulatedSc
 
 
 def scene_figures(rows: dict[str, dict[str, Any]], pairs: Sequence[tuple[ObjectRecord, ObjectRecord]]) -> dict[str, Any]:
-    """The figures the issue's bars are about."""
+    """The figures that the issue's bars apply to."""
 
     def values(name: str) -> list[float]:
         return [row[name] for row in rows.values() if row.get(name) is not None]
@@ -140,7 +140,7 @@ Pair = tuple[ObjectRecord, ObjectRecord]
 
 
 def true_runs(pairs: Sequence[Pair]) -> list[list[Pair]]:
-    """Built-in units whose true fronts lie in one plane and face one way."""
+    """Runs of built-in units: true fronts in one plane, facing one way."""
     runs: list[list[Pair]] = []
     for pair in pairs:
         home = next((run for run in runs if _coplanar(run[0][0], pair[0])), None)
@@ -152,17 +152,17 @@ def true_runs(pairs: Sequence[Pair]) -> list[list[Pair]]:
 
 
 def off_plane_mm(run: Sequence[Pair]) -> float:
-    """How far apart the found fronts of a run reach, across their mean plane: front corners, so a turned front counts."""
+    """Spread of a run's estimated fronts across their mean plane; measured at front corners, so that a yaw error counts."""
     outward = -np.mean([found.world_from_object.rotation[:, 1] for _, found in run], axis=0)
     corners = np.concatenate([_front_corners(found) for _, found in run])
     return float(np.ptp(corners @ (outward / np.linalg.norm(outward)))) * 1000
 
 
 def gap_errors_mm(run: Sequence[Pair]) -> list[float]:
-    """How far the found gaps are from the true ones, at every seam of a run.
+    """Errors of the estimated gaps at every seam of a run.
 
-    A seam is between neighbours that in truth stand less than 6 mm apart, side by side or one above the other; gaps are
-    measured along the true run.
+    A seam is between neighbours that are truly less than 6 mm apart, side by side or one above the other; gaps are measured
+    along the true run.
     """
     right, up = run[0][0].world_from_object.rotation[:, 0], np.array([0.0, 0.0, 1.0])
     errors = []
@@ -177,7 +177,7 @@ def gap_errors_mm(run: Sequence[Pair]) -> list[float]:
 
 
 def summary(seeds: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Each figure over all kitchens beside its bar: the worst kitchen's value decides."""
+    """The worst kitchen's value of each figure, beside its bar."""
     result: dict[str, Any] = {}
     for name, bar in BARS.items():
         values = [seed[name] for seed in seeds if seed[name] is not None]

@@ -1,4 +1,4 @@
-"""A command's wall time, CPU time and peak memory, its children included."""
+"""Wall time, CPU time and peak memory of a command, including its children."""
 
 import os
 import subprocess
@@ -15,13 +15,13 @@ _INTERVAL_S = 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """What one command took."""
+    """Cost of one command."""
 
     exit_code: int
     wall_s: float
     cpu_s: float  # user and system, of the process and all its children
     peak_bytes: int  # of the whole tree, sampled five times a second; a page that processes share counts once (PSS)
-    largest_bytes: int  # that of its largest process, at its peak
+    largest_bytes: int  # of its largest process, at that process's peak
 
 
 def run_measured(command: Sequence[str], *, cwd: Path, log: Path) -> Cost:
@@ -31,7 +31,7 @@ def run_measured(command: Sequence[str], *, cwd: Path, log: Path) -> Cost:
         process = subprocess.Popen(command, cwd=cwd, stdout=output, stderr=subprocess.STDOUT)
         watch = _Watch(psutil.Process(process.pid))
         watch.start()
-        _, status, usage = os.wait4(process.pid, 0)  # what its children took is in it
+        _, status, usage = os.wait4(process.pid, 0)  # includes the usage of its children
         process.returncode = os.waitstatus_to_exitcode(status)
         watch.stop()
     return Cost(
@@ -58,7 +58,7 @@ class _Watch(threading.Thread):
             self._sample()
 
     def stop(self) -> None:
-        """End the sampling."""
+        """Stop sampling."""
         self._ended.set()
         self.join()
 
@@ -71,6 +71,6 @@ class _Watch(threading.Thread):
         for process in tree:
             try:
                 total += process.memory_full_info().pss
-            except (psutil.NoSuchProcess, psutil.AccessDenied):  # it ended, or is about to
+            except (psutil.NoSuchProcess, psutil.AccessDenied):  # it has ended, or is about to
                 continue
         self.peak_bytes = max(self.peak_bytes, total)

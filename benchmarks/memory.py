@@ -1,10 +1,10 @@
-"""Peak memory of reading and examining a recording, against its number of frames, at 1920x1440.
+"""Peak memory of reading and examining a recording, by its number of frames, at 1920x1440.
 
     python benchmarks/memory.py [--frames 250 500 1000] [--sample scan.r3d] [--update] [--workdir DIR]
 
 A synthetic kitchen's frames (colour enlarged to 1920x1440) are repeated along its path until the recording is long enough, so
-that the fused room and the size of the files are real. Each recording is read, and examined by the doctor, in a process of
-its own with all its frames kept. --update writes the figures under "memory" in benchmarks/capture.json.
+that the fused room and the file sizes are realistic. Each recording is read, and examined by the capture doctor, in a separate
+process with all its frames kept. --update writes the figures under "memory" in benchmarks/capture.json.
 """
 
 import argparse
@@ -33,7 +33,7 @@ SIZE = (1920, 1440)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Make the recordings, read each, print and keep the figures."""
+    """Make the recordings, read each, print and save the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", type=int, nargs="+", default=[250, 500, 1000])
     parser.add_argument("--sample", type=Path, help="a synthetic Record3D recording (default: made, 60 frames)")
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def measure(counts: Sequence[int], sample: Path, folder: Path) -> dict[str, Any]:
-    """Peak resident memory and seconds a frame by number of frames."""
+    """Peak resident memory and seconds per frame, by number of frames."""
     peaks, speeds = {}, {}
     for count in counts:
         source = lengthened(sample, folder / "long.r3d", count)
@@ -73,7 +73,7 @@ def measure(counts: Sequence[int], sample: Path, folder: Path) -> dict[str, Any]
 
 
 def lengthened(sample: Path, target: Path, count: int) -> Path:
-    """The recording with `count` frames of SIZE: its own, walked to and fro."""
+    """The recording extended to `count` frames of SIZE by playing it forwards and backwards."""
     with zipfile.ZipFile(sample) as short, zipfile.ZipFile(target, "w") as long:
         metadata = json.loads(short.read("metadata"))
         have = len(metadata["poses"])
@@ -97,7 +97,7 @@ def lengthened(sample: Path, target: Path, count: int) -> Path:
 
 
 def update_figures(part: str, figures: dict[str, Any]) -> None:
-    """Put a part's figures into benchmarks/capture.json, leaving the others."""
+    """Store a part's figures in benchmarks/capture.json, keeping the others."""
     document = json.loads(FIGURES.read_text(encoding="utf-8")) if FIGURES.exists() else {}
     FIGURES.write_text(json.dumps({**document, part: figures}, indent=1, sort_keys=True) + "\n", encoding="utf-8")
 

@@ -1,10 +1,10 @@
-"""What somebody sees who opens the sample kitchen, in a real Chromium, with the clock running.
+"""Time from opening the sample kitchen to its first pictures, masks and proposals, in a real Chromium.
 
     python benchmarks/newcomer.py [--json benchmarks/app.json] [--picture FILE]
 
-From the click on "Open the sample kitchen": the first picture of it, the page that says it was read, then Annotate with the
-first mask, with all of them, and with the last proposal. --picture keeps Annotate as it is at the end. Exit status 1: no
-picture within 5 s, or no mask within 60 s.
+From the click on "Open the sample kitchen": its first picture, the page that reports it as read, then Annotate with the first
+mask, with all masks, and with the last proposal. --picture saves a screenshot of Annotate at the end. Exit status 1: no picture
+within 5 s, or no mask within 60 s.
 """
 
 import argparse
@@ -28,7 +28,7 @@ LONG_MS = 600_000
 
 
 def newcomer(data: Path, picture: Path | None) -> dict[str, Any]:
-    """Seconds from the first click to what is seen next."""
+    """Seconds from the first click to each milestone."""
     expect.set_options(timeout=LONG_MS)
     figures: dict[str, Any] = {}
     with served(data) as address, sync_playwright() as playwright:
@@ -64,7 +64,7 @@ def newcomer(data: Path, picture: Path | None) -> dict[str, Any]:
 
 
 def main() -> int:
-    """Go, report; 1 when a bar was missed."""
+    """Measure and report; 1 if a bar was missed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--picture", type=Path)
     add_options(parser)

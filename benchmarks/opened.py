@@ -1,12 +1,12 @@
-"""Ten kitchens of two generators, filmed while fronts are opened, from one click an object: what is measured of their joints.
+"""Accuracy of joints in ten kitchens of two generators, filmed while fronts are opened, from one click per object.
 
     python benchmarks/opened.py --second PATH/make_kitchen.py --workdir DIR [--only ours-2 second-104] [--frames F] [--size WxH]
                                 [--again] [--json FILE]
 
-Each kitchen is drawn into DIR/<name> and taken through `r2c2r run`, `check` and `evaluate`; what is there is kept, so that a
-run goes on where it stopped, and --again reconstructs anew. A joint counts once; "state unknown" is a miss, and so is every
-number of a joint that is missing or of another type. DIR/opened.md has a line a kitchen, the total against the bars, and the
-axes and pivots by the definitions of others (joint_definitions.py).
+Each kitchen is drawn into DIR/<name> and taken through `r2c2r run`, `check` and `evaluate`; existing results are kept, so that
+a run resumes where it stopped, and --again reconstructs them. A joint counts once; "state unknown" is a miss, and so is every
+figure of a joint that is missing or of another type. DIR/opened.md has one line per kitchen, the total against the bars, and
+the errors of axes and pivots by the definitions of other papers (joint_definitions.py).
 """
 
 import argparse
@@ -41,7 +41,7 @@ Rows = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bar:
-    """One number that is asked for, over all joints of all kitchens."""
+    """A required bound of one figure, over all joints of all kitchens."""
 
     title: str
     limit: float
@@ -49,7 +49,7 @@ class Bar:
     at_least: bool = False
 
     def line(self, value: float | None) -> str:
-        """A row of the table of the total."""
+        """A row of the table of totals."""
         met = value is not None and (value >= self.limit if self.at_least else value <= self.limit)
         sign = "≥" if self.at_least else "≤"
         return f"| {self.title} | {_cell(value)} | {sign} {self.limit:g} {self.unit} | {'yes' if met else 'no'} |"
@@ -74,7 +74,7 @@ BARS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw, reconstruct and score what is missing; print the tables."""
+    """Draw, reconstruct and score the missing kitchens; print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
         "--second", type=Path, help="the second generator's program; without it, only the project's own kitchens"
@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def draw(folder: Path, name: str, second: Path | None, frames: int, size: str) -> None:
-    """The recording of that name, unless it is there."""
+    """Draw the recording of that name if it is missing."""
     if (folder / "prompts.json").exists():
         return
     shape = ["--frames", str(frames), "--size", size]
@@ -124,7 +124,7 @@ def draw(folder: Path, name: str, second: Path | None, frames: int, size: str) -
 
 
 def measured(folder: Path, *, again: bool) -> dict[str, Any]:
-    """Every joint's score, and what the whole bundle adds to them."""
+    """Every joint's score, with the figures of the whole bundle."""
     recording = next(folder.glob("*.r3d"))
     bundle, work = folder / "run" / "bundle.zip", folder / "run"
     if again or not (work / "evaluation.json").exists():
@@ -155,7 +155,7 @@ def measured(folder: Path, *, again: bool) -> dict[str, Any]:
 
 
 def figures(rows: Sequence[dict[str, Any]]) -> dict[str, float | None]:
-    """The numbers of the bars over all joints of some kitchens."""
+    """The figures of the bars over all joints of the given kitchens."""
     scores = [JointScore(**score) for row in rows for score in row["scores"]]
     axes = [score.axis_deg for score in scores if score.axis_deg is not None]
     pivots = [score.pivot_mm for score in scores if score.pivot_mm is not None]
@@ -182,7 +182,7 @@ def figures(rows: Sequence[dict[str, Any]]) -> dict[str, float | None]:
 
 
 def tables(rows: Rows) -> str:
-    """A line a kitchen, the total against the bars, and others' definitions."""
+    """One line per kitchen, the total against the bars, and the other definitions."""
     head = "| kitchen | " + " | ".join(BARS) + " |\n|---" + "|---" * len(BARS) + "|"
     body = [line(name, row) for name, row in rows.items()]
     total = figures(list(rows.values()))
@@ -191,13 +191,13 @@ def tables(rows: Rows) -> str:
 
 
 def line(name: str, *rows: dict[str, Any]) -> str:
-    """One kitchen's numbers, or those of all."""
+    """A table row of one kitchen, or of all."""
     values = figures(rows)
     return f"| {name} | " + " | ".join(_cell(values[key]) for key in BARS) + " |"
 
 
 def _others(rows: Rows) -> list[str]:
-    """Median and worst of each definition over the revolute joints; how many of them have none."""
+    """Median and worst error by each definition over the revolute joints, and how many have none."""
     each = [entry for row in rows.values() for entry in row["others"]]
     if not each:
         return ["No revolute joint was found of those that open."]

@@ -1,9 +1,9 @@
-"""What looking for motion costs: CPU time of tracking all objects of a recording, with it and with all fronts taken as closed.
+"""CPU time of motion search: tracking all objects of a recording with it, and with all fronts assumed closed.
 
     python benchmarks/opened_cost.py WORKDIR/ours-21 [WORKDIR/second-100 …] [--json FILE]
 
-Of recordings that benchmarks/opened.py has run. Both ways begin with an empty cache and the runs cut, and each has a process
-of its own: what one has read or compiled helps the other none.
+Uses recordings that benchmarks/opened.py has run. Both variants start with an empty cache and with the runs cut, each in its
+own process, so that neither profits from files read or code compiled by the other.
 """
 
 import argparse
@@ -24,11 +24,11 @@ from r2c2r_core.workspace import Workspace
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """A line a recording: seconds with, seconds without, the difference in percent."""
+    """Per recording: seconds with, seconds without, the difference in percent."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+", type=Path)
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--way", choices=("opened", "closed"), help=argparse.SUPPRESS)  # what a process of its own is told
+    parser.add_argument("--way", choices=("opened", "closed"), help=argparse.SUPPRESS)  # for the child process
     options = parser.parse_args(arguments)
     if options.way is not None:
         print(tracking_seconds(options.recordings[0], closed=options.way == "closed"))
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def tracking_seconds(folder: Path, *, closed: bool) -> float:
-    """CPU seconds in which every prompt of a recording is tracked; with `closed`, no leaf is looked for anywhere else."""
+    """CPU seconds to track every prompt of a recording; with `closed`, without the search for moving leaves."""
     capture = Workspace(folder / "run" / "work").load_latest("ingest", "scene")
     if capture is None:
         raise SystemExit(f"{folder}: no run found; run benchmarks/opened.py first")
@@ -55,7 +55,7 @@ def tracking_seconds(folder: Path, *, closed: bool) -> float:
         session.prepare()
         start = time.process_time()
         for prompt in prompts.objects:
-            with suppress(R2C2RError):  # what is not found, is not in either way
+            with suppress(R2C2RError):  # objects that are not found are missing in both variants
                 session.track(prompt)
         return time.process_time() - start
 
