@@ -275,9 +275,9 @@ def _header(value: Any) -> str:
 def main() -> int:
     """Send and report; 1 if any response was a server error."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--examples", type=int, default=100, help="of each role and operation")
+    parser.add_argument("--examples", type=int, default=100, help="number per role and operation")
     parser.add_argument("--roles", nargs="+", choices=ROLES, default=list(ROLES))
-    parser.add_argument("--walks", type=int, default=16, help="pairs of walks")
+    parser.add_argument("--walks", type=int, default=16, help="number of pairs of walks")
     parser.add_argument("--seed", type=int, default=0)
     add_options(parser)
     options = parser.parse_args()

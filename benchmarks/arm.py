@@ -17,7 +17,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("bundles", nargs="+", metavar="NAME=BUNDLE")
     parser.add_argument("-o", type=Path, default=Path(__file__).with_suffix(".json"))
-    parser.add_argument("--films", type=Path, help="a folder for films, sheets and maps")
+    parser.add_argument("--films", type=Path, help="output folder for films, sheets and maps")
     options = parser.parse_args()
     known = json.loads(options.o.read_text()) if options.o.is_file() else {"kitchens": {}}
     for name, _, path in (argument.partition("=") for argument in options.bundles):

@@ -298,7 +298,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Collect the claims of recordings not computed yet; then write the maps, the figures and the plot."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="*", type=Path)
-    parser.add_argument("--check", nargs="*", type=Path, default=[], help="recordings that no map is fitted on")
+    parser.add_argument("--check", nargs="*", type=Path, default=[], help="recordings excluded from the fit of the maps")
     parser.add_argument("--frames", type=int, default=40)
     parser.add_argument("--until", choices=("segment", "synthesize"), default="synthesize")
     parser.add_argument("--workdir", type=Path)

@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("bundle", type=Path)
     parser.add_argument("dataset", type=Path)
     parser.add_argument("--only", nargs="+", choices=sorted(PROBES), default=list(PROBES), metavar="PROBE")
-    parser.add_argument("--environments", type=Path, help="kept afterwards, and used again")
+    parser.add_argument("--environments", type=Path, help="kept afterwards and reused")
     parser.add_argument("--update", action="store_true")
     options = parser.parse_args(arguments)
     held = held_counts(options.bundle, options.dataset)

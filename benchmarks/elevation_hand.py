@@ -290,7 +290,7 @@ def main() -> int:
     """Measure and report; 1 if it took too much hand time or the certificate failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kitchen", type=Path)
-    parser.add_argument("--data", type=Path, help="keep the app's folder here, with a picture of the fronts; empty")
+    parser.add_argument("--data", type=Path, help="an empty folder to keep the app's data in, with a picture of the fronts")
     add_options(parser)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="r2c2r-elevation-") as folder:

@@ -55,7 +55,7 @@ Kitchen = dict[str, Any]  # certified: bool | None; objects: {name: Row}
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the kitchens, print the regressions and a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kitchens", nargs="*", metavar="KITCHEN", help=f"of {', '.join(KITCHENS)}")
+    parser.add_argument("kitchens", nargs="*", metavar="KITCHEN", help=f"one of {', '.join(KITCHENS)}")
     parser.add_argument("--workdir", type=Path, default=Path("build/guard"))
     parser.add_argument("--second", type=Path, help="the second generator's program; without it, its kitchens are left out")
     parser.add_argument("--franka", type=Path, help="the gymnasium-robotics wheel; without it, its kitchen is left out")

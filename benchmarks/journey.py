@@ -167,7 +167,7 @@ def _masks_come(person: Person) -> None:
 
 
 def _correct(person: Person) -> int:
-    """Delete false and duplicate objects, correct categories, click missing ones; return the resulting number of true objects."""
+    """Delete false and duplicate objects, correct categories, click missing ones; the resulting number of true objects."""
     wanted = {item["name"]: item["category"] for item in json.loads((person.sample / "truth.json").read_text())["objects"]}
     found = _looked_at(person)
     for item, name in found:

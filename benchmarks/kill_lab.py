@@ -87,7 +87,7 @@ class Lab:
         return self._first.host
 
     def address_for(self, path: str) -> str:
-        """Route as the proxies of deploy/ do: to the last server that answered, if alive; all parts of an upload to the same one."""
+        """Route as the proxies of deploy/ do: to the last server that answered, if alive; parts of an upload to the same."""
         if path.startswith("/api/uploads"):
             return self._first.address
         if not self._webs[0].runs:

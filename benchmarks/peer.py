@@ -1,11 +1,11 @@
-"""ripl-articulation (the estimator of ArtiPoint's authors) beside this project, on the joints of benchmarks/opened.py.
+"""Joint estimation of ripl-articulation (by ArtiPoint's authors) compared with this project, on the joints of opened.py.
 
     python benchmarks/peer.py --python PEER/bin/python --workdir DIR [--noise-mm 4] [--noise-deg 0.5]
 
-The peer estimates no poses: it is given those of the part in every frame that shows it open, the true ones with noise of that
-much (one sigma on each axis, drawn anew in each frame). This project's figures are those of DIR's bundles, from pictures and
-clicks alone; both are scored by the definitions of all (joint_definitions.py). Type is by ArtiPoint's rule for the peer: a
-twist whose rotation is longer than 0.3 of its whole is revolute.
+The peer estimates no poses: it receives the part's true poses in every frame that shows it open, with Gaussian noise (one sigma
+per axis, independent in each frame). This project's figures are those of DIR's bundles, from pictures and clicks alone; both
+are scored by every definition (joint_definitions.py). The peer's joint type follows ArtiPoint's rule: a twist whose rotational
+part is longer than 0.3 of its norm is revolute.
 """
 
 import argparse
@@ -27,13 +27,13 @@ from r2c2r_core.geometry.transforms import Rigid3
 
 _SCRIPT = Path(__file__).resolve().parent / "peer_ripl.py"
 _TURNS = 0.3
-_FEWEST = 4  # frames from which a joint is fitted
+_FEWEST = 4  # minimum number of frames to fit a joint
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Fit, score, print one table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--python", required=True, help="of the environment that has ripl-articulation")
+    parser.add_argument("--python", required=True, help="Python of the environment that has ripl-articulation")
     parser.add_argument("--workdir", type=Path, required=True)
     parser.add_argument("--noise-mm", type=float, default=4.0)
     parser.add_argument("--noise-deg", type=float, default=0.5)
@@ -52,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def peer_errors(
     objects: tuple[ObjectRecord, ...], python: str, noise: tuple[float, float], rng: np.random.Generator
 ) -> list[dict[str, float]]:
-    """Of every joint that opens; of those whose type is wrong only that."""
+    """Errors of every joint that opens; for those of the wrong type only that fact."""
     joints = {joint.name: (thing, joint, joint.motion) for thing in objects for joint in thing.joints if _opens(joint.motion)}
     poses = {name: part_poses(*each, noise, rng) for name, each in joints.items()}  # type: ignore[arg-type]
     poses = {name: each for name, each in poses.items() if len(each["part"]) >= _FEWEST}
@@ -69,8 +69,8 @@ def part_poses(
 ) -> dict[str, Any]:
     """World poses of the unit and of its part in the frames that show the part open.
 
-    Of the closed ones the peer is told nothing: it is biased towards a part that does not move, as its authors say, and is off
-    by degrees where those frames are most.
+    Closed frames are withheld: the peer is biased towards a part that does not move, as its authors state, and is off by
+    degrees where most frames are closed.
     """
     base, parts = thing.world_from_object, []
     for frame in sorted(motion.shown):
@@ -97,7 +97,7 @@ def _scored(thing: ObjectRecord, joint: JointRecord, twist: np.ndarray) -> dict[
 
 
 def own_errors(truth: Path) -> list[dict[str, float]]:
-    """The same of the bundle that benchmarks/opened.py made of that recording; nothing where there is none."""
+    """The same errors of the bundle that benchmarks/opened.py made of that recording; empty if there is none."""
     bundle = truth.parent / "run" / "bundle.zip"
     if not bundle.exists():
         return []
@@ -123,7 +123,7 @@ def _opens(motion: MotionRecord | None) -> bool:
 
 
 def table(errors: dict[str, list[dict[str, float]]]) -> str:
-    """Median and worst of each definition, one column of both a method."""
+    """Median and worst error by each definition, with one column of both per method."""
     names = dict.fromkeys(name for each in errors.values() for entry in each for name in entry)
     lines = ["| | " + " | ".join(f"{method}: median | worst" for method in errors) + " |", "|---" * (1 + 2 * len(errors)) + "|"]
     for name in names:

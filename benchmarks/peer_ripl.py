@@ -1,11 +1,11 @@
-"""The twist that ripl-articulation fits to part poses: run by that package's own environment, which this project never is.
+"""Twists that ripl-articulation fits to part poses: run in that package's own environment, not in this project's.
 
     python -m venv PEER && PEER/bin/pip install ripl-articulation
     PEER/bin/python benchmarks/peer_ripl.py < POSES.json > TWISTS.json
 
 POSES.json: {name: {"base": [4x4 …], "part": [4x4 …]}}, world poses by frame. TWISTS.json: {name: {"twist": [rotation,
-translation] in the base's frame, "states": [θ …]}}. Numbers come from the package as they are
-(solve_articulation_from_poses with its defaults).
+translation] in the base's frame, "states": [θ …]}}. The values are the package's own (solve_articulation_from_poses with its
+defaults).
 """
 
 import json
@@ -16,7 +16,7 @@ from ripl_articulation import solve_articulation_from_poses
 
 
 def main() -> None:
-    """Every joint's twist, as JSON."""
+    """Print every joint's twist as JSON."""
     found = {}
     for name, poses in json.load(sys.stdin).items():
         twist, states = solve_articulation_from_poses(np.array(poses["base"]), np.array(poses["part"]))

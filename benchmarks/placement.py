@@ -1,15 +1,15 @@
-"""Placement with unknown scale and pose: meshes rendered into sample kitchens, then found again from the frames.
+"""Accuracy of placement with unknown scale and pose: meshes rendered into sample kitchens, then estimated from the frames.
 
     python benchmarks/placement.py [--trials 0-199] [--meshes DIR] [--candidates WORKDIR ...] [--overlays DIR] [--seen N]
 
-Writes placement.json beside this file: trials it holds already of the same code are not run again, so the work may be done
-in parts, several at a time. A trial stands a mesh of true size in a synthetic kitchen (benchmarks/staged.py: ten
-frames of 960x720 from an arc of 120 degrees, a plank in front of it, a phone's LiDAR depth, masks whose outline is up to 5 px
-wrong) and gives it to the alignment turned at random and of unknown scale. --meshes are scans and models (the mug, the
-refrigerator and the generated figure of shared/data/meshes), --candidates finished workdirs, whose chosen meshes keep the size
-they were placed in; boxes with a picture on each side, and blank ones with a handle, are always among them. Errors are modulo
-the turns that leave the mesh as it is, in shape and in colour. With --seen N masks are given in N neighbouring frames alone:
-too little for many, which is what "unsure" has to notice; these are kept apart, in placement_seen_N.json.
+Writes placement.json beside this file: trials of the same code that it already contains are not repeated, so the work may be
+done in parts, several at a time. A trial puts a mesh of true size into a synthetic kitchen (benchmarks/staged.py: ten frames of
+960x720 from an arc of 120 degrees, a plank in front of it, a phone's LiDAR depth, masks whose outline is up to 5 px off) and
+passes it to the alignment with a random rotation and an unknown scale. --meshes are scans and models (the mug, the refrigerator
+and the generated figure of shared/data/meshes); --candidates are finished workdirs, whose chosen meshes keep the size they were
+placed in; boxes with a picture on each side, and blank ones with a handle, are always included. Errors are modulo the
+symmetries of the mesh, in shape and in colour. With --seen N masks are given in N neighbouring frames only: often too little,
+which "unsure" has to detect; these trials are stored separately, in placement_seen_N.json.
 """
 
 import argparse
@@ -35,13 +35,13 @@ from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.sources import source_key
 
 HERE = Path(__file__).parent
-LOOSE = (1.5, 0.015, 0.02)  # degrees, metres, share of scale: 95 % within
-TIGHT = (1.0, 0.010, 0.01)  # 80 % within
+LOOSE = (1.5, 0.015, 0.02)  # degrees, metres, relative scale: required of 95 %
+TIGHT = (1.0, 0.010, 0.01)  # required of 80 %
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """What one placement came to."""
+    """Result of one placement."""
 
     number: int
     article: str
@@ -52,9 +52,9 @@ class Trial:
     unsure: bool
     iou: float
     runner_up: float | None
-    spread: tuple[float, float, float] | None  # standard deviations: degrees, metres, share of scale
+    spread: tuple[float, float, float] | None  # standard deviations: degrees, metres, relative scale
     rms_mm: float | None
-    doubts: tuple[str, ...]  # in words
+    doubts: tuple[str, ...]  # as text
     note: str
     cpu_s: float
 
@@ -64,13 +64,13 @@ class Trial:
 
 
 def main() -> None:
-    """Run the trials that are missing and write what came out."""
+    """Run the missing trials and write the results."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", default="0-199", help="first and last number")
+    parser.add_argument("--trials", default="0-199", help="first and last trial number")
     parser.add_argument("--meshes", type=Path, default=None)
     parser.add_argument("--candidates", type=Path, nargs="*", default=[])
-    parser.add_argument("--overlays", type=Path, default=None, help="a folder for pictures of the failures")
-    parser.add_argument("--seen", type=int, default=None, help="frames with a mask, neighbours; all where not given")
+    parser.add_argument("--overlays", type=Path, default=None, help="output folder for pictures of the failures")
+    parser.add_argument("--seen", type=int, default=None, help="number of neighbouring frames with a mask; default: all")
     options = parser.parse_args()
     first, last = (int(number) for number in options.trials.split("-"))
     result = HERE / ("placement.json" if options.seen is None else f"placement_seen_{options.seen}.json")
@@ -91,7 +91,7 @@ def main() -> None:
 
 
 def merged(result: Path, new: list[Trial], views: dict[str, object] | None = None) -> list[Trial]:
-    """All trials of this code so far with the new ones, as the file then holds them; parts run at once take turns."""
+    """All trials of this code so far, merged with the new ones and written to the file; a lock serialises parallel parts."""
     with (result.with_suffix(".lock")).open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         held = json.loads(result.read_text()) if result.exists() else {}
@@ -108,7 +108,7 @@ def merged(result: Path, new: list[Trial], views: dict[str, object] | None = Non
 
 
 def hundred_views(article: Article) -> dict[str, object]:
-    """CPU time of a hundred views with colour and depth at the size they are matched at."""
+    """CPU time of rendering a hundred views with colour and depth, at the size used for matching."""
     config = AlignConfig()
     started = time.process_time()
     render_views(article.mesh, count=100, size_px=config.match_px)
@@ -150,14 +150,14 @@ def attempt(number: int, article: Article, seen: int | None, overlays: Path | No
 
 
 def seen_in(track: MaskTrack, count: int, first: int) -> MaskTrack:
-    """The track with masks in so many neighbouring frames alone."""
+    """The track with masks in `count` neighbouring frames only."""
     frames = sorted(track.masks)
     first = min(first, max(len(frames) - count, 0))
     return replace(track, masks={k: track.masks[k] for k in frames[first : first + count]})
 
 
 def error_of(found: Similarity3, truth: Similarity3, shape: Shape) -> tuple[float, float, float]:
-    """Degrees, metres at the middle and share of scale, to the nearest of the poses that look the same."""
+    """Errors in degrees, metres at the centre and relative scale, to the nearest of the symmetric poses."""
     middle = (shape.points @ shape.frames[0]).min(axis=0) / 2 + (shape.points @ shape.frames[0]).max(axis=0) / 2
     centre = shape.frames[0] @ middle
     best = min(
@@ -170,7 +170,7 @@ def error_of(found: Similarity3, truth: Similarity3, shape: Shape) -> tuple[floa
 
 
 def same_turns(shape: Shape, centre: np.ndarray) -> list[np.ndarray]:
-    """Turns about the centre that leave the shape and its colours as they are: of its box, and all about a round axis."""
+    """Symmetries of shape and colours about the centre: box rotations, and all rotations about an axis of revolution."""
     sample = shape.points[::2] - centre
 
     def alike(turn: np.ndarray) -> bool:
@@ -188,7 +188,7 @@ def same_turns(shape: Shape, centre: np.ndarray) -> list[np.ndarray]:
 
 
 def summarise(trials: list[Trial]) -> dict[str, object]:
-    """Shares within the limits, of the rest those flagged, and the same by kind."""
+    """Fractions within the limits and of the rest that is flagged, in total and by kind."""
     return {
         **shares(trials),
         "kinds": {kind: shares([t for t in trials if t.kind == kind]) for kind in sorted({t.kind for t in trials})},
@@ -197,7 +197,7 @@ def summarise(trials: list[Trial]) -> dict[str, object]:
 
 
 def shares(trials: list[Trial]) -> dict[str, object]:
-    """The figures the issue asks for, and medians."""
+    """The issue's figures, and medians."""
     rest = [t for t in trials if not t.within(LOOSE)]
     sure = [t for t in trials if not t.unsure]
     return {

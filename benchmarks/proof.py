@@ -1,4 +1,4 @@
-"""The four stages after the alignment, run and timed on what a finished reconstruction placed (scene.py and galley.py)."""
+"""The four stages after the alignment, run and timed on a finished reconstruction's placements (scene.py and galley.py)."""
 
 import os
 import time
@@ -24,7 +24,7 @@ from r2c2r_core.workspace import Workspace
 
 
 class Placed(NamedTuple):
-    """What synthesis starts from; the lists run side by side."""
+    """Inputs of the synthesis; the lists are parallel."""
 
     capture: Capture
     tracks: list[MaskTrack]
@@ -34,18 +34,18 @@ class Placed(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Proof:
-    """What came out, and what it cost."""
+    """Results of the four stages, and their cost."""
 
     primitives: ArticulatedScene  # before the warp
     scene: ArticulatedScene
     certificate: Certificate
     bundle: Path
-    seconds: dict[str, float]  # of the wall clock, by stage
+    seconds: dict[str, float]  # wall clock, by stage
     cpu_seconds: float
 
 
 def placed_by(work: Workspace) -> Placed:
-    """What a finished run placed."""
+    """Placements of a finished run, with their capture, tracks and meshes."""
     names = work.names("align")
     return Placed(
         capture=work.load_latest("ingest", "scene"),
@@ -56,7 +56,7 @@ def placed_by(work: Workspace) -> Placed:
 
 
 def prove(placed: Placed, bundle: Path) -> Proof:
-    """Synthesis, warp, export and certificate, with the usual settings."""
+    """Synthesis, warp, export and certificate with the default settings."""
     config, seconds, started = ReconstructConfig(), dict[str, float](), _cpu_seconds()
     capture, tracks, placements, assets = placed
 
@@ -80,7 +80,7 @@ def prove(placed: Placed, bundle: Path) -> Proof:
 
 
 def certificate_figures(certificate: Certificate) -> dict[str, Any]:
-    """The certificate's figures, the worst over joints and things."""
+    """The certificate's figures, the worst over joints and objects."""
     joints = certificate.joints
     openings = [thing.opening_free for thing in certificate.things if thing.opening_free is not None]
     cavities = [joint.cavity_open for joint in joints if joint.cavity_open is not None]
@@ -100,7 +100,7 @@ def certificate_figures(certificate: Certificate) -> dict[str, Any]:
 
 
 def mm(metres: float) -> float:
-    """Millimetres to a thousandth."""
+    """Millimetres, rounded to a thousandth."""
     return round(1000 * metres, 3)
 
 
@@ -120,5 +120,5 @@ def _reconstruction(placed: Placed, scene: ArticulatedScene) -> Reconstruction:
 
 
 def _cpu_seconds() -> float:
-    """Of this process and of those it waited for (the loaders)."""
+    """CPU time of this process and of the child processes it waited for (the loaders)."""
     return sum(os.times()[:4])

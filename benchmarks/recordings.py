@@ -1,4 +1,4 @@
-"""Recordings with a truth, of either sample generator: their true masks, clicks on the frames that were read, random clicks."""
+"""Recordings with ground truth, of either sample generator: true masks, clicks on the frames that were read, random clicks."""
 
 import json
 import zipfile
@@ -22,8 +22,8 @@ from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.segment.prompts import read_prompts
 
-CLICK_MARGIN_PX = 3  # from the border of what a person clicks
-_WELL_VISIBLE = 0.5  # of its pixels in the frame that shows most of them
+CLICK_MARGIN_PX = 3  # minimum distance of a click from the mask's border
+_WELL_VISIBLE = 0.5  # fraction of the pixels in the frame that shows most of them
 
 TrueMask = Callable[[str, int], Mask | None]
 
@@ -34,7 +34,7 @@ def recording_in(folder: Path) -> Path:
 
 
 def true_masks(folder: Path) -> TrueMask:
-    """Of the project's own samples (a folder an object) or of images of object numbers, in the order of truth.json."""
+    """True masks of the project's own samples (a folder per object), or of images of object numbers (order of truth.json)."""
     own, numbers = folder / "truth_masks", folder / "masks"
     order = [item["name"] for item in json.loads((folder / "truth.json").read_text())["objects"]]
 
@@ -52,7 +52,7 @@ def true_masks(folder: Path) -> TrueMask:
 
 
 def clicked(folder: Path, frames: Sequence[int]) -> Prompts:
-    """One click an object: its own where that frame was read, else the middle of it in the frame that shows most of it."""
+    """One click per object: its own if that frame was read, else the innermost point in the frame that shows most of it."""
     masks, found = true_masks(folder), []
     for prompt in read_prompts(folder / "prompts.json").objects:
         points = tuple(point for point in prompt.points if point.frame in frames)[:1]
@@ -63,10 +63,10 @@ def clicked(folder: Path, frames: Sequence[int]) -> Prompts:
 
 
 def random_clicks(folder: Path, rng: np.random.Generator) -> Prompts:
-    """One click an object that some frame shows: any pixel of its visible face, in any frame that shows it well.
+    """One click per object visible in some frame: any pixel of its visible face, in any frame that shows it well.
 
-    The face of what opens is the front of its box; of other things it is all that is seen of them. Clear views are not
-    preferred, nor are middles: a person clicks where the hand is.
+    The face of an object that opens is the front of its box; of other objects it is the whole visible surface. Clear views and
+    central places are not preferred, as people click anywhere.
     """
     source = recording_in(folder)
     with zipfile.ZipFile(source) as archive:
@@ -82,7 +82,7 @@ def random_clicks(folder: Path, rng: np.random.Generator) -> Prompts:
 
 
 def write_prompts(prompts: Prompts, path: Path) -> None:
-    """Clicks as prompts.json."""
+    """Write clicks as prompts.json."""
     entries = [
         {
             "name": prompt.name,
@@ -101,7 +101,7 @@ def _pixels(mask: Mask | None) -> int:
 def _click(
     thing: ObjectRecord, recorded: Record3DMetadata, masks: TrueMask, frame: int, rng: np.random.Generator
 ) -> PromptPoint | None:
-    """A pixel of the visible face, not near its border; None where this frame shows no such pixel."""
+    """A pixel of the visible face, not near its border; None if this frame shows no such pixel."""
     mask, pose = masks(thing.name, frame), recorded.poses[frame]
     if mask is None or pose is None:
         return None
@@ -114,7 +114,7 @@ def _click(
 
 
 def _front_pixels(thing: ObjectRecord, camera: Intrinsics, pose: Rigid3) -> Mask:
-    """Where rays reach the front of the object's box (its -y side) from outside."""
+    """Pixels whose rays hit the front of the object's box (its -y side) from outside."""
     object_from_camera = thing.world_from_object.inverse @ pose
     half, eye = thing.dimensions_m / 2, object_from_camera.translation
     if eye[1] >= -half[1]:
@@ -128,7 +128,7 @@ def _front_pixels(thing: ObjectRecord, camera: Intrinsics, pose: Rigid3) -> Mask
 
 
 def mask_overlap(folder: Path, name: str, found: Path) -> float:
-    """Mean IoU of the masks in `found` (<frame:06d>.png) in the frames that show the object; a missing one counts as 0."""
+    """Mean IoU of the masks in `found` (<frame:06d>.png) over the frames that show the object; a missing one counts as 0."""
     masks, overlaps = true_masks(folder), []
     own = folder / "truth_masks" / name
     for frame in sorted(int(path.stem) for path in (own if own.exists() else folder / "masks").glob("*.png")):
@@ -141,7 +141,7 @@ def mask_overlap(folder: Path, name: str, found: Path) -> float:
 
 
 def clicked_overlaps(folder: Path, prompts: Prompts, masks: Path, matched: Mapping[str, str | None]) -> dict[str, float]:
-    """`mask_overlap` of every clicked object; `matched` gives its name in the bundle, whose masks are in `masks`/NAME."""
+    """`mask_overlap` of every clicked object; `matched` maps it to its name in the bundle, whose masks are in `masks`/NAME."""
     return {each.name: mask_overlap(folder, each.name, masks / (matched.get(each.name) or "-")) for each in prompts.objects}
 
 
@@ -156,7 +156,7 @@ def _middle(prompt: ObjectPrompt, masks: dict[int, Mask | None]) -> tuple[Prompt
 
 
 def record_of(item: SceneObject) -> ObjectRecord:
-    """A built object as the evaluation reads it from a manifest."""
+    """A built object as the record that the evaluation reads from a manifest."""
     pose = item.world_from_object
     joints = tuple(
         JointRecord(

@@ -1,12 +1,12 @@
-"""Similarity from correspondences most of which are wrong: ours beside the peers, on the same point sets in one run.
+"""Similarity from correspondences with many outliers: this project's solver and its peers on the same point sets, in one run.
 
 `python benchmarks/registration.py` writes registration.json beside this file, docs/registration.png, and prints a table. A
-thousand pairs of point sets for each share of wrong correspondences (--shares does some of them, and leaves the others in
-the file as they are: all methods of a share are timed in one run); each has 1000 correspondences on the surface of a box of
-0.6 x 0.54 x 0.84 m, 5 mm of noise along each axis, a scale of 0.3 to 3, any turn, and the wrong ones anywhere in the box's
-own bounds. Open3D gets as many pairs as fit a minute a share. KISS-Matcher is optional (`pip install kiss-matcher`); it
-estimates no scale, so the paper's vote over pairs (mended by method.md row 3) gives it one. OpenCV's affine inliers are
-fitted by a similarity. TEASER++ has no wheel on PyPI.
+thousand pairs of point sets for each outlier ratio (--shares runs some of them and keeps the others of the file: all methods
+of a ratio are timed in one run); each has 1000 correspondences on the surface of a box of 0.6 x 0.54 x 0.84 m, 5 mm of noise
+along each axis, a scale of 0.3 to 3, any rotation, and outliers anywhere in the box's own bounds. Open3D gets as many pairs as
+fit into a minute per ratio. KISS-Matcher is optional (`pip install kiss-matcher`); it estimates no scale, so the paper's vote
+over pairs (corrected by method.md row 3) provides it. OpenCV's affine inliers are fitted by a similarity. TEASER++ has no wheel
+on PyPI.
 """
 
 import argparse
@@ -29,14 +29,14 @@ SHARES = (0.6, 0.8, 0.9, 0.95, 0.98)
 NOISE_M = 0.005
 LIMIT_M = 3 * NOISE_M
 COUNT = 1000
-SECONDS = {"Open3D RANSAC, 100k": 60.0}  # for each share; one pair takes it up to two minutes
-GOOD = (3.0, 0.02, 0.02)  # degrees, metres, share of scale: stack.md section 4
+SECONDS = {"Open3D RANSAC, 100k": 60.0}  # for each outlier ratio; one pair takes it up to two minutes
+GOOD = (3.0, 0.02, 0.02)  # degrees, metres, relative scale: stack.md section 4
 
 Method = Callable[[np.ndarray, np.ndarray], Similarity3 | None]
 
 
 class Problem(NamedTuple):
-    """Correspondences and the similarity the right ones obey."""
+    """Correspondences, and the similarity of the inliers."""
 
     source: np.ndarray
     target: np.ndarray
@@ -44,7 +44,7 @@ class Problem(NamedTuple):
 
 
 def main() -> None:
-    """Run all methods on all problems, and write what came out."""
+    """Run all methods on all problems, and write the results."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pairs", type=int, default=1000, help="pairs of point sets for each share")
     parser.add_argument("--shares", type=float, nargs="*", default=SHARES)
@@ -53,7 +53,7 @@ def main() -> None:
     before = json.loads(result.read_text())["rows"] if result.exists() else []
     rows = [row for row in before if row["wrong"] not in options.shares]
     for method in methods().values():
-        method(*problem(SHARES[0], 0)[:2])  # what is loaded on first use
+        method(*problem(SHARES[0], 0)[:2])  # load what is imported on first use
     for share in options.shares:
         problems = [problem(share, seed) for seed in range(options.pairs)]
         for name, method in methods().items():
@@ -66,7 +66,7 @@ def main() -> None:
 
 
 def methods() -> dict[str, Method]:
-    """Ours and the peers that are installed."""
+    """The project's solver and the installed peers."""
     found: dict[str, Method] = {"r2c2r": ours, "OpenCV estimateAffine3D": opencv}
     try:
         import kiss_matcher  # noqa: F401
@@ -100,7 +100,7 @@ def problem(share: float, seed: int) -> Problem:
 
 
 def measured(method: Method, problems: list[Problem], seconds: float) -> dict[str, float | int | None]:
-    """Success, median errors of the successes, and median time."""
+    """Success rate, median errors of the successes, and median time."""
     errors, times = [], []
     for each in problems:
         started = time.perf_counter()
@@ -123,7 +123,7 @@ def measured(method: Method, problems: list[Problem], seconds: float) -> dict[st
 
 
 def error(found: Similarity3 | None, each: Problem) -> tuple[float, float, float]:
-    """Degrees, metres at the middle, share of scale."""
+    """Errors in degrees, metres at the centre, and relative scale."""
     if found is None:
         return 180.0, np.inf, np.inf
     turn = Rotation.from_matrix(found.rotation.T @ each.truth.rotation).magnitude()
@@ -133,13 +133,13 @@ def error(found: Similarity3 | None, each: Problem) -> tuple[float, float, float
 
 
 def ours(source: np.ndarray, target: np.ndarray) -> Similarity3 | None:
-    """What placement and odometry use."""
+    """The solver that placement and odometry use."""
     fit = similarity_consensus(source, target, threshold=LIMIT_M, rng=np.random.default_rng(0))
     return None if fit is None else fit.target_from_source
 
 
 def opencv(source: np.ndarray, target: np.ndarray) -> Similarity3 | None:
-    """RANSAC over affine maps, then a similarity on its inliers."""
+    """RANSAC over affine maps, then a similarity fitted to its inliers."""
     found, _, inlier = cv2.estimateAffine3D(source[:, None], target[:, None], ransacThreshold=LIMIT_M, confidence=0.9999)
     if not found or np.count_nonzero(inlier) < 3:
         return None
@@ -163,7 +163,7 @@ def kiss(source: np.ndarray, target: np.ndarray) -> Similarity3 | None:
 
 
 def voted_scale(source: np.ndarray, target: np.ndarray) -> float:
-    """The ratio most of 20 000 pairs' lengths agree on within the noise."""
+    """The scale on which most of 20 000 pairs' length ratios agree, within the noise."""
     first, second = np.random.default_rng(0).integers(0, len(source), (2, 20000))
     of_source = np.linalg.norm(source[first] - source[second], axis=1)
     of_target = np.linalg.norm(target[first] - target[second], axis=1)
@@ -177,7 +177,7 @@ def voted_scale(source: np.ndarray, target: np.ndarray) -> float:
 
 
 def open3d_ransac(source: np.ndarray, target: np.ndarray) -> Similarity3 | None:
-    """RANSAC over similarities of three correspondences, 100 000 at most."""
+    """RANSAC over similarities of three correspondences, with at most 100 000 iterations."""
     import open3d
 
     registration = open3d.pipelines.registration
@@ -200,7 +200,7 @@ def open3d_ransac(source: np.ndarray, target: np.ndarray) -> Similarity3 | None:
 
 
 def table(rows: list[dict[str, object]]) -> str:
-    """Success and time of each method and share, in Markdown."""
+    """Success rate and time of each method and outlier ratio, in Markdown."""
     lines = [
         "| method | " + " | ".join(f"{share:.0%} wrong" for share in SHARES) + " |",
         "|---|" + "---|" * len(SHARES),
@@ -215,7 +215,7 @@ def table(rows: list[dict[str, object]]) -> str:
 
 
 def plot(rows: list[dict[str, object]], path: Path) -> None:
-    """Success and time over the share of wrong correspondences."""
+    """Plot of success rate and time over the outlier ratio."""
     import matplotlib as mpl
 
     mpl.use("Agg")

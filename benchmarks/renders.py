@@ -1,4 +1,4 @@
-"""MuJoCo's own pictures of a bundle: closed, all joints open, and each joint open alone, for a person to look at.
+"""MuJoCo renderings of a bundle for visual inspection: closed, all joints open, and each joint open alone.
 
     MUJOCO_GL=egl python benchmarks/renders.py BUNDLE.zip OUT.png [--size 960x540]
 

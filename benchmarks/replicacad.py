@@ -1,9 +1,10 @@
-"""ReplicaCAD's articulated pieces as a phone's recording with a truth.
+"""Converter of ReplicaCAD's articulated pieces into a phone recording with ground truth.
 
     python benchmarks/replicacad.py FOLDER OUT [--frames 120] [--size 640x480] [--seed 0]
 
 FOLDER holds replicacad-kitchen_counter, replicacad-fridge and replicacad-doubledoor (URDF and GLB, CC BY 4.0). They stand in a
-row in a plain room; the two doors, which come alone, close a cupboard of ours 0.6 m deep. A drawer's depth is the counter's.
+row in a plain room; the two doors, which come without a carcass, close a cupboard drawn here, 0.6 m deep. A drawer's depth is
+the counter's.
 """
 
 import argparse
@@ -23,13 +24,13 @@ from r2c2r_core.synthetic.truth import TrueJoint, TrueObject
 _TURN = np.column_stack([[0, -1, 0], [0, 0, 1], [-1, 0, 0]]).astype(float)  # theirs: front +x, +y up; ours: front -y, +z up
 _CUPBOARD_M, _BOARD_M = 0.6, 0.02
 _WOOD = np.array([0.45, 0.36, 0.26])
-_FACING = 0.95  # cosine from which a triangle is of the front
-_HANDLE_SHARE = 0.15  # of a front's area at most
+_FACING = 0.95  # minimum cosine for a triangle to face the front
+_HANDLE_SHARE = 0.15  # maximum fraction of a front's area
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Link:
-    """A link of a URDF in its closed place, with the joint above it."""
+    """A link of a URDF in its closed pose, with its parent joint."""
 
     name: str
     joint: ElementTree.Element
@@ -38,13 +39,13 @@ class Link:
 
     @property
     def vertices(self) -> np.ndarray:
-        """All of its vertices, a handle pushed back to the face that it stands on."""
+        """All of its vertices, with a handle's projected onto the front face."""
         points = np.concatenate([mesh.vertices for mesh in self.meshes])
         points[:, 1] = np.maximum(points[:, 1], self._face())
         return points
 
     def _face(self) -> float:
-        """The y of the front: the foremost of what faces -y but for the little area of a handle."""
+        """The y of the front face: the foremost triangles that face -y, except for the small area of a handle."""
         normals = np.concatenate([mesh.face_normals for mesh in self.meshes])
         areas = np.concatenate([mesh.area_faces for mesh in self.meshes])
         y = np.concatenate([mesh.triangles_center[:, 1] for mesh in self.meshes])
@@ -54,7 +55,7 @@ class Link:
 
 
 def main() -> None:
-    """Draw them."""
+    """Draw the recording."""
     parser = argparse.ArgumentParser(description="ReplicaCAD's articulated pieces as a recording.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("out", type=Path)
@@ -100,7 +101,7 @@ def _standing(urdf: Path, left: float) -> list[Link]:
 
 
 def read_urdf(urdf: Path) -> list[Link]:
-    """Links with meshes, all joints at 0, in our axes."""
+    """Links with meshes, all joints at 0, in this project's axes."""
     robot = ElementTree.parse(urdf).getroot()
     joints = {joint.find("child").attrib["link"]: joint for joint in robot.findall("joint")}  # type: ignore[union-attr]
     links = []
@@ -123,7 +124,7 @@ def _place(link: str, joints: dict[str, ElementTree.Element]) -> Rigid3:
 def _origin(element: ElementTree.Element) -> Rigid3:
     origin = element.find("origin")
     turn, shift = (_numbers(origin.attrib[key]) for key in ("rpy", "xyz")) if origin is not None else (np.zeros(3),) * 2
-    quarters = np.round(turn / (np.pi / 2)) * np.pi / 2  # theirs are rounded to 1.56: a fridge would lean
+    quarters = np.round(turn / (np.pi / 2)) * np.pi / 2  # theirs are rounded to 1.56, which would tilt a fridge
     return Rigid3(Rotation.from_euler("xyz", quarters).as_matrix(), shift)
 
 
@@ -192,7 +193,7 @@ def _board(low: list[float], high: list[float], thing: int) -> Surface:
 
 
 def _reaching(front: np.ndarray, back: float) -> np.ndarray:
-    """The front and what lies behind it, to y = back."""
+    """The front's vertices, extended backwards to y = `back`."""
     return np.concatenate([front, np.column_stack([front[:, 0], np.full(len(front), back), front[:, 2]])])
 
 

@@ -1,9 +1,9 @@
-"""Accuracy and cost of the whole way, on synthetic kitchens with exact truth.
+"""End-to-end accuracy and cost on synthetic kitchens with exact truth.
 
     python benchmarks/run.py [--seeds 0-4] [--frames N] [--size WxH] [--json FILE] [--workdir DIR]
 
 Each seed: sample (kept in the workdir), `r2c2r run` from nothing, `r2c2r check`, `r2c2r evaluate`. Prints a Markdown table.
-What must not become worse is guard.py's.
+Regressions are checked by guard.py.
 """
 
 import argparse
@@ -72,7 +72,7 @@ def _bench(options: argparse.Namespace, workdir: Path) -> int:
 
 
 def bench_seed(seed: int, frames: int, size: tuple[int, int], workdir: Path) -> dict[str, float | None]:
-    """All figures of one seed by name; None where they are missing."""
+    """All figures of one seed by name; None if missing."""
     sample = made_sample(seed, frames, size, workdir)
     work = workdir / f"run-{seed}"
     outcome = whole_way(sample / "scan.r3d", sample / "prompts.json", sample / "truth.json", work)
@@ -88,7 +88,7 @@ def bench_seed(seed: int, frames: int, size: tuple[int, int], workdir: Path) -> 
 
 
 def made_sample(seed: int, frames: int, size: tuple[int, int], workdir: Path) -> Path:
-    """The sample's folder, made unless the same generator made it before."""
+    """The sample's folder, made unless the same version of the generator has already made it."""
     folder = workdir / f"sample-{seed}-{frames}-{size[0]}x{size[1]}-{_generator_digest()}"
     if not folder.exists():
         unfinished = workdir / f"unfinished-{seed}"
@@ -110,7 +110,7 @@ def made_sample(seed: int, frames: int, size: tuple[int, int], workdir: Path) ->
 
 
 def _generator_digest() -> str:
-    """Changes with the generator's source, so that no stale sample is used."""
+    """Digest of the generator's source, so that no stale sample is used."""
     digest = hashlib.sha256()
     for file in sorted((REPOSITORY / "r2c2r_core" / "synthetic").glob("*.py")):
         digest.update(file.read_bytes())
@@ -118,7 +118,7 @@ def _generator_digest() -> str:
 
 
 def markdown(document: dict[str, Any]) -> str:
-    """One line a seed, and their mean."""
+    """One line per seed, and their mean."""
     seeds: dict[str, dict[str, float | None]] = document["seeds"]
     lines = ["| seed | " + " | ".join(title for _, title, _ in _COLUMNS) + " |", "|---" * (len(_COLUMNS) + 1) + "|"]
     for seed, metrics in seeds.items():
@@ -146,7 +146,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--frames", type=int, default=180)
     parser.add_argument("--size", type=_size, default=(960, 720), metavar="WxH")
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--workdir", type=Path, help="kept afterwards; samples in it are used again")
+    parser.add_argument("--workdir", type=Path, help="kept afterwards; samples in it are reused")
     return parser
 
 

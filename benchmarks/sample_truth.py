@@ -1,4 +1,4 @@
-"""What is exactly true of a synthetic recording: poses, surfaces, depth at colour size."""
+"""Exact ground truth of a synthetic recording: poses, surfaces, depth at colour size."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _AHEAD_M = np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 1.0], [0.5, 0.0, 1.5], [0.0, 0.
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SampleTruth:
-    """A kitchen and the walk through it, made again from its seed."""
+    """A sample's kitchen and camera path, regenerated from its seed."""
 
     scene: LitScene
     capture_from_kitchen: Rigid3
@@ -32,7 +32,7 @@ class SampleTruth:
     surface: Any  # Open3D's ray-casting scene of it, in the kitchen's frame
 
     def depth(self, frame: int, camera: Intrinsics) -> np.ndarray:
-        """Exact z-depth (h, w); 0 where nothing is."""
+        """Exact z-depth (h, w); 0 where there is no surface."""
         camera_from_kitchen = (self.capture_from_kitchen.inverse @ self.poses[frame]).inverse
         faces = facing_faces(self.scene, camera_from_kitchen)
         return rasterize(self.scene.vertices, faces, self.scene.attributes, camera, camera_from_kitchen).depth_m.astype(
@@ -40,7 +40,7 @@ class SampleTruth:
         )
 
     def distance_m(self, points_capture: Points) -> np.ndarray:
-        """Distance of points to the nearest true surface."""
+        """Distance of points to the nearest true surface, in metres."""
         import open3d as o3d
 
         points = self.capture_from_kitchen.inverse.apply(points_capture).astype(np.float32)
@@ -62,7 +62,7 @@ def sample_truth(seed: int, frames: int) -> SampleTruth:
 
 
 def pose_errors(frames: Sequence[Frame], truth: Mapping[int, Rigid3]) -> dict[str, float]:
-    """Rms errors after one rigid motion of the whole: of the camera centres (mm), and of points 1 to 2 m ahead (mm)."""
+    """RMS errors after the best rigid alignment: of the camera centres (mm), and of points 1 to 2 m ahead (mm)."""
     found = [f.world_from_camera for f in frames]
     wanted = [truth[f.index] for f in frames]
     centres = _rms(np.array([p.translation for p in found]), np.array([p.translation for p in wanted]))

@@ -1,12 +1,11 @@
-"""The scene and its proof: synthesis, warp, export and certificate of finished reconstructions, against issue 5's bars.
+"""Quality of the scene and its certificate: synthesis, warp, export and certificate of finished runs, against issue 5's bars.
 
     python benchmarks/scene.py --workdir DIR [--seeds 0-9] [--json FILE] [--update]
 
-DIR holds seed<N> and kitchen, the workdirs of finished `r2c2r run`s (of `r2c2r sample` and of the real kitchen); what is not
-there is left out. Only the stages after the alignment are run again, into a temporary folder; the workdirs stay as they
-are. Seconds are scaled to 20 objects by their number; a
-true room of 20 is timed, against its bar, by galley.py. --update writes benchmarks/scene.json. SAPIEN is tried when
-R2C2R_SAPIEN_PYTHON names its environment.
+DIR holds seed<N> and kitchen, the workdirs of finished `r2c2r run`s (of `r2c2r sample` and of the real kitchen); missing ones
+are skipped. Only the stages after the alignment are run again, into a temporary folder; the workdirs are not modified. Seconds
+are scaled to 20 objects by their number; a true room of 20 is timed, against its bar, by galley.py. --update writes
+benchmarks/scene.json. SAPIEN is included if R2C2R_SAPIEN_PYTHON names its environment.
 """
 
 import argparse
@@ -35,7 +34,7 @@ from r2c2r_core.workspace import Workspace
 FIGURES = Path(__file__).resolve().parent / "scene.json"
 OBJECTS = 20
 
-# name, bar, which way is better; None: no bar, for the reader
+# name, bar, better direction; None: no bar, for information
 BARS: tuple[tuple[str, float | None, str], ...] = (
     ("rest_mm", 0.5, "lower"),
     ("sweep_mm", 1.0, "lower"),
@@ -55,7 +54,7 @@ BARS: tuple[tuple[str, float | None, str], ...] = (
     ("cpu_seconds_20_objects", None, "lower"),
 )
 
-# Table 3 of the paper. What its columns count is not stated there: most likely limits of stock assets against the truth.
+# Table 3 of the paper. It does not state what its columns count: most likely limits of stock assets against the truth.
 PAPER_TABLE_3 = {"cabinets": {"BK": 1.0, "SFK": 1.0}, "drawers": {"BK": 0.9525, "SFK": 0.9125}}
 MEANING = {
     "paper": "range of the joint over the true one: doors in radians, drawers over the drawer's WIDTH; n unstated",
@@ -65,7 +64,7 @@ MEANING = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure every finished workdir, print, and keep the figures."""
+    """Measure every finished workdir, print, and save the figures."""
     options = _parser().parse_args(arguments)
     kitchens = {f"seed{seed}": seed for seed in options.seeds} | {"kitchen": None}
     measured: dict[str, Any] = {}
@@ -90,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def measure(workdir: Path, seed: int | None) -> dict[str, Any]:
-    """All figures of one kitchen; lists of what stands out under "details"."""
+    """All figures of one kitchen; lists of anomalies under "details"."""
     placed = placed_by(Workspace(workdir))
     with tempfile.TemporaryDirectory(prefix="r2c2r-scene-") as folder:
         proof = prove(placed, Path(folder) / "bundle.zip")
@@ -131,7 +130,7 @@ def worst(measured: dict[str, Any]) -> dict[str, Any]:
 
 
 def _where_truth_is_free(mjcf: Path, seed: int | None) -> tuple[float | None, dict[str, Any]]:
-    """Deepest overlap of two joints' parts, both open, that the true kitchen does not have; within the true limits."""
+    """Deepest overlap between the open parts of two joints that do not meet in the true kitchen, within the true limits."""
     if seed is None:
         return None, {}
     model, limits, true = compiled(mjcf, strict=True), true_limits(seed), true_meetings(seed)
@@ -144,7 +143,7 @@ def _where_truth_is_free(mjcf: Path, seed: int | None) -> tuple[float | None, di
 
 
 def _ratios(scene: ArticulatedScene, seed: int | None, certificate: Certificate) -> dict[str, float]:
-    """Table 3's figure for our doors and drawers, and the share of our own range that a hand's force reaches."""
+    """Table 3's figure for our doors and drawers, and the fraction of our own range that a hand's force reaches."""
     reached = {joint.joint: joint.travel_reached for joint in certificate.joints}
     limits = true_limits(seed) if seed is not None else {}
     table: dict[str, float] = {}

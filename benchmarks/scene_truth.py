@@ -1,4 +1,4 @@
-"""A synthetic kitchen as a MuJoCo model of its true fronts and handles: which joints really pass each other."""
+"""MuJoCo model of a synthetic kitchen's true fronts and handles, to determine which joints really do not collide."""
 
 from typing import Any
 
@@ -8,19 +8,19 @@ from r2c2r_core.export.together import Meeting, meetings
 from r2c2r_core.synthetic.kitchen import Appliance, Furniture, Handle, Kitchen, Leaf
 from r2c2r_core.synthetic.layout import plan_kitchen
 
-_SEAT_M = 0.003  # between a closed front and the block behind it: the true ones touch
+_SEAT_M = 0.003  # gap between a closed front and the block behind it; the true ones touch
 
 Pair = frozenset[str]
 
 
 def true_limits(seed: int) -> dict[str, float]:
-    """Upper limit of every true joint, under the name that ours has."""
+    """Upper limit of every true joint, under this project's name for it."""
     model = true_model(seed)
     return {model.joint(j).name: float(model.jnt_range[j][1]) for j in range(model.njnt)}
 
 
 def true_meetings(seed: int) -> dict[Pair, Meeting]:
-    """The pairs of joints whose true parts meet when both are open."""
+    """Pairs of joints whose true parts collide when both are open."""
     return {frozenset(one.joints): one for one in meetings(true_model(seed))}
 
 
@@ -65,7 +65,7 @@ def _appliance(thing: Appliance) -> list[str]:
 
 
 def _mover(joint: str, corner: np.ndarray, size: np.ndarray, hinge: str | None, upper: float, handle: Handle) -> str:
-    """A front with its handle; `corner` is its lower left one on the outer face."""
+    """MJCF of a front with its handle; `corner` is the lower left corner of its outer face."""
     pivot = corner + np.array([size[0] if hinge == "right" else 0.0, 0.0, 0.0])
     kind, axis = ("slide", "0 -1 0") if hinge is None else ("hinge", "0 0 -1" if hinge == "left" else "0 0 1")
     own = corner - pivot

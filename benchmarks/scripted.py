@@ -1,9 +1,9 @@
-"""How many variants the scripted policy solves.
+"""Success rate of the scripted policy over variants.
 
     python benchmarks/scripted.py VARIANTS --joint NAME ... --thing NAME ... [-n 100] [-o FILE]
 
-VARIANTS is a folder that `r2c2r vary` wrote. Episode k takes variant k and seed k; the file is written as it goes, and what is
-there is not run again. Needs the extra `r2c2r[gym]`.
+VARIANTS is a folder that `r2c2r vary` wrote. Episode k takes variant k and seed k; the file is written after each episode, and
+episodes already in it are not repeated. Needs the extra `r2c2r[gym]`.
 """
 
 import argparse

@@ -1,10 +1,10 @@
-"""Ten people scrub at once: how fast frames of a project come, over loopback, each person on a connection of their own.
+"""Frame latency while ten people scrub a project at once, over loopback, each on their own connection.
 
     python benchmarks/scrubbing.py [--people 10] [--steps 200] [--json benchmarks/app.json]
 
 A project of full-size frames (960x720 of a 1920x1440 recording would be shown) is scrubbed back and forth without any cache;
-each step asks for the next frame when the one before has come. The first pass makes the previews; both are reported, and how
-long the annotate page takes to its first frame in a Chromium that has never been there.
+each step requests the next frame when the previous one has arrived. The first pass makes the previews; both passes are
+reported, and the time to the first frame of the annotate page in a Chromium without a cache.
 """
 
 import argparse
@@ -44,7 +44,7 @@ FRAME_IS_DRAWN = """() => {
 
 
 def scrub(folder: Path, people: int, steps: int) -> dict[str, Any]:
-    """Milliseconds a frame, first pass and later ones, and the slowest answer of the API meanwhile."""
+    """Milliseconds per frame, in the first pass and later ones, and the slowest response of the API meanwhile."""
     server = Server(folder / "data", real=False)
     server.start()
     journey = Journey(server, random.Random(0), None)
@@ -65,7 +65,7 @@ def scrub(folder: Path, people: int, steps: int) -> dict[str, Any]:
 
 
 def _full_size_frames(project: Path) -> None:
-    """Pictures of the size a phone records, with texture."""
+    """Textured pictures of the size that a phone records."""
     rng = np.random.default_rng(0)
     table = []
     for index in range(FRAMES):
@@ -92,7 +92,7 @@ def _together(address: str, cookies: dict[str, str], *, people: int, steps: int,
 
 
 def _page_to_first_frame(cookies: dict[str, str], address: str) -> dict[str, float]:
-    """Milliseconds from asking for the annotate page to its first frame on the canvas, in browsers that know nothing yet."""
+    """Milliseconds from requesting the annotate page to its first frame on the canvas, in browsers with an empty cache."""
     taken = []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)

@@ -1,11 +1,11 @@
-"""The second generator's kitchens, filmed while fronts are opened.
+"""Kitchens of the second generator, filmed while fronts are opened.
 
     python benchmarks/second_opened.py PATH/make_kitchen.py OUT --seed N [--frames F] [--size WxH]
 
-PATH/make_kitchen.py is that generator, kept apart from the project on purpose; its layouts, paints, light and shading stay as
-they are, and nothing of the project's own generator is used. What moves, what is behind it, the way of the camera and the hands
-are drawn here: hinges that lie inside their boards, motion with a stop for thought, drawers and shelves of other sizes. OUT has
-capture.r3d, prompts.json, truth.json and truth_masks/, laid out as `r2c2r sample --opened` writes them.
+PATH/make_kitchen.py is that generator, deliberately independent of the project; its layouts, paints, light and shading are used
+unchanged, and nothing of the project's own generator is used. The moving parts, the space behind them, the camera path and the
+hands are drawn here: hinges inside their boards, motion with a pause, drawers and shelves of other sizes. OUT has capture.r3d,
+prompts.json, truth.json and truth_masks/, laid out as `r2c2r sample --opened` writes them.
 """
 
 import argparse
@@ -29,7 +29,7 @@ Motion = Literal["revolute", "prismatic"]
 
 _FRONT_M, _GAP_M = 0.02, 0.0015  # as the generator makes its fronts
 _CAPTURE_FROM_WORLD = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # ARKit: y up
-_WALK = 0.42  # of the film: past everything, after what stood open at the start is closed
+_WALK = 0.42  # fraction of the film at which the walk past all fronts ends; fronts open at the start are closed before
 _START = 0.09
 _FRAMES_EACH, _MOST = 36, 6
 _MIN_SEEN_PX, _MIN_SEEN_SHARE = 400, 0.25
@@ -38,24 +38,24 @@ _DEPTH_SIZE = (256, 192)
 
 @dataclass(kw_only=True)
 class Leaf:
-    """One front that moves, in the world; `parts` are indices into the scene's parts."""
+    """One moving front, in world coordinates; `parts` are indices into the scene's parts."""
 
     name: str  # of its joint
-    owner: int  # number of its object
+    owner: int  # object number
     kind: str
     type: Motion
     axis: np.ndarray
     origin: np.ndarray
     upper: float
     hinge: str | None
-    corners: np.ndarray  # (8, 3) of its closed front
-    out: np.ndarray  # level, into the room
+    corners: np.ndarray  # (8, 3) of the closed front
+    out: np.ndarray  # horizontal, into the room
     inside: dict[str, Any]
     front_parts: list[int] = field(default_factory=list)
     body_parts: list[int] = field(default_factory=list)
 
     def pose(self, state: float) -> np.ndarray:
-        """4x4: how it has moved from where it is closed."""
+        """4x4 motion from the closed pose."""
         moved = np.eye(4)
         if self.type == "prismatic":
             moved[:3, 3] = state * self.axis
@@ -67,21 +67,21 @@ class Leaf:
 
 @dataclass(frozen=True, kw_only=True)
 class Turn:
-    """When one leaf opens and closes (shares of the film), how far, and whether it rests at its end."""
+    """Opening and closing times of one leaf (fractions of the film), its end position, and whether it rests there."""
 
     leaf: Leaf
     widest: float
     out: tuple[float, float]
     back: tuple[float, float]
     rests: bool
-    thinks: float  # share of the way at which the hand stops for a moment; 0: it does not
+    thinks: float  # fraction of the way at which the hand pauses; 0: no pause
 
     def state(self, time: float) -> float:
-        """Rad or m at a time."""
+        """Joint position (rad or m) at a time."""
         return self.widest * (_way(time, *self.out, self.thinks) - _way(time, *self.back, 0.0))
 
     def moves(self, time: float) -> bool:
-        """Whether a hand is on it."""
+        """Whether a hand moves it."""
         return self.out[0] < time < self.out[1] or self.back[0] < time < self.back[1]
 
 
@@ -143,7 +143,7 @@ def _load(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location("make_kitchen", path)
     if spec is None or spec.loader is None or not path.exists():
         raise SystemExit(f"{path}: no such program; give the path of make_kitchen.py")
-    if importlib.util.find_spec("liblzfse") is None:  # the same codec by another name is in the project's environment
+    if importlib.util.find_spec("liblzfse") is None:  # the project's environment has the same codec by another name
         sys.modules["liblzfse"] = importlib.import_module("lzfse")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -151,7 +151,7 @@ def _load(path: Path) -> ModuleType:
 
 
 def _units(plain: Callable[..., None], leaves: list[Leaf], rng: np.random.Generator) -> Callable[..., None]:
-    """The generator's `unit`, hollow, with its leaves noted; some of them hinged below or above, in pairs, or over a drawer."""
+    """The generator's `unit`, made hollow, with its leaves recorded; some hinged below or above, in pairs, or over a drawer."""
     given: dict[str, int] = {}
 
     def unit(
@@ -170,7 +170,7 @@ def _units(plain: Callable[..., None], leaves: list[Leaf], rng: np.random.Genera
     ) -> None:
         first, owner = len(scene.parts), len(scene.objects)
         plain(scene, name, category, run, x, width, z, height, depth, colour, texture, hinge=hinge)
-        panel = [part for part in scene.parts[first + 3 :]]  # of a microwave: its controls, which stay
+        panel = [part for part in scene.parts[first + 3 :]]  # a microwave's controls, which do not move
         del scene.parts[first:]
         scene.parts += panel
         way = _way_of(category, hinge, width, given, rng)
@@ -195,7 +195,7 @@ def _units(plain: Callable[..., None], leaves: list[Leaf], rng: np.random.Genera
 
 
 def _way_of(category: str, hinge: str | None, width: float, given: dict[str, int], rng: np.random.Generator) -> str:
-    """How a unit opens; each of the rarer ways at most once in a kitchen."""
+    """How a unit opens; each of the rarer ways is used at most once per kitchen."""
     rarer = {"cabinet": "bottom" if width < 0.5 else "pair", "wall_cabinet": "top", "refrigerator": "freezer"}.get(category)
     if rarer is not None and not given.get(rarer) and rng.random() < 0.75:
         given[rarer] = 1
@@ -205,7 +205,7 @@ def _way_of(category: str, hinge: str | None, width: float, given: dict[str, int
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """Where one compartment is, in its run: x along it, y from the front (0) to the wall, z up."""
+    """One compartment's bounds in its run: x along it, y from the front (0) to the wall, z up."""
 
     scene: Any
     run: np.ndarray
@@ -220,15 +220,15 @@ class Cell:
     depth: float
 
     def part(self, low: float, high: float) -> "Cell":
-        """Between two heights of it."""
+        """The part of the cell between two heights."""
         return Cell(**{**self.__dict__, "z": self.z + low, "height": high - low})
 
     def span(self, left: float, right: float) -> "Cell":
-        """Between two widths of it."""
+        """The part of the cell between two x positions."""
         return Cell(**{**self.__dict__, "x": self.x + left, "width": right - left})
 
     def box(self, low: Triple, high: Triple, colour: Any, texture: str = "paint", owner: int | None = None) -> int:
-        """Add a box in the run's frame; its number among the parts."""
+        """Add a box in the run's frame; return its number among the parts."""
         number = self.owner if owner is None else owner
         self.scene.box(low, high, self.run, number, np.asarray(colour), texture, False)
         return len(self.scene.parts) - 1
@@ -240,7 +240,7 @@ def _leaf(cell: Cell, way: str, suffix: str, leaves: list[Leaf], rng: np.random.
 
 
 def _carcass(cell: Cell, rng: np.random.Generator, *, drawer: bool) -> dict[str, Any]:
-    """Five boards and shelves; their clear lengths."""
+    """Add five boards and shelves; return their clear lengths."""
     wall, back = float(rng.uniform(0.012, 0.022)), cell.depth - float(rng.uniform(0.01, 0.05))
     x0, x1, z0, z1 = cell.x, cell.x + cell.width, cell.z, cell.z + cell.height
     y0, y1 = _FRONT_M + 0.001, cell.depth
@@ -275,7 +275,7 @@ def _carcass(cell: Cell, rng: np.random.Generator, *, drawer: bool) -> dict[str,
 
 
 def _board(cell: Cell, way: str, suffix: str, inside: dict[str, Any], leaves: list[Leaf], rng: np.random.Generator) -> None:
-    """The front with its handle, a drawer's box, and the joint that moves them."""
+    """Add the front with its handle, a drawer's box, and the joint that moves them."""
     x0, x1, z0, z1 = cell.x + _GAP_M, cell.x + cell.width - _GAP_M, cell.z + _GAP_M, cell.z + cell.height - _GAP_M
     front = [cell.box((x0, 0, z0), (x1, _FRONT_M, z1), cell.colour, cell.texture)]
     front.append(cell.box(*_handle(way, x0, x1, z0, z1, cell.name), (0.75, 0.75, 0.78), "metal"))
@@ -315,7 +315,7 @@ def _handle(way: str, x0: float, x1: float, z0: float, z1: float, name: str) -> 
 
 
 def _joint(cell: Cell, way: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
-    """Axis, a point on it and the limit, in the run: hinges lie a little inside the edge and behind the face."""
+    """Axis, a point on it and the limit, in the run's frame: hinges lie a little inside the edge and behind the face."""
     middle = np.array([cell.x + cell.width / 2, 0.0, cell.z + cell.height / 2])
     inset, behind = float(rng.uniform(0.002, 0.014)), float(rng.uniform(0.0, 0.009))
     if way == "drawer":
@@ -330,7 +330,7 @@ def _joint(cell: Cell, way: str, rng: np.random.Generator) -> tuple[np.ndarray, 
 
 
 def _drawer(cell: Cell, carcass: dict[str, Any], travel: float, rng: np.random.Generator) -> tuple[dict[str, Any], list[int]]:
-    """The box that comes out with a drawer's front, with things in it; its own clear lengths."""
+    """Add the box that moves with a drawer's front, with objects in it; return its clear lengths."""
     wall, floor, slide = float(rng.uniform(0.01, 0.018)), 0.006, 0.014
     side = carcass["board_m"] + slide
     x0, x1 = cell.x + side, cell.x + cell.width - side
@@ -345,7 +345,7 @@ def _drawer(cell: Cell, carcass: dict[str, Any], travel: float, rng: np.random.G
         ((x0 + wall, rear - wall, z0 + floor), (x1 - wall, rear, z1)),
     ]
     parts = [cell.box(low, high, colour) for low, high in boxes]
-    for _ in range(2):  # nobody's, but it goes along
+    for _ in range(2):  # unlabelled contents that move along
         x, y = x0 + (x1 - x0) * float(rng.uniform(0.25, 0.7)), _FRONT_M + (rear - _FRONT_M) * float(rng.uniform(0.2, 0.7))
         parts.append(
             cell.box(
@@ -364,7 +364,7 @@ def _drawer(cell: Cell, carcass: dict[str, Any], travel: float, rng: np.random.G
 
 
 def _turns(leaves: list[Leaf], frames: int, rng: np.random.Generator) -> list[Turn]:
-    """Who opens when: one or two from the start, the others one after the other, a pair together, the last to the end."""
+    """Schedule of openings: one or two open from the start, the others in sequence, a pair together, the last until the end."""
     count = int(np.clip(frames // _FRAMES_EACH, 2, _MOST))
     chosen = _chosen([leaf for leaf in leaves if not leaf.name.startswith("microwave")], count, rng)
     early = 2 if count > 4 and rng.random() < 0.5 else 1
@@ -390,7 +390,7 @@ def _turns(leaves: list[Leaf], frames: int, rng: np.random.Generator) -> list[Tu
 
 
 def _chosen(leaves: list[Leaf], count: int, rng: np.random.Generator) -> list[list[Leaf]]:
-    """Groups that open together, of as many kinds as there are."""
+    """Groups that open together, of as many different kinds as possible."""
     rest = [leaves[i] for i in rng.permutation(len(leaves))]
     groups: list[list[Leaf]] = []
     while rest and sum(len(group) for group in groups) < count:
@@ -403,7 +403,7 @@ def _chosen(leaves: list[Leaf], count: int, rng: np.random.Generator) -> list[li
 
 
 def _way(time: float, start: float, end: float, thinks: float) -> float:
-    """From 0 to 1 along half a cosine; with a stop in between, along two of them."""
+    """Progress from 0 to 1 along half a cosine; with a pause in between, along two of them."""
     t = float(np.clip((time - start) / (end - start), 0.0, 1.0))
     if not thinks:
         return 0.5 - 0.5 * float(np.cos(np.pi * t))
@@ -414,7 +414,7 @@ def _way(time: float, start: float, end: float, thinks: float) -> float:
 def _path(
     turns: list[Turn], run: np.ndarray, length: float, frames: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Eyes and targets in the world: before each front while it is moved, along the run between."""
+    """Eyes and targets in world coordinates: before each front while it moves, along the run in between."""
     from scipy.interpolate import PchipInterpolator
 
     knots: list[tuple[float, np.ndarray, np.ndarray]] = []
@@ -451,7 +451,7 @@ def _path(
 
 
 def _before(leaf: Leaf, run: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """An eye to one side of a front and what it looks at; from a drawer's side one looks down into it."""
+    """An eye to one side of a front, and its target; from a drawer's side the camera looks down into it."""
     middle, across = leaf.corners.mean(axis=0), run[:3, 0]
     aside = {"left": 0.45, "right": -0.45}.get(leaf.hinge or "", 0.35)
     high = middle[2] > 1.2
@@ -461,7 +461,7 @@ def _before(leaf: Leaf, run: np.ndarray, step: float) -> tuple[np.ndarray, np.nd
 
 
 def _looking(eye: np.ndarray, target: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """4x4 of a nearly level camera (x right, y down, z ahead)."""
+    """4x4 pose of a nearly level camera (x right, y down, z ahead)."""
     ahead = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(ahead, [0, 0, 1])
     right /= np.linalg.norm(right)
@@ -473,7 +473,7 @@ def _looking(eye: np.ndarray, target: np.ndarray, rng: np.random.Generator) -> n
 
 
 def _sleeve(scene: Any) -> int:
-    """A dark arm along +z with its hand at the origin: nobody's."""
+    """A dark arm along +z with its hand at the origin, labelled as no object."""
     import trimesh
 
     arm = trimesh.creation.capsule(radius=0.048, height=0.5, count=[12, 12])
@@ -486,7 +486,7 @@ def _sleeve(scene: Any) -> int:
 
 
 def _move(scene: Any, turns: list[Turn], sleeves: dict[str, int], time: float, world_from_camera: np.ndarray) -> None:
-    """Give every part its pose of this moment, as `now`; a hand that is on nothing is under the floor."""
+    """Set every part's current pose as `now`; a hand that moves nothing is put under the floor."""
     for part in scene.parts:
         part["now"] = np.eye(4)
     for turn in turns:
@@ -507,7 +507,7 @@ def _move(scene: Any, turns: list[Turn], sleeves: dict[str, int], time: float, w
 def _uncovered(
     leaves: list[Leaf], hit: np.ndarray, depth: np.ndarray, camera: np.ndarray, world_from_camera: np.ndarray
 ) -> np.ndarray:
-    """Pixels (h, w) of what stays behind a front's closed place: masks are of what moves, and nobody owns what it uncovers."""
+    """Pixels (h, w) behind a front's closed place: masks cover what moves, and the uncovered interior has no label."""
     v, u = np.indices(depth.shape)
     local = np.stack([(u - camera[0, 2]) / camera[0, 0], (v - camera[1, 2]) / camera[1, 1], np.ones(depth.shape)], -1)
     points = (np.nan_to_num(depth)[..., None] * local) @ world_from_camera[:3, :3].T + world_from_camera[:3, 3]
@@ -523,7 +523,7 @@ def _uncovered(
 
 
 class _Moved:
-    """The scene as `shade` reads it: textures go with what moves."""
+    """The scene as `shade` reads it, with textures that move with their parts."""
 
     def __init__(self, scene: Any) -> None:
         self.parts = [{**part, "T": part["now"] @ part["T"]} for part in scene.parts]
@@ -537,7 +537,7 @@ def _draw(
     world_from_camera: np.ndarray,
     lights: list[Any],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Colour 0..1, the number of the part behind every pixel (-1: nothing), and z-depth (nan: nothing)."""
+    """Colour 0..1, part number of every pixel (-1: none), and z-depth (nan: none)."""
     import open3d as o3d
 
     rays = o3d.t.geometry.RaycastingScene()
@@ -567,7 +567,7 @@ def _draw(
 
 
 def _store(recording: zipfile.ZipFile, number: int, image: np.ndarray, depth: np.ndarray, rng: np.random.Generator) -> None:
-    """One frame as Record3D has it: blurred and grainy colour, smooth, biased and torn depth."""
+    """Write one frame as Record3D does: blurred and grainy colour, smooth, biased and torn depth."""
     import liblzfse
 
     soft = cv2.GaussianBlur(image, (3, 3), 0.6) + rng.normal(0, 0.012, image.shape)
@@ -612,7 +612,7 @@ def _metadata(camera: np.ndarray, width: int, height: int, poses: list[list[floa
 
 
 def _seen(leaf: Leaf, state: float, hit: np.ndarray, camera: np.ndarray, world_from_camera: np.ndarray) -> tuple[int, float]:
-    """Pixels of a front, and their share of its whole outline."""
+    """Number of visible pixels of a front, and their fraction of its whole outline."""
     pixels = int(np.isin(hit, leaf.front_parts).sum())
     pose = np.linalg.inv(world_from_camera) @ leaf.pose(state)
     corners = leaf.corners @ pose[:3, :3].T + pose[:3, 3]
@@ -632,7 +632,7 @@ def _propose(
     leaves: list[Leaf],
     rng: np.random.Generator,
 ) -> None:
-    """A place where a person might click an object in this frame: well inside its front, wherever that stands."""
+    """Add a plausible click on an object in this frame: well inside its front, in its current position."""
     boards = [leaf.front_parts[0] for leaf in leaves if leaf.owner == index]
     face = np.isin(hit, boards) if boards else mask
     if np.count_nonzero(face) < 200:
@@ -649,7 +649,7 @@ def _propose(
 def _prompts(
     scene: Any, clicks: dict[int, list[tuple[float, int, float, float]]], rng: np.random.Generator
 ) -> list[dict[str, Any]]:
-    """One click an object, in one of its clearest views, closed or open."""
+    """One click per object, in one of its clearest views, closed or open."""
     entries = []
     for index, thing in enumerate(scene.objects):
         if clicks.get(index):

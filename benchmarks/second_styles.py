@@ -1,11 +1,11 @@
-"""The second generator's kitchens with fronts of other makes.
+"""Kitchens of the second generator with other styles of fronts.
 
     python benchmarks/second_styles.py PATH/make_kitchen.py STYLE OUT --seed N [--frames F] [--size WxH] [--clicks C]
 
-PATH/make_kitchen.py is that generator, kept apart from the project on purpose: its layouts, renderer, sensor and truth stay as
-they are; how a front of furniture is made is drawn here. A door's handle is on the side that opens, as in its kitchens, but
-where on that side differs from kitchen to kitchen. The truth is of what moves: a face frame and the channel over a handleless
-front belong to nobody.
+PATH/make_kitchen.py is that generator, deliberately independent of the project: its layouts, renderer, sensor and truth are
+used unchanged; the fronts of furniture are drawn here. A door's handle is on the side that opens, as in its kitchens, but its
+place on that side differs from kitchen to kitchen. The truth covers the moving parts: a face frame, and the channel over a
+handleless front, belong to no object.
 """
 
 import argparse
@@ -24,19 +24,19 @@ Pull = Literal["bar", "knob", "wide", "cup", "none"]
 
 _FURNITURE = ("cabinet", "wall_cabinet", "drawer")
 _THICK, _GAP = 0.02, 0.0015  # as the generator makes its fronts
-_WINDOW = np.array([0.25, -0.85, 0.45])  # direction of what glossy fronts mirror
-_GLOSSY = "gloss"  # a texture of ours; to the generator it is paint
+_WINDOW = np.array([0.25, -0.85, 0.45])  # direction of the window that glossy fronts mirror
+_GLOSSY = "gloss"  # a texture added here; the generator treats it as paint
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Style:
-    """How the fronts of a kitchen are made."""
+    """Style of the fronts of a kitchen."""
 
     colour: Triple
     texture: str = "paint"
     rail_m: float = 0.0  # of a frame-and-panel front; 0: a slab
-    frame_m: float = 0.0  # of a face frame that the front is inset in, on each side
-    channel_m: float = 0.0  # over the fronts of base units, to reach in
+    frame_m: float = 0.0  # width of the face frame around an inset front, on each side
+    channel_m: float = 0.0  # height of the channel over the fronts of base units, to reach in
     pull: Pull = "bar"
     pull_colour: Triple = (0.75, 0.75, 0.78)
 
@@ -53,15 +53,15 @@ STYLES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Habit:
-    """Where this kitchen's handles are."""
+    """Handle positions of a kitchen."""
 
-    side_m: float  # from the free edge to the handle's middle
-    high_m: float  # from the handle's nearer end to the edge that is nearer to a hand
-    low: float  # of a drawer's height, from its bottom to its handle
+    side_m: float  # from the free edge to the handle's centre
+    high_m: float  # from the handle's nearer end to the edge that is nearer to the hand
+    low: float  # fraction of a drawer's height from its bottom to its handle
 
     @staticmethod
     def of(seed: int) -> "Habit":
-        """Drawn for one kitchen."""
+        """Draw the habit of one kitchen."""
         rng = np.random.default_rng([seed, 13])
         return Habit(
             side_m=float(rng.uniform(0.03, 0.065)), high_m=float(rng.uniform(0.04, 0.2)), low=float(rng.uniform(0.5, 0.8))
@@ -70,7 +70,7 @@ class Habit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Front:
-    """A front's rectangle in the frame of its run: x along it, y into it, z up."""
+    """A front's rectangle in its run's frame: x along it, y into it, z up."""
 
     x: float
     z: float
@@ -78,7 +78,7 @@ class Front:
     height: float
 
     def inner(self, left: float, right: float, bottom: float, top: float) -> "Front":
-        """What is left of it inside margins."""
+        """The rectangle inset by margins."""
         return Front(x=self.x + left, z=self.z + bottom, width=self.width - left - right, height=self.height - bottom - top)
 
 
@@ -110,7 +110,7 @@ def _load(path: Path) -> ModuleType:
 
 
 def _units(plain: Callable[..., None], style: Style, habit: Habit) -> Callable[..., None]:
-    """The generator's `unit`, with furniture in this style; machines stay as they are."""
+    """The generator's `unit`, with furniture in this style; appliances are unchanged."""
 
     def unit(
         scene: Any,
@@ -136,7 +136,7 @@ def _units(plain: Callable[..., None], style: Style, habit: Habit) -> Callable[.
         first, number = len(scene.parts), len(scene.objects)
         paint = (style.colour, style.texture)
         plain(scene, name, category, run, moves.x, moves.width, moves.z, moves.height, depth, *paint, hinge=hinge)
-        del scene.parts[first + 1 :]  # all but its carcass
+        del scene.parts[first + 1 :]  # all parts except the carcass
 
         def fixed(low: Triple, high: Triple, shade: float) -> None:
             scene.box(low, high, run, color=np.array(style.colour) * shade, tex="paint")
@@ -152,7 +152,7 @@ def _units(plain: Callable[..., None], style: Style, habit: Habit) -> Callable[.
 
 
 def _surround(fixed: Box, cell: Front, moves: Front, depth: float) -> None:
-    """The face frame, or the dark channel, that is left of the cell beside what moves; and the carcass behind it."""
+    """Add the face frame or the dark channel that fills the cell around the moving part, and the carcass behind it."""
     right, top = cell.x + cell.width, cell.z + cell.height
     if moves.width < cell.width:
         _ring(fixed, cell, (cell.width - moves.width) / 2, 1.0)
@@ -162,7 +162,7 @@ def _surround(fixed: Box, cell: Front, moves: Front, depth: float) -> None:
 
 
 def _panel(moving: Box, moves: Front, style: Style) -> None:
-    """A slab, or a frame with its panel 9 mm behind its face."""
+    """Add a slab, or a frame with its panel 9 mm behind its face."""
     front = moves.inner(_GAP, _GAP, _GAP, _GAP)
     if not style.rail_m:
         moving((front.x, 0, front.z), (front.x + front.width, _THICK, front.z + front.height))
@@ -174,7 +174,7 @@ def _panel(moving: Box, moves: Front, style: Style) -> None:
 
 
 def _ring(box: Box, front: Front, rail: float, *paint: float) -> None:
-    """Two stiles and two rails."""
+    """Add two stiles and two rails."""
     right, top = front.x + front.width, front.z + front.height
     for left, low, end, high in (
         (front.x, front.z, front.x + rail, top),
@@ -186,7 +186,7 @@ def _ring(box: Box, front: Front, rail: float, *paint: float) -> None:
 
 
 def _pull(moving: Box, moves: Front, style: Style, habit: Habit, category: str, hinge: str | None) -> None:
-    """The handle: on a drawer across its middle, on a door at its free edge, towards the hand."""
+    """Add the handle: across a drawer's middle, or at a door's free edge, towards the hand."""
     if style.pull == "none":
         return
     drawer = category == "drawer"
@@ -200,13 +200,13 @@ def _pull(moving: Box, moves: Front, style: Style, habit: Habit, category: str, 
         z = moves.z + min(habit.high_m, 0.06) + tall / 2
     else:
         z = moves.z + moves.height - habit.high_m - tall / 2
-    near = 0.0 if style.pull in ("knob", "cup") else -0.02  # a bar stands off, a knob stands on
+    near = 0.0 if style.pull in ("knob", "cup") else -0.02  # a bar stands off the face, a knob sits on it
     low, high = (x - wide / 2, -0.032, z - tall / 2), (x + wide / 2, near, z + tall / 2)
     moving(low, high, style.pull_colour, "metal")
 
 
 def _pull_size(pull: Pull, moves: Front, drawer: bool) -> tuple[float, float]:
-    """Width and height as mounted: bars lie on drawers and stand on doors, wide ones lie on all."""
+    """Width and height as mounted: bars are horizontal on drawers and vertical on doors, wide pulls always horizontal."""
     if pull == "wide":
         return moves.width - 0.1, 0.01
     if pull == "knob" or (pull == "cup" and not drawer):

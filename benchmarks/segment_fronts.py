@@ -1,11 +1,11 @@
-"""Edges of fronts from one random click each, against the truth of synthetic kitchens.
+"""Edge accuracy of fronts from one random click each, against the truth of synthetic kitchens.
 
     python benchmarks/segment_fronts.py KITCHEN… [--clicks 5] [--workdir DIR] [--pictures DIR] [--update NAME]
 
-A KITCHEN is a folder with a truth.json and one recording (`*.r3d`), as `r2c2r sample` writes it. Clicks fall anywhere on the
-front face, 1 cm and more from its edges, in a random frame that sees that point; categories are given. A front is right when
-all its edges are within 10 mm of the truth's; one that is not found counts as wrong. --update writes this group of kitchens
-into benchmarks/segment.json.
+A KITCHEN is a folder with a truth.json and one recording (`*.r3d`), as `r2c2r sample` writes it. Clicks are random on the front
+face, at least 1 cm from its edges, in a random frame that sees that point; categories are given. A front is right if all its
+edges are within 10 mm of the truth's; one that is not found counts as wrong. --update writes this group of kitchens into
+benchmarks/segment.json.
 """
 
 import argparse
@@ -37,7 +37,7 @@ RIGHT_MM, INSET_M, AGREES_M, BORDER_PX = 10.0, 0.01, 0.03, 4
 
 @dataclass(frozen=True, slots=True)
 class TrueFront:
-    """A front's face: x to the right, z up from its middle, outwards along -y."""
+    """A front's face: x to the right, z up from its centre, outwards along -y."""
 
     name: str
     category: str
@@ -48,11 +48,11 @@ class TrueFront:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One click, and by how far the edges it gave miss the truth's."""
+    """One click, and the errors of the resulting edges."""
 
     front: TrueFront
     click: PromptPoint
-    off_mm: np.ndarray | None  # left, right, bottom, top, outwards positive; None where nothing was found
+    off_mm: np.ndarray | None  # left, right, bottom, top, outwards positive; None if no front was found
 
     @property
     def worst_mm(self) -> float:
@@ -60,7 +60,7 @@ class Trial:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Click on every front, compare, print a table."""
+    """Click every front, compare, print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kitchens", type=Path, nargs="+")
     parser.add_argument("--clicks", type=int, default=5)
@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def bench(kitchen: Path, folder: Path, clicks: int, pictures: Path | None) -> list[Trial]:
-    """Every front of a kitchen, clicked that often."""
+    """Every front of a kitchen, clicked `clicks` times."""
     session, capture = opened(kitchen, folder)
     rng = np.random.default_rng(zlib.crc32(kitchen.name.encode()))
     trials = [
@@ -106,7 +106,7 @@ def opened(kitchen: Path, folder: Path) -> tuple[Any, Capture]:
 
 
 def opened_recording(recording: Path, folder: Path) -> tuple[Any, Capture]:
-    """A session on a recording as `r2c2r run` reads it, and the capture; what was read is kept in `folder`."""
+    """A session on a recording as `r2c2r run` reads it, and the capture; the capture is cached in `folder`."""
     work = Workspace(folder)
     if work.load_latest("ingest", "scene") is None:
         read = read_capture(recording, work.store(recording.stem), IngestConfig())
@@ -126,7 +126,7 @@ def true_fronts(truth: Path, world_from_capture: Rigid3) -> Iterator[TrueFront]:
 
 
 def clicks_on(scene: Any, front: TrueFront, count: int, rng: np.random.Generator) -> Iterator[PromptPoint]:
-    """Random points of the face, each in a random frame that sees it; fewer where few are seen."""
+    """Random points of the face, each in a random frame that sees it; fewer if few are visible."""
     made = 0
     for _ in range(20 * count):
         if made == count:
@@ -147,7 +147,7 @@ def clicks_on(scene: Any, front: TrueFront, count: int, rng: np.random.Generator
 
 
 def try_click(session: Any, front: TrueFront, click: PromptPoint) -> Trial:
-    """What that click gives for that front."""
+    """Result of a click for that front."""
     try:
         panel = session.find(ObjectPrompt(name=front.name, category=front.category, points=(click,))).panel()
     except R2C2RError:
@@ -156,7 +156,7 @@ def try_click(session: Any, front: TrueFront, click: PromptPoint) -> Trial:
 
 
 def off_mm(front: TrueFront, panel: FrontPanel) -> np.ndarray:
-    """By how far a panel's edges miss the truth's: left, right, bottom, top, outwards positive."""
+    """Edge errors of a panel against the truth: left, right, bottom, top, outwards positive."""
     local = front.world_from_face.inverse @ panel.world_from_front
     sides = np.array([[sign * panel.width_m / 2, 0, 0] for sign in (-1, 1)])
     ends = np.array([[0, 0, sign * panel.height_m / 2] for sign in (-1, 1)])
@@ -179,7 +179,7 @@ def _figures(trials: list[Trial]) -> dict[str, Any]:
 
 
 def _draw(session: Any, trial: Trial, folder: Path) -> None:
-    """The frame clicked, the click and the mask it gave."""
+    """Draw the clicked frame, the click and the resulting mask."""
     folder.mkdir(parents=True, exist_ok=True)
     image = session.scene.rgb(trial.click.frame)[..., ::-1].copy()
     if trial.off_mm is not None:

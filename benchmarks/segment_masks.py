@@ -1,12 +1,12 @@
-"""Masks of the weight-free segmenter against exact truth, on synthetic kitchens.
+"""Mask accuracy of the weight-free segmenter against exact truth, on synthetic kitchens.
 
     python benchmarks/segment_masks.py --samples DIR [--seeds 0-9] [--every N] [--workdir DIR] [--random N]
                                        [--overlays DIR] [--keep] [--update]
 
-DIR holds seed<N>/ as `r2c2r sample` writes it. One click an object (the sample's own), then a second one as an annotator
-would set it: of a few frames shown, in the worst, at the middle of the largest wrong region. --random adds N one-click
-trials an object from clicks anywhere on it. Every Nth frame that shows 400 px of the object counts, at RGB resolution.
---overlays draws the worst frames; --update writes the key "masks" of benchmarks/segment.json.
+DIR holds seed<N>/ as `r2c2r sample` writes it. One click per object (the sample's own), then a second one as an annotator would
+place it: among a few frames shown, in the worst, at the centre of the largest wrong region. --random adds N one-click trials
+per object from clicks anywhere on it. Every Nth frame that shows 400 px of the object counts, at RGB resolution. --overlays
+draws the worst frames; --update writes the key "masks" of benchmarks/segment.json.
 """
 
 import argparse
@@ -36,12 +36,12 @@ from r2c2r_core.workspace import Workspace
 
 RESULTS = Path(__file__).resolve().parent / "segment.json"
 BARS = {"front": (0.92, None), "appliance": (0.90, None), "thing": (0.80, 0.90)}  # after one click, after two
-SHOWN = 6  # frames an annotator looks at before the second click
+SHOWN = 6  # frames that an annotator inspects before the second click
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """One object in one frame."""
+    """Result for one object in one frame."""
 
     seed: int
     name: str
@@ -58,7 +58,7 @@ class Seen:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure, print, and keep the figures."""
+    """Measure, print, and save the figures."""
     options = _parser().parse_args(arguments)
     seen: list[Seen] = []
     for seed in options.seeds:
@@ -125,7 +125,7 @@ class _Trial:
         return rows
 
     def mask(self, prompt: ObjectPrompt, frame: int) -> tuple[Mask, float]:
-        """What the session shows; nothing where it does not find the object."""
+        """Mask and confidence from the session; an empty mask if it does not find the object."""
         try:
             view = self.session.find(prompt).see(self.session.scene.frame(frame))
             return view.mask, view.trust
@@ -135,7 +135,7 @@ class _Trial:
             return np.zeros_like(self.truth[frame]), 0.0
 
     def with_second_click(self, prompt: ObjectPrompt) -> ObjectPrompt:
-        """The prompt, and a click in the worst of the frames shown, at the middle of the largest wrong region."""
+        """The prompt with a further click in the worst of the frames shown, at the centre of the largest wrong region."""
         numbers = sorted(self.truth)
         shown = sorted({prompt.points[0].frame, *numbers[:: max(1, len(numbers) // SHOWN)]} & set(numbers))
         masks = {frame: self.mask(prompt, frame)[0] for frame in shown}
@@ -143,7 +143,7 @@ class _Trial:
         return _added(prompt, correction(worst, self.truth[worst], masks[worst]))
 
     def clicked_anywhere(self, prompt: ObjectPrompt, rng: np.random.Generator) -> ObjectPrompt:
-        """One click, three pixels or more inside the object, in any frame that shows it."""
+        """One click, at least three pixels inside the object, in any frame that shows it."""
         frame = int(rng.choice(sorted(self.truth)))
         rows, columns = np.nonzero(cv2.erode(self.truth[frame].astype(np.uint8), np.ones((7, 7), np.uint8)))
         if len(rows) == 0:
@@ -172,7 +172,7 @@ class _Trial:
 
 
 def outlined(rgb: Image, truth: Mask, mask: Mask, clicks: Sequence[PromptPoint] = ()) -> np.ndarray:
-    """A tile (BGR) of what matters of a frame: truth outlined in green, ours in red."""
+    """A tile (BGR) of a frame's relevant part: truth outlined in green, ours in red."""
     image = np.ascontiguousarray(rgb[:, :, ::-1])
     for shape, colour in ((truth, (0, 255, 0)), (mask, (0, 0, 255))):
         outline, _ = cv2.findContours(shape.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
@@ -189,7 +189,7 @@ def outlined(rgb: Image, truth: Mask, mask: Mask, clicks: Sequence[PromptPoint] 
 
 
 def ingested(source: Path, work: Workspace, *, keep: bool) -> Capture:
-    """The capture of a recording, kept in the workspace; `keep` takes what lies there whatever version made it."""
+    """The capture of a recording, cached in the workspace; `keep` reuses a cached one of any version."""
     if not (keep and work.load_latest("ingest", "scene")):
         reconstruct(Request(source=source, prompts=Prompts(objects=())), work, until="ingest")
     capture = work.load_latest("ingest", "scene")
@@ -198,7 +198,7 @@ def ingested(source: Path, work: Workspace, *, keep: bool) -> Capture:
 
 
 def correction(frame: int, truth: Mask, found: Mask) -> PromptPoint:
-    """A click at the middle of the largest wrong region: on the object where it is missing, off it where there is too much."""
+    """A click at the centre of the largest wrong region: positive where the mask is missing, negative where it is too large."""
     best: tuple[float, PromptPoint] | None = None
     for label, wrong in ((1, truth & ~found), (0, found & ~truth)):
         depth = cv2.distanceTransform(np.pad(wrong, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
@@ -215,7 +215,7 @@ def correction(frame: int, truth: Mask, found: Mask) -> PromptPoint:
 
 
 def summarise(seen: list[Seen]) -> dict[str, object]:
-    """Mean IoU over objects of the mean over frames, by group and by category; and what confidence is worth."""
+    """Mean IoU over objects of the mean over frames, by group and by category; and the quality of the confidence."""
     one = [row for row in seen if row.clicks == "one"]
     return {
         "groups": {kind: {clicks: _mean_of(seen, kind, clicks) for clicks in ("one", "two", "random")} for kind in BARS},
@@ -225,7 +225,7 @@ def summarise(seen: list[Seen]) -> dict[str, object]:
 
 
 def report(seen: list[Seen]) -> str:
-    """The same as text, with the worst objects."""
+    """The same figures as text, with the worst objects."""
     lines = []
     for kind, (bar, second_bar) in BARS.items():
         figures = {clicks: _mean_of(seen, kind, clicks) for clicks in ("one", "two", "random")}
@@ -252,14 +252,14 @@ def _mean_of(seen: list[Seen], kind: str, clicks: str) -> float | None:
 
 
 def _mean(rows: list[Seen]) -> float:
-    """Over objects, of the mean over frames: a big thing counts no more than a small one."""
+    """Mean over objects of the mean over frames, so that large objects weigh no more than small ones."""
     objects = sorted({(row.seed, row.name) for row in rows})
     means = [np.mean([row.iou for row in rows if (row.seed, row.name) == key]) for key in objects]
     return float(np.mean(means)) if means else float("nan")
 
 
 def _confidence(rows: list[Seen]) -> dict[str, float]:
-    """Rank correlation with the IoU, and the mean absolute difference from it."""
+    """Rank correlation of the confidence with the IoU, and its mean absolute error."""
     from scipy.stats import spearmanr
 
     iou, confidence = np.array([row.iou for row in rows]), np.array([row.confidence for row in rows])
@@ -282,14 +282,14 @@ def _added(prompt: ObjectPrompt, point: PromptPoint) -> ObjectPrompt:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description="Mask accuracy on synthetic kitchens with exact truth.")
-    parser.add_argument("--samples", type=Path, required=True, help="holds seed<N>/ as r2c2r sample writes it")
+    parser.add_argument("--samples", type=Path, required=True, help="folder with seed<N>/ as r2c2r sample writes it")
     parser.add_argument("--seeds", type=_seeds, default=_seeds("0-9"))
-    parser.add_argument("--every", type=int, default=1, help="of the frames that show the object")
+    parser.add_argument("--every", type=int, default=1, help="use every Nth frame that shows the object")
     parser.add_argument("--workdir", type=Path, required=True, help="keeps captures between runs")
-    parser.add_argument("--random", type=int, default=0, help="one-click trials from anywhere on the object")
-    parser.add_argument("--only", help="categories or names, with commas")
+    parser.add_argument("--random", type=int, default=0, help="number of one-click trials from anywhere on the object")
+    parser.add_argument("--only", help="comma-separated categories or names")
     parser.add_argument("--overlays", type=Path)
-    parser.add_argument("--rows", type=Path, help="a JSON file of every object in every frame")
+    parser.add_argument("--rows", type=Path, help="JSON file for the result of every object in every frame")
     parser.add_argument("--keep", action="store_true", help="use the capture in the workdir whatever version made it")
     parser.add_argument("--update", action="store_true")
     return parser

@@ -1,4 +1,4 @@
-"""Masks against outlines drawn by eye on a real kitchen: one click an object.
+"""Mask accuracy against outlines drawn by eye on a real kitchen, from one click per object.
 
     python benchmarks/segment_outlines.py RECORDING [--outlines FILE] [--workdir DIR] [--overlays DIR] [--keep] [--update]
 
@@ -29,7 +29,7 @@ OUTLINES = Path(__file__).resolve().parents[1] / "tests/data/redkitchen-outlines
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure, print, and keep the figures."""
+    """Measure, print, and save the figures."""
     options = _parser().parse_args(arguments)
     objects = json.loads(options.outlines.read_text(encoding="utf-8"))["objects"]
     work = Workspace(options.workdir)
@@ -60,7 +60,7 @@ def measure(entry: dict[str, Any], session: SegmentSession, overlays: Path | Non
         overlaps[number] = mask_iou(truth, mask)
         if overlays is not None:
             overlays.mkdir(parents=True, exist_ok=True)
-            rgb = session.scene.rgb(int(number))  # type: ignore[attr-defined]  # the geometric one has it
+            rgb = session.scene.rgb(int(number))  # type: ignore[attr-defined]  # the geometric session has it
             cv2.imwrite(str(overlays / f"{entry['name']}-{number}-{overlaps[number]:.2f}.png"), outlined(rgb, truth, mask))
     mean = float(np.mean(list(overlaps.values())))
     print(f"  {entry['name']:12} {mean:.3f}   " + "  ".join(f"{n}: {iou:.2f}" for n, iou in overlaps.items()), flush=True)
@@ -68,7 +68,7 @@ def measure(entry: dict[str, Any], session: SegmentSession, overlays: Path | Non
 
 
 def drawn(polygons: dict[str, Any], shape: tuple[int, int]) -> Mask:
-    """The mask of the polygons `on` the object less those cut `off` it."""
+    """The mask of the `on` polygons minus the `off` polygons."""
     canvas = np.zeros(shape, np.uint8)
     for value, key in ((1, "on"), (0, "off")):
         for polygon in polygons.get(key, []):

@@ -1,11 +1,11 @@
-"""Proposals with no click, against the truth of synthetic kitchens.
+"""Accuracy of proposals without any click, against the truth of synthetic kitchens.
 
     python benchmarks/segment_proposals.py SAMPLES [--seeds 0-9] [--workdir DIR] [--pictures DIR] [--update]
 
-SAMPLES holds seed0, seed1 … as `r2c2r sample` writes them. A front is an object of the truth with a joint; it is found when a
-proposal's masks have a mean IoU of 0.8 with its own, over every 9th frame that shows 400 px of it. A proposal is false when
-in its own frame no true object overlaps it by IoU 0.5. Things that the truth does not list (what decorates a worktop) count
-as false things. --update writes benchmarks/segment.json.
+SAMPLES holds seed0, seed1 … as `r2c2r sample` writes them. A front is an object of the truth with a joint; it is found if a
+proposal's masks have a mean IoU of 0.8 with its own, over every 9th frame that shows 400 px of it. A proposal is false if in
+its own frame no true object overlaps it by IoU 0.5. Free-standing objects that the truth does not list (decoration of a
+worktop) count as false. --update writes benchmarks/segment.json.
 """
 
 import argparse
@@ -35,10 +35,10 @@ FOUND_IOU, TRUE_IOU, EVERY = 0.8, 0.5, 9
 
 @dataclass(slots=True)
 class Match:
-    """One proposal against the truth."""
+    """One proposal matched against the truth."""
 
     proposal: Proposal
-    name: str | None  # of the true object it overlaps most, at IoU 0.5 or more in its own frame
+    name: str | None  # of the true object with the largest overlap, at least IoU 0.5 in the proposal's own frame
     iou: float  # mean over frames
 
 
@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def store(seeds: dict[str, dict[str, Any]]) -> None:
-    """Put these seeds' figures among those measured before."""
+    """Merge these seeds' figures into the stored ones."""
     stored = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
     merged = dict(sorted((stored.get("proposals", {}).get("seeds", {}) | seeds).items()))
     stored["proposals"] = {"seeds": merged, "all": _all(merged)}

@@ -1,11 +1,11 @@
-"""How fast a prepared capture answers clicks, next to GrabCut per frame and Open3D's cluster and plane tools.
+"""Latency of clicks on a prepared capture, compared with GrabCut per frame and Open3D's clustering and plane detection.
 
     python benchmarks/segment_speed.py SAMPLE [--workdir DIR] [--clicks N] [--objects a,b] [--no-stream] [--update]
 
 SAMPLE is a folder of `r2c2r sample`. For every object: the first click, the same object clicked at N random pixels of its
 true masks, a second click, and all frames. --update writes the key "speed" of benchmarks/segment.json.
 
-Times are wall clock; `cpu` beside them is the CPU time of the process, which a busy machine does not stretch.
+Times are wall clock; `cpu` beside them is the CPU time of the process, which is less affected by other load.
 """
 
 import argparse
@@ -37,8 +37,8 @@ from r2c2r_core.segment.stage import open_session
 from r2c2r_core.workspace import Workspace
 
 RESULTS = Path(__file__).resolve().parent / "segment.json"
-_PREVIEW_WIDTH = 960  # of the app's masks
-_SEEN_PX = 400  # a smaller true mask is no target for a click, and no measure of overlap
+_PREVIEW_WIDTH = 960  # width of the app's masks
+_SEEN_PX = 400  # smaller true masks are neither clicked nor compared
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,7 +70,7 @@ def measure(sample: Path, capture: Capture, cache: Path, options: argparse.Names
     with _timed() as second:
         session = open_session(capture, cache)
     numbers["reopen"] = second.seconds
-    fresh = open_session(capture, cache)  # knows no object yet
+    fresh = open_session(capture, cache)  # has no object yet
     prompts = [p for p in read_prompts(sample / "prompts.json").objects if not options.objects or p.name in options.objects]
     truth = {prompt.name: _truth(sample, prompt.name) for prompt in prompts}
     rng = np.random.default_rng(options.seed)
@@ -99,7 +99,7 @@ def measure(sample: Path, capture: Capture, cache: Path, options: argparse.Names
 
 @dataclass(slots=True)
 class _Span:
-    """What a piece of work took."""
+    """Duration of a piece of work."""
 
     wall_s: float = 0.0
     cpu_s: float = 0.0
@@ -123,18 +123,18 @@ def _timed() -> Iterator[_Span]:
 
 
 def _click(session: SegmentSession, prompt: ObjectPrompt) -> _Span:
-    """From a click to the first mask in the frame that was clicked last, as in the app."""
+    """Time from a click to the first mask in the frame that was clicked last, as in the app."""
     with _timed() as span:
         try:
             first = session.glimpse(prompt) or next(session.stream(prompt))
             mask_bits(first[1], _PREVIEW_WIDTH)
-        except Exception as error:  # a click may miss; the time still counts
+        except Exception as error:  # a click may miss; its time still counts
             print(f"{prompt.name}: {error}", file=sys.stderr)
     return span
 
 
 def _stream(session: SegmentSession, fresh: SegmentSession, prompt: ObjectPrompt, truth: dict[int, Path]) -> dict[str, Any]:
-    """All frames of one object: masks a second, how good they are, and how well the first look agreed with them."""
+    """All frames of one object: masks per second, their quality, and the agreement of the first mask with them."""
     with _timed() as span:
         masks = {index: packed for index, packed, _ in session.stream(prompt)}
     overlaps = []
@@ -155,7 +155,7 @@ def _stream(session: SegmentSession, fresh: SegmentSession, prompt: ObjectPrompt
 
 
 def _by_kind(objects: dict[str, Any]) -> dict[str, Any]:
-    """The slowest, and the mean, of each kind."""
+    """The slowest and the mean of each kind."""
     kinds = sorted({entry["kind"] for entry in objects.values()})
     table = {}
     for kind in kinds:
@@ -182,7 +182,7 @@ def _distribution(spans: list[_Span]) -> dict[str, Any]:
 
 
 def _random_clicks(prompt: ObjectPrompt, truth: dict[int, Path], count: int, rng: np.random.Generator) -> list[ObjectPrompt]:
-    """The object clicked anew, at random pixels of its true masks, each in a frame of its own."""
+    """Alternative prompts of the object: random pixels of its true masks, each in a different frame."""
     found = []
     for index in rng.permutation(sorted(truth)).tolist():
         if len(found) == count:
@@ -194,7 +194,7 @@ def _random_clicks(prompt: ObjectPrompt, truth: dict[int, Path], count: int, rng
 
 
 def _with_second(prompt: ObjectPrompt, truth: dict[int, Path], rng: np.random.Generator) -> ObjectPrompt:
-    """One more click on the object, in another frame."""
+    """The prompt with one more click on the object, in another frame."""
     for index in rng.permutation(sorted(truth)).tolist():
         point = _pixel_of(truth[index], index, rng)
         if point is not None and index != prompt.points[0].frame:
@@ -203,7 +203,7 @@ def _with_second(prompt: ObjectPrompt, truth: dict[int, Path], rng: np.random.Ge
 
 
 def _pixel_of(path: Path, frame_index: int, rng: np.random.Generator) -> PromptPoint | None:
-    """A pixel at least three inside the mask; None where the mask is too small to aim at."""
+    """A pixel at least three inside the mask; None if the mask is too small for a click."""
     mask = _mask(path)
     rows, columns = np.nonzero(cv2.erode(mask.astype(np.uint8), np.ones((7, 7), np.uint8)))
     if mask.sum() < _SEEN_PX or len(rows) == 0:
@@ -213,7 +213,7 @@ def _pixel_of(path: Path, frame_index: int, rng: np.random.Generator) -> PromptP
 
 
 def _peers(capture: Capture, prompts: Sequence[ObjectPrompt], truth: dict[str, dict[int, Path]]) -> dict[str, Any]:
-    """The same work by common tools: GrabCut from the true box of an object, Open3D's parts and planes of the surface."""
+    """The same work by common tools: GrabCut from an object's true box, Open3D's clusters and planes of the surface."""
     times, overlaps = [], []
     for prompt in prompts[::3]:
         frame = prompt.points[0].frame
@@ -244,7 +244,7 @@ def _peers(capture: Capture, prompts: Sequence[ObjectPrompt], truth: dict[str, d
 
 
 def _capture(sample: Path, folder: Path) -> Capture:
-    """The recording, read once a workdir."""
+    """The recording, read once per workdir."""
     work = Workspace(folder / "work")
     found: Capture | None = work.load_latest("ingest", "scene")
     if found is not None:
@@ -285,12 +285,12 @@ def _folder(given: Path | None) -> Iterator[Path]:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description="Click latency and propagation speed on a sample with exact truth.")
     parser.add_argument("sample", type=Path, help="folder of `r2c2r sample`")
-    parser.add_argument("--workdir", type=Path, help="kept afterwards; the capture read into it is used again")
-    parser.add_argument("--clicks", type=int, default=5, help="random clicks an object, besides the one of prompts.json")
-    parser.add_argument("--objects", type=lambda text: set(text.split(",")), default=set(), help="names; all by default")
-    parser.add_argument("--seed", type=int, default=0, help="of the random clicks")
+    parser.add_argument("--workdir", type=Path, help="kept afterwards; the capture read into it is reused")
+    parser.add_argument("--clicks", type=int, default=5, help="random clicks per object, besides the one of prompts.json")
+    parser.add_argument("--objects", type=lambda text: set(text.split(",")), default=set(), help="comma-separated names; default: all")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the random clicks")
     parser.add_argument("--warm", action="store_true", help="keep the prepared cache and skip measuring the preparation")
-    parser.add_argument("--no-stream", dest="stream", action="store_false", help="clicks only")
+    parser.add_argument("--no-stream", dest="stream", action="store_false", help="measure clicks only")
     parser.add_argument("--no-peers", dest="peers", action="store_false", help="skip GrabCut and Open3D")
     parser.add_argument("--update", action="store_true", help=f"write {RESULTS.name}")
     return parser

@@ -1,19 +1,18 @@
-"""Which tuned numbers matter: each is moved by a quarter either way, alone, and what comes out is compared with the truth.
+"""Sensitivity of the results to each tuned parameter, moved alone by a quarter in either direction and compared with the truth.
 
     python benchmarks/sensitivity.py RECORDING... [--rooms segment,generate] [--minutes 30] [--objects 6] [--frames 30]
 
 A RECORDING is a folder with scan.r3d or capture.r3d, prompts.json, truth.json, and true masks (`r2c2r sample` writes one). A
-first computation of one object of each category writes down which numbers each step and each furniture run reads. A number is
-then moved on one object of each kind (front, appliance, thing) whose steps read it, and only these steps are computed again;
-what follows is, where a mask's IoU with the usual one is below 0.995 or a size differs by half a millimetre. What nothing
-reads is listed as such. Runs go on where an earlier one stopped (benchmarks/sensitivity.json) while the code and the recordings
-are the same; several processes may share the work, by rooms or by recordings. --plot only draws docs/sensitivity.svg and
-docs/sensitivity.md again.
+first run with one object of each category records which parameters each step and each furniture run reads. A parameter is then
+moved on one object of each kind (front, appliance, thing) whose steps read it, and only these steps are recomputed; later steps
+follow only if the mean IoU of the masks with the usual ones is below 0.995 or a size differs by half a millimetre. Parameters
+that nothing reads are listed as such. Runs resume where an earlier one stopped (benchmarks/sensitivity.json) while the code and
+the recordings are the same; several processes may share the work, by packages (--rooms) or by recordings. --plot only redraws
+docs/sensitivity.svg and docs/sensitivity.md.
 
-loss: mean error of the sizes in percent + 100 (1 - mean mask IoU) + 100 (1 - share of right joints), of the objects moved; an
-object that is lost counts as an error of 100 % without mask and joint. Where fronts were filmed while they open, + 100 (1 -
-share of frames with the right state); where proposals are made (a room of --rooms is segment or segment.proposals), + 100 (1 -
-their F1).
+loss: mean error of the sizes in percent + 100 (1 - mean mask IoU) + 100 (1 - fraction of right joints), over the objects used;
+a lost object counts as an error of 100 % without mask and joint. Where fronts were filmed while they open, + 100 (1 - fraction
+of frames with the right state); where proposals are made (--rooms contains segment or segment.proposals), + 100 (1 - their F1).
 """
 
 import argparse
@@ -43,11 +42,11 @@ FIGURES, PLOT, TABLE = (
 )
 ROOMS = ("segment", "generate", "align", "kitchen", "geometry", "synthesize", "warp")
 
-Field = tuple[str, str, int | None]  # module, number, entry of a pair
+Field = tuple[str, str, int | None]  # module, parameter, entry of a pair
 
 
 def candidates_of(case: Case, rooms: Sequence[str]) -> list[Field]:
-    """Every number that some step reads, entry by entry where it is a pair, room by room (or module by module)."""
+    """Every parameter that some step reads, entry by entry if it is a pair, by package (or module)."""
     read = {entry for entries in case.read.values() for entry in entries}
     found: list[Field] = []
     for room in rooms:
@@ -59,7 +58,7 @@ def candidates_of(case: Case, rooms: Sequence[str]) -> list[Field]:
 
 
 def moved_value(entry: Field, factor: float) -> Any:
-    """The number a quarter away, within its bounds; a cosine by its angle, a count by at least one."""
+    """The parameter moved by a quarter, within its bounds; a cosine by its angle, a count by at least one."""
     path, name, k = entry
     described = next(f for f in fields(params_of(path)) if f.name == name)
     unit, rules = described.metadata["json_schema_extra"]["unit"], described.metadata
@@ -82,7 +81,7 @@ def moved_value(entry: Field, factor: float) -> Any:
 
 
 def trial(case: Case, entry: Field) -> dict[str, Any]:
-    """The figures with one number moved either way."""
+    """The figures with one parameter moved in either direction."""
     path, name, _ = entry
     of = params_of(path)
     found: dict[str, Any] = {}
@@ -94,7 +93,7 @@ def trial(case: Case, entry: Field) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Move what is left to move, as long as there is time; write the figures after each, the plot and the table at the end."""
+    """Move the remaining parameters while there is time; save the figures after each, and the plot and the table at the end."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="*", type=Path)
     parser.add_argument("--rooms", default=",".join(ROOMS))
@@ -135,7 +134,7 @@ def _measure_case(case: Case, options: argparse.Namespace, end: float) -> None:
     still = same_everywhere(json.loads(options.json.read_text()))
     print(f"{case.name}: {said['usual']}; {said['read']} numbers read", flush=True)
     entries = {_name(entry): entry for entry in candidates_of(case, options.rooms.split(","))}
-    for name, entry in sorted(entries.items(), key=lambda item: item[0] not in still):  # what did nothing elsewhere first
+    for name, entry in sorted(entries.items(), key=lambda item: item[0] not in still):  # those without effect so far first
         if time.monotonic() > end:
             break
         if name in done:
@@ -164,13 +163,13 @@ def _name(entry: Field) -> str:
 
 
 def _add(path: Path, key: list[Any], said: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers moved so far, with these; another process may be at work on the same file."""
+    """The results so far, merged with these; a file lock serialises parallel processes."""
     with Path(__file__).open() as alone:
         fcntl.flock(alone, fcntl.LOCK_EX)
         runs = json.loads(path.read_text())["runs"] if path.exists() else []
         run = next((run for run in runs if run["key"] == key), {"key": key, "numbers": {}})
         run |= {**said, "numbers": run["numbers"] | numbers}
-        rest = [other for other in runs if other["key"][2:] != key[2:]]  # of older code: anew
+        rest = [other for other in runs if other["key"][2:] != key[2:]]  # runs of older code are dropped
         path.write_text(_text([*rest, run]), encoding="utf-8")
     return dict(run["numbers"])
 

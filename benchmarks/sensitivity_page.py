@@ -1,4 +1,4 @@
-"""What moving each tuned number did, as a plot and as a page of the documentation."""
+"""Plot and documentation page of the sensitivity to each tuned parameter."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -35,7 +35,7 @@ WHY = (
 
 
 def effects(document: Mapping[str, Any]) -> list[tuple[str, float, float]]:
-    """Of numbers that stand, change of the loss down and up, the mean over the runs that moved it; the largest first."""
+    """For parameters that still exist, the loss change down and up, averaged over the runs that moved them; largest first."""
     found: dict[str, list[list[float]]] = {}
     for run in document["runs"]:
         for name, moves in run["numbers"].items():
@@ -49,14 +49,14 @@ def effects(document: Mapping[str, Any]) -> list[tuple[str, float, float]]:
 
 
 def same_everywhere(document: Mapping[str, Any]) -> set[str]:
-    """Numbers whose moves changed not a byte of any step of any run that moved them."""
+    """Parameters whose moves changed no byte of any step in any run."""
     moved = [(name, moves) for run in document["runs"] for name, moves in run["numbers"].items()]
     other = {name for name, moves in moved if "error" in moves or any(move["changed"] for move in moves.values())}
     return set(filter(_stands, {name for name, _ in moved} - other))
 
 
 def tornado(document: Mapping[str, Any]) -> str:
-    """The largest effects as bars to either side of the usual loss, SVG."""
+    """SVG tornado plot: the largest effects as bars to either side of the usual loss."""
     rows = [row for row in effects(document)[:SHOWN] if max(map(abs, row[1:])) > 0]
     most = max((abs(v) for row in rows for v in row[1:]), default=1.0) or 1.0
     height, middle, reach = 18, 560, 220
@@ -83,7 +83,7 @@ def tornado(document: Mapping[str, Any]) -> str:
 
 
 def table(document: Mapping[str, Any]) -> str:
-    """The page of the documentation."""
+    """The documentation page."""
     rows, same = effects(document), same_everywhere(document)
     still = sorted(name for name, down, up in rows if max(abs(down), abs(up)) == 0.0 and name not in same)
     untouched = sorted(filter(_stands, set.intersection(*(set(run["untouched"]) for run in document["runs"]))))
@@ -138,7 +138,7 @@ def table(document: Mapping[str, Any]) -> str:
 
 
 def _stands(name: str) -> bool:
-    """Whether the code still has the number; a run tells what it moved, also of what is gone since."""
+    """Whether the code still has the parameter; a run also lists parameters that have been removed since."""
     path, _, number = name.partition("[")[0].rpartition(".")
     return path in modules_with_numbers(path.partition(".")[0]) and number in {f.name for f in fields(params_of(path))}
 

@@ -1,4 +1,4 @@
-"""The steps that make a recording's objects, one at a time, with the tuned numbers that each reads: for `sensitivity.py`."""
+"""Pipeline steps of a recording's objects, run one at a time, with the tuned parameters each reads; for `sensitivity.py`."""
 
 import pickle
 import sys
@@ -38,15 +38,15 @@ from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from r2c2r_core.tuning import path_of, tuning
 from r2c2r_core.warp.stage import WarpConfig, fit_meshes
 
-SAME_M, SAME_IOU = 0.0005, 0.995  # what follows is not computed again for less
+SAME_M, SAME_IOU = 0.0005, 0.995  # smaller changes do not trigger later steps
 PROPOSED_IOU = 0.5
 SHARES = ("mask_iou", "joints", "states", "proposals")
 
-Reads = set[tuple[str, str]]  # module, number
+Reads = set[tuple[str, str]]  # module, parameter
 
 
 class Watch(Mapping[type, Any]):
-    """Stands for the usual numbers, and writes down which are read."""
+    """Mapping with the default parameters that records which are read."""
 
     def __init__(self) -> None:
         self.read: set[tuple[str, str]] = set()
@@ -80,14 +80,14 @@ def _watched(of: type[Any], read: set[tuple[str, str]]) -> Any:
 
 @dataclass(slots=True, eq=False)
 class Session(GeometricSession):
-    """A session that stores nothing, and notes which numbers made each furniture run, so that a move keeps the others."""
+    """A session without storage that records the parameters of each furniture run, so that a move keeps unaffected runs."""
 
     reads: dict[str, Reads] = field(default_factory=dict)
     asked: set[str] = field(default_factory=set)
     noting: bool = True
 
     def run_of(self, region: PlaneRegion, margin_m: float = 0.0) -> Run | None:
-        """The furniture run on a plane, and this far around it."""
+        """The furniture run on a plane, with a margin around it."""
         key = f"run{self.planes.index(region)}-{round(margin_m * 1000)}"
         self.asked.add(key)
         if key not in self._runs:
@@ -98,38 +98,38 @@ class Session(GeometricSession):
         return self._runs[key]
 
     def reading(self) -> Reads:
-        """What the runs were made by that were asked for since the last time."""
+        """Parameters read by the runs that were requested since the last call."""
         keys, self.asked = self.asked, set()
         return set().union(*(self.reads[key] for key in keys))
 
     def without(self, moved: Reads) -> "Session":
-        """A session for moved numbers: the runs that they did not make are there."""
+        """A session for moved parameters that reuses the runs which did not read them."""
         runs = {key: run for key, run in self._runs.items() if not self.reads[key] & moved}
         return Session(self.scene, self.planes, self.config, self.folder, runs, noting=False)
 
 
 @dataclass(slots=True, eq=False)
 class Case:
-    """A recording with its truth, and what the usual numbers make of it, step by step."""
+    """A recording with its truth, and the results of every step with the default parameters."""
 
     name: str
     capture: Capture
     prompts: dict[str, ObjectPrompt]
     truth: dict[str, ObjectRecord]
     true_masks: TrueMask
-    folder: Path  # where nothing is left
-    proposes: bool = False  # whether proposals are made, too
+    folder: Path  # segmentation cache; results are not stored there
+    proposes: bool = False  # whether proposals are made too
     made: dict[str, Any] = field(default_factory=dict)
     read: dict[str, Reads] = field(default_factory=dict)
 
     @property
     def steps(self) -> list[str]:
-        """In their order."""
+        """All steps in order."""
         each = [f"{stage}/{name}" for stage in ("segment", "generate", "align") for name in self.prompts]
         return ["open", *(["propose"] if self.proposes else []), *each, "synthesize", "warp"]
 
     def needs(self, step: str) -> list[str]:
-        """The steps that it is made from."""
+        """The steps whose results a step uses."""
         stage, _, name = step.partition("/")
         if stage in ("segment", "propose"):
             return ["open"]
@@ -142,7 +142,7 @@ class Case:
         return ["synthesize", *self.needs("synthesize")] if stage == "warp" else []
 
     def compute(self, step: str, made: Mapping[str, Any]) -> Any:
-        """The step's result; an R2C2RError or an error of the numbers is one, too."""
+        """The step's result; for an R2C2RError or a numerical error its text."""
         stage, _, name = step.partition("/")
         try:
             return self._compute(stage, name, made)
@@ -173,7 +173,7 @@ class Case:
         return fit_meshes(made["synthesize"], tracks, placements, assets, WarpConfig())
 
     def settle(self) -> None:
-        """Compute every step with the usual numbers, and what it reads."""
+        """Compute every step with the default parameters, and record what it reads."""
         for step in self.steps:
             watch, started = Watch(), time.monotonic()
             with tuning(watch):
@@ -183,7 +183,7 @@ class Case:
             print(f"{step}: {time.monotonic() - started:.1f} s", file=sys.stderr, flush=True)
 
     def chosen(self, moved: Reads) -> frozenset[str]:
-        """One object of each kind whose own steps read these numbers; every one where the whole scene does."""
+        """One object of each kind whose own steps read these parameters; all objects if only steps of the whole scene do."""
         kinds: dict[str, str] = {}
         for name, prompt in self.prompts.items():
             if any(self.read[f"{stage}/{name}"] & moved for stage in ("segment", "generate", "align")):
@@ -191,7 +191,7 @@ class Case:
         return frozenset(kinds.values()) or frozenset(self.prompts)
 
     def moved(self, of: type[Any], numbers: Any) -> dict[str, Any]:
-        """The figures with other numbers of one module, what they were of the same objects, and the steps that gave another."""
+        """The figures with other parameters of one module, the usual loss of the same objects, and the steps that changed."""
         changed = {(path_of(of), f.name) for f in fields(of) if getattr(numbers, f.name) != f.default}
         objects = self.chosen(changed)
         made, new, other = dict(self.made), set(), list[str]()
@@ -236,7 +236,7 @@ class Case:
         return {key: round(value, 4) for key, value in figures.items()}
 
     def _proposed(self, proposals: Any) -> float:
-        """F1: of what is true and seen, and of what is proposed, what overlaps the other in the proposal's frame."""
+        """F1 of the proposals, matched to visible true objects by mask IoU in the proposal's frame."""
         if isinstance(proposals, str):
             return 0.0
         found = [self._meant(proposal) for proposal in proposals]
@@ -244,7 +244,7 @@ class Case:
         return 2 * len(set(found) - {None}) / max(len(found) + len(seen), 1)
 
     def _meant(self, proposal: Proposal) -> str | None:
-        """The true object whose mask a proposal's own is in its frame, at an IoU of a half."""
+        """The true object whose mask overlaps a proposal's own in its frame by an IoU of at least one half."""
         outline, frame = unpack_mask(proposal.outline), proposal.click.frame
         shown = {name: mask for name in self.truth if (mask := self.true_masks(name, frame)) is not None}
         return next((name for name, mask in shown.items() if mask_iou(mask, outline) >= PROPOSED_IOU), None)
@@ -273,13 +273,13 @@ def _value(metrics: Sequence[Any], name: str) -> float:
 
 
 def _right_joints(truth: ObjectRecord, found: ObjectRecord) -> float:
-    """The share of joints of the right type, and of doors hinged on the right side."""
+    """Fraction of joints of the right type, and of doors hinged on the right side."""
     values = [m.value for m in joint_errors(truth, found) if m.name in ("joint_type", "hinge_side") and m.value is not None]
     return float(np.mean(values)) if values else 1.0
 
 
 def _differs(usual: Any, found: Any) -> bool:
-    """Whether what follows could change: another mask, size or pose."""
+    """Whether later steps could change: a mask, size or pose differs beyond the tolerance."""
     if isinstance(usual, str) or isinstance(found, str):
         return bool(usual != found)
     if isinstance(usual, MaskTrack):
@@ -309,7 +309,7 @@ def _front_sizes(track: MaskTrack) -> list[float]:
 
 
 def open_case(folder: Path, work: Path, frames: int, objects: int, proposes: bool) -> Case:
-    """A recording, read and settled."""
+    """A recording, read and computed with the default parameters."""
     capture = read_capture(recording_in(folder), work / folder.name / "frames", IngestConfig(most_frames=frames))
     categories: dict[str, ObjectPrompt] = {}
     for prompt in clicked(folder, [frame.index for frame in capture.frames]).objects:
@@ -323,6 +323,6 @@ def open_case(folder: Path, work: Path, frames: int, objects: int, proposes: boo
 
 
 def _rank(prompt: ObjectPrompt, prompts: Iterable[ObjectPrompt]) -> int:
-    """Its place among the prompts of its kind: the first of every kind come first."""
+    """Index among the prompts of the same kind, so that the first of every kind are sorted first."""
     kind = category_of(prompt.category).kind
     return [other.name for other in prompts if category_of(other.category).kind == kind].index(prompt.name)

@@ -1,4 +1,4 @@
-"""The solids that a sample was drawn from, and how much of one a mesh fills."""
+"""Solids that a sample was drawn from, and the overlap of a mesh with one."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +18,13 @@ _SIDES = 48
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TrueSolid:
-    """What is true of one object, in the world."""
+    """True shape of one object, in world coordinates."""
 
     record: ObjectRecord
     solid: Any  # manifold3d.Manifold
 
     def extents_error(self, vertices_world: np.ndarray) -> float:
-        """Mean relative error of the sizes along the object's own axes; a handle in front of the front face is left out."""
+        """Mean relative error of the sizes along the object's own axes; a handle in front of the front face is excluded."""
         local = self.record.world_from_object.inverse.apply(vertices_world)
         low, high = local.min(axis=0), local.max(axis=0)
         if not self.record.turns_freely:
@@ -32,9 +32,10 @@ class TrueSolid:
         return float((np.abs(high - low - self.record.dimensions_m) / self.record.dimensions_m).mean())
 
     def recentred(self, vertices_world: np.ndarray) -> np.ndarray:
-        """The vertices with a round thing's middle where it truly is: a candidate leaves its place behind, alignment finds it.
+        """The vertices, with a round object's centre shifted to its true place, which only the alignment estimates.
 
-        A round thing a centimetre off would be judged by that alone; furniture keeps its place, for its handle is part of it.
+        Otherwise a round object a centimetre off would be judged by that alone; furniture keeps its place, as its handle is
+        part of it.
         """
         if not self.record.turns_freely:
             return vertices_world
@@ -43,7 +44,7 @@ class TrueSolid:
 
 
 def true_solids(seed: int, truth: Path, world_from_capture: Rigid3) -> dict[str, TrueSolid]:
-    """Every object's solid: bottles by their profile, the rest as boxes (a cupboard is the space it takes)."""
+    """Every object's solid: bottles by their profile, others as boxes (a cupboard is the space it fills)."""
     bottles = {bottle.name: bottle for bottle in plan_kitchen(seed).bottles}
     return {
         record.name: TrueSolid(record=record, solid=_solid_of(record, bottles.get(record.name)))
@@ -68,7 +69,7 @@ def _solid_of(record: ObjectRecord, bottle: Bottle | None) -> Any:
 
 
 def _profile(bottle: Bottle) -> np.ndarray:
-    """(radius, height above the foot) from the foot to the top, as synthetic/build.py draws it."""
+    """(radius, height above the base) from the base to the top, as synthetic/build.py draws it."""
     r, h, n = bottle.radius_m, bottle.height_m, bottle.neck_radius_m
     shoulder, neck, cap = bottle.shoulder * h, (bottle.shoulder + 0.18) * h, h - 0.022
     turn = np.linspace(0, np.pi, 9)[::-1]
@@ -91,7 +92,7 @@ def _manifold(vertices: np.ndarray, faces: np.ndarray) -> Any:
 
 
 def _front_face(y: np.ndarray) -> float:
-    """The foremost place along the depth at which many vertices lie: a handle and its posts stand before it."""
+    """The foremost depth coordinate shared by many vertices: a handle and its posts stand in front of it."""
     middle = (y.min() + y.max()) / 2
     front = y[y < middle]
     return float(np.quantile(front, 0.5)) if len(front) else float(y.min())

@@ -1,12 +1,12 @@
-"""Seconds by stage: how they grow with objects and with frames, from nothing to the bundle, and after one changed click.
+"""Seconds by stage: scaling with objects and with frames, of a whole run, and after one changed click.
 
     python benchmarks/speed.py [--quick] [--objects 5,14,40] [--frames 60,180,600] [--workers N] [--workdir DIR]
 
-Each case is a fresh workspace; each stage is a process of its own, as in the app, so its seconds include starting it and its
-workers. More objects than the sample has are its objects again under other names: they are segmented, generated and placed, and
-not arranged, for they would stand in each other. "whole" is `r2c2r run`, "again" the same with one click moved by two pixels.
-Writes benchmarks/speed.json and a table; --quick measures "whole" and "again" alone and keeps what the file says of stages.
-Times move with the machine's load: use an idle one. The load average beside each says whether it was.
+Each case is a fresh workspace; each stage is a separate process, as in the app, so its seconds include the start of the process
+and its workers. Objects beyond those of the sample are duplicates under other names: they are segmented, generated and placed,
+but not arranged, as they would overlap. "whole" is `r2c2r run`, "again" the same with one click moved by two pixels.
+Writes benchmarks/speed.json and a table; --quick measures "whole" and "again" alone and keeps the file's figures of stages.
+Times depend on the machine's load: use an idle one. The load average is recorded beside each.
 """
 
 import argparse
@@ -29,12 +29,12 @@ USUAL_OBJECTS, USUAL_FRAMES = 14, 180
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the cases, and write what they took."""
+    """Run the cases and write their times."""
     parser = argparse.ArgumentParser(description="Seconds by stage, objects and frames.")
     parser.add_argument("--objects", type=_numbers, default=(5, 14, 40))
     parser.add_argument("--frames", type=_numbers, default=(60, 180, 600))
-    parser.add_argument("--workers", type=int, default=0, help="0: as cores and memory allow")
-    parser.add_argument("--workdir", type=Path, help="kept afterwards; samples in it are used again")
+    parser.add_argument("--workers", type=int, default=0, help="0: as many as cores and memory allow")
+    parser.add_argument("--workdir", type=Path, help="kept afterwards; samples in it are reused")
     parser.add_argument("--quick", action="store_true", help="only the whole run and the one after a changed click")
     options = parser.parse_args(arguments)
     cases = [(count, USUAL_FRAMES) for count in options.objects]
@@ -53,13 +53,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for count, frames in () if options.quick else sorted(cases, key=lambda case: case[0] * case[1]):
             document["stages"].append(stage_seconds(count, frames, options.workers, workdir))
             print(json.dumps(document["stages"][-1]), file=sys.stderr, flush=True)
-            _write(document)  # the larger ones take long: what was measured stays
+            _write(document)  # the larger cases take long: save what was measured
     print(markdown(document))
     return 0
 
 
 def stage_seconds(count: int, frames: int, workers: int, workdir: Path) -> dict[str, Any]:
-    """Wall and CPU seconds of every stage, for so many objects of a kitchen filmed in so many frames."""
+    """Wall and CPU seconds of every stage, for `count` objects of a kitchen filmed in `frames` frames."""
     sample = made_sample(0, frames, SIZE, workdir)
     prompts = json.loads((sample / "prompts.json").read_text())
     filmed = len(prompts["objects"])

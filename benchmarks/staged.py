@@ -1,4 +1,4 @@
-"""A mesh stood in a sample kitchen and filmed: photos, a phone's depth, imperfect masks, something in the way."""
+"""A mesh placed in a sample kitchen and filmed: photos, a phone's depth, imperfect masks, a partial occlusion."""
 
 from functools import cache
 from pathlib import Path
@@ -26,15 +26,15 @@ VIEWS = 10
 ARC = np.radians(120.0)
 RGB = Intrinsics(fx=720.0, fy=720.0, cx=482.0, cy=357.0, width=960, height=720)
 DEPTH = RGB.resized(256, 192)
-FINE = 3  # rays a depth pixel, each way
-OUTLINE_PX = 5.0  # the most a mask's outline is off
+FINE = 3  # rays per depth pixel, along each axis
+OUTLINE_PX = 5.0  # maximum error of a mask's outline
 
 
 class Stage(NamedTuple):
-    """A place in a kitchen, seen from around."""
+    """A place in a kitchen, and the camera poses around it."""
 
-    key: tuple[int, bool, float]  # kitchen, on its worktop or on its floor, metres away
-    spot: np.ndarray  # what the thing stands on
+    key: tuple[int, bool, float]  # kitchen, on its worktop or on its floor, distance in metres
+    spot: np.ndarray  # where the object stands
     poses: tuple[Rigid3, ...]  # world_from_camera
 
 
@@ -55,7 +55,7 @@ class Images:
 
 
 def place_for(article: Article, number: int) -> Stage:
-    """On the worktop what is small, on the floor before it what is not; from as far as a person would stand."""
+    """Small articles on the worktop, others on the floor before it; seen from a distance at which a person would stand."""
     small = article.size_m < 0.45
     reach = 0.75 if small else 1.5 if article.size_m < 0.9 else 2.1 if article.size_m < 1.4 else 2.8
     return _stage(number % 2, small, reach)
@@ -85,7 +85,7 @@ def _kitchen(seed: int) -> tuple[Kitchen, LitScene]:
 
 @cache
 def _backdrop(key: tuple[int, bool, float], view: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Colour and depth of the kitchen without the thing, and its depth along the depth camera's rays."""
+    """Colour and depth of the kitchen without the object, and its depth along the depth camera's rays."""
     pose, scene = _stage(*key).poses[view], _kitchen(key[0])[1]
     shown = render_view(scene, RGB, pose.inverse)
     large = DEPTH.resized(DEPTH.width * FINE, DEPTH.height * FINE)
@@ -94,8 +94,8 @@ def _backdrop(key: tuple[int, bool, float], view: int) -> tuple[np.ndarray, np.n
 
 
 def film(stage: Stage, mesh: TexturedMesh, rng: np.random.Generator) -> tuple[Similarity3, Capture, MaskTrack]:
-    """Where the mesh was stood (world_from_article), and what a phone recorded of it."""
-    turn = float(np.radians(rng.uniform(-75.0, 75.0)))  # its front is seen by some of the frames
+    """The mesh's true pose (world_from_article), and a phone's recording and masks of it."""
+    turn = float(np.radians(rng.uniform(-75.0, 75.0)))  # its front is visible in some of the frames
     world = Similarity3(1.0, rotation_about_z(turn), stage.spot + np.append(rng.uniform(-0.05, 0.05, 2), 0.0))
     thing = subdivided(world.apply(mesh.vertices), mesh)
     plank = _plank(stage, mesh, rng)
@@ -114,14 +114,14 @@ def film(stage: Stage, mesh: TexturedMesh, rng: np.random.Generator) -> tuple[Si
 
 
 def wrong_outline(mask: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The mask with its outline moved by up to `OUTLINE_PX`, smoothly, in and out."""
+    """The mask with its outline displaced smoothly by up to `OUTLINE_PX`, in and out."""
     near = window(mask, 20)
     part = mask[near]
     inside = cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5)
     outside = cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 5)
     coarse = rng.standard_normal((part.shape[0] // 4 + 12, part.shape[1] // 4 + 12)).astype(np.float32)
     field = cv2.GaussianBlur(coarse, (0, 0), 5)[6:-5, 6:-5]
-    field = cv2.resize(5.0 * np.sqrt(np.pi) * 2.0 * field, part.shape[::-1], interpolation=cv2.INTER_LINEAR)  # of unit spread
+    field = cv2.resize(5.0 * np.sqrt(np.pi) * 2.0 * field, part.shape[::-1], interpolation=cv2.INTER_LINEAR)  # of unit sigma
     moved = np.zeros_like(mask)
     moved[near] = (inside - outside) > np.clip(0.5 * OUTLINE_PX * field, -OUTLINE_PX, OUTLINE_PX)
     return moved if moved.sum() > 50 else mask
@@ -130,7 +130,7 @@ def wrong_outline(mask: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def outlines(
     path: Path, capture: Capture, mesh: TexturedMesh, found: Similarity3, truth: Similarity3, track: MaskTrack
 ) -> None:
-    """Three photos with the mask (white), the truth (green) and what was found (red)."""
+    """Three photos with the mask (white), the truth (green) and the estimate (red)."""
     path.parent.mkdir(parents=True, exist_ok=True)
     shown = []
     for index in sorted(track.masks)[:: max(len(track.masks) // 3, 1)][:3]:
@@ -153,7 +153,7 @@ def _draw(picture: np.ndarray, mask: np.ndarray, colour: tuple[int, int, int]) -
 
 
 def subdivided(vertices_world: np.ndarray, mesh: TexturedMesh) -> TexturedMesh:
-    """The mesh in the world, without triangles the rasteriser would tear at the near plane."""
+    """The mesh in world coordinates, without triangles the rasteriser would tear at the near plane."""
     if len(mesh.faces) > 2000:
         return TexturedMesh(vertices=vertices_world, faces=mesh.faces, uv=mesh.uv, texture=mesh.texture)
     vertices, faces, uv = subdivide_long_edges(vertices_world, mesh.faces, mesh.uv, 0.25)
@@ -161,7 +161,7 @@ def subdivided(vertices_world: np.ndarray, mesh: TexturedMesh) -> TexturedMesh:
 
 
 def _plank(stage: Stage, mesh: TexturedMesh, rng: np.random.Generator) -> TexturedMesh:
-    """An upright plank in front of the thing, a fifth to a third as wide."""
+    """An upright plank in front of the object, a fifth to a third as wide."""
     size = np.ptp(mesh.vertices, axis=0)
     wide, high, away = rng.uniform(0.2, 0.33) * size[:2].max(), rng.uniform(0.5, 1.1) * size[2], 0.75 * np.hypot(*size[:2])
     side = rng.uniform(-0.5, 0.5) * size[0]
@@ -174,7 +174,7 @@ def _plank(stage: Stage, mesh: TexturedMesh, rng: np.random.Generator) -> Textur
 def _photo(
     thing: TexturedMesh, plank: TexturedMesh, colour: np.ndarray, depth: np.ndarray, pose: Rigid3, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The photo, and the thing's visible pixels."""
+    """The photo, and the object's visible pixels."""
     colour, nearest, mask = colour.copy(), np.where(depth > 0, depth, np.float32(np.inf)), np.zeros(depth.shape, dtype=bool)
     for mesh, is_thing in ((thing, True), (plank, False)):
         image, own = render_textured(mesh.vertices, mesh.faces, mesh.uv, mesh.texture, RGB, pose.inverse)
@@ -182,7 +182,7 @@ def _photo(
         colour[nearer] = image[nearer]
         nearest = np.where(nearer, own, nearest)
         mask = np.where(nearer, is_thing, mask)
-    near = window(nearest < np.where(depth > 0, depth, np.inf), 40)  # nobody looks at the grain of the rest
+    near = window(nearest < np.where(depth > 0, depth, np.inf), 40)  # sensor grain is only needed near the object
     soft = cv2.GaussianBlur(colour[near], (0, 0), 0.7).astype(np.float32) * np.float32(rng.uniform(0.92, 1.08))
     soft += 2.5 * rng.standard_normal(soft.shape, dtype=np.float32)
     colour[near] = soft.clip(0, 255).astype(np.uint8)
@@ -190,7 +190,7 @@ def _photo(
 
 
 def window(mask: np.ndarray, margin_px: int) -> tuple[slice, slice]:
-    """Rows and columns that hold a mask and a margin; everything where it is empty."""
+    """Rows and columns of a mask's bounding box with a margin; the whole image if the mask is empty."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return slice(None), slice(None)
@@ -199,7 +199,7 @@ def window(mask: np.ndarray, margin_px: int) -> tuple[slice, slice]:
 
 
 def _depth(thing: TexturedMesh, plank: TexturedMesh, fine: np.ndarray, pose: Rigid3, rng: np.random.Generator) -> Depth:
-    """A phone's LiDAR: as synthetic/sensor.py for edges and noise, with holes where a surface is grazed."""
+    """A phone's LiDAR depth: edges and noise as in synthetic/sensor.py, with holes at grazing angles."""
     large = DEPTH.resized(DEPTH.width * FINE, DEPTH.height * FINE)
     nearest = np.where(fine > 0, fine, np.inf)
     for mesh in (thing, plank):
@@ -237,7 +237,7 @@ def _capture(frames: tuple[Frame, ...], images: Images) -> Capture:
 
 
 def _track(masks: dict[int, object]) -> MaskTrack:
-    """Masks alone: no measured front or box helps the alignment."""
+    """Mask track without a measured front or box, so that neither helps the alignment."""
     return MaskTrack(
         name="thing",
         category="object",
@@ -253,7 +253,7 @@ def _track(masks: dict[int, object]) -> MaskTrack:
 
 
 def _look(eye: np.ndarray, target: np.ndarray) -> Rigid3:
-    """world_from_camera looking at a point, upright."""
+    """world_from_camera of an upright camera that looks at a point."""
     forward = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)

@@ -1,4 +1,4 @@
-"""Things to place: scans and models of true size, meshes a finished run chose, and boxes with and without pictures."""
+"""Articles to place: scans and models of true size, meshes that a finished run chose, and boxes with and without pictures."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +19,7 @@ Kind = Literal["scan", "generated", "picture box", "blank box"]
 
 
 class Article(NamedTuple):
-    """A mesh of true size, upright, its front towards -Y, its lowest point at z = 0 and its middle on the z axis."""
+    """A mesh of true size, upright, its front towards -Y, its lowest point at z = 0 and its centre on the z axis."""
 
     name: str
     kind: Kind
@@ -27,12 +27,12 @@ class Article(NamedTuple):
 
     @property
     def size_m(self) -> float:
-        """The diagonal of its box."""
+        """The diagonal of its bounding box."""
         return float(np.linalg.norm(np.ptp(self.mesh.vertices, axis=0)))
 
 
 def assortment(meshes: Path | None, workdirs: list[Path]) -> list[Article]:
-    """Kinds in turn, so that any number of trials has its share of each."""
+    """Articles with the kinds interleaved, so that any number of trials has its share of each."""
     kinds = [
         list(_scans(meshes)) if meshes is not None else [],
         [article for work in workdirs for article in _chosen(work)],
@@ -45,7 +45,7 @@ def assortment(meshes: Path | None, workdirs: list[Path]) -> list[Article]:
 
 
 def as_candidate(article: Article, world_from_article: Similarity3, rng: np.random.Generator) -> tuple[MeshAsset, Similarity3]:
-    """The mesh in a frame of its own, turned and scaled at random, and the true world_from_mesh."""
+    """The mesh in its own frame, rotated and scaled at random, and the true world_from_mesh."""
     rotation = Rotation.random(rng=rng).as_matrix()
     scale = float(np.exp(rng.uniform(-1.5, 1.5))) / article.size_m
     mesh_from_article = Similarity3(scale, rotation, rng.uniform(-0.3, 0.3, 3))
@@ -65,23 +65,23 @@ def as_candidate(article: Article, world_from_article: Similarity3, rng: np.rand
 
 
 def _scans(folder: Path) -> Iterator[Article]:
-    """The mug, the refrigerator (whose pictures do not load: plain grey) and the generated figure, each at its height."""
+    """The mug, the refrigerator (its textures do not load: plain grey) and the generated figure, each at its true height."""
     import trimesh
 
     mug = read_upload(folder / "ycb-025_mug" / "textured.obj", "mug", "c0").mesh
-    base = min(hull_directions(mug.vertices, 8), key=lambda side: float(side[2]))  # as scanned it leans by 15 degrees
+    base = min(hull_directions(mug.vertices, 8), key=lambda side: float(side[2]))  # the scan is tilted by 15 degrees
     mug = _moved(mug, Similarity3(1.0, rotation_between(base, np.array([0.0, 0.0, -1.0])), np.zeros(3)))
     yield _standing("mug", "scan", mug, 0.081, by_height=True)
     loaded = trimesh.load(folder / "aws-Refrigerator_01" / "meshes" / "aws_Refrigerator_01_visual.DAE", force="scene")
     yield _standing("refrigerator model", "scan", _patterned(loaded.to_geometry()), 1.75, by_height=True)
     figure = read_upload(folder / "sam3d-bench" / "0.glb", "figure", "c0").mesh
     turn = least_volume_axes(figure.vertices, hull_directions(figure.vertices, 40))[0].T
-    turn = np.roll(turn, 2 - int(np.argmax(np.ptp(figure.vertices @ turn.T, axis=0))), axis=0)  # its longest side upright
+    turn = np.roll(turn, 2 - int(np.argmax(np.ptp(figure.vertices @ turn.T, axis=0))), axis=0)  # longest side upright
     yield _standing("figure", "scan", _moved(figure, Similarity3(1.0, turn, np.zeros(3))), 0.9, by_height=True)
 
 
 def _chosen(workdir: Path) -> Iterator[Article]:
-    """What a finished run chose for each object, at the size it was placed in."""
+    """The mesh that a finished run chose for each object, at the size it was placed in."""
     work = Workspace(workdir)
     scene = work.load_latest("synthesize", "scene")
     for thing in () if scene is None else scene.objects:
@@ -106,7 +106,7 @@ def _standing(name: str, kind: Kind, mesh: TexturedMesh, scale: float, *, by_hei
 
 
 def _patterned(mesh: "object") -> TexturedMesh:
-    """A mesh whose pictures do not load, in plain grey: shape alone has to place it."""
+    """A mesh whose textures do not load, in plain grey, so that only its shape can be matched."""
     vertices = np.asarray(mesh.vertices, dtype=np.float64)  # type: ignore[attr-defined]
     faces = np.asarray(mesh.faces, dtype=np.int64)  # type: ignore[attr-defined]
     return TexturedMesh(
@@ -115,7 +115,7 @@ def _patterned(mesh: "object") -> TexturedMesh:
 
 
 def _box(seed: int, *, pictures: bool) -> Article:
-    """A box of 12 to 80 cm a side: a different picture on every side, or blank with a bar handle on its front."""
+    """A box of 12 to 80 cm per side: a different picture on every side, or blank with a bar handle on its front."""
     rng = np.random.default_rng([seed, 23])
     size = rng.uniform([0.15, 0.12, 0.12], [0.8, 0.6, 0.9]) * float(rng.uniform(0.5, 1.0))
     parts = [_cuboid(size, np.array([0.0, 0.0, size[2] / 2]))]
@@ -135,7 +135,7 @@ def _box(seed: int, *, pictures: bool) -> Article:
 
 
 def _cuboid(size: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Four corners a side, and uv in a 3 x 2 atlas."""
+    """Four corners per side, and uv in a 3 x 2 atlas."""
     vertices, faces, uv = [], [], []
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     for k in range(6):
@@ -151,7 +151,7 @@ def _cuboid(size: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _pictures(rng: np.random.Generator) -> np.ndarray:
-    """Blotches of several sizes, on six tiles."""
+    """An atlas of six tiles with random blotches of several sizes."""
     image = np.zeros((512, 768, 3), np.float32)
     for cells, gain in ((10, 80), (30, 55), (90, 35)):
         small = rng.normal(size=(cells, cells * 3 // 2, 3)).astype(np.float32)

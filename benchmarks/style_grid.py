@@ -1,12 +1,12 @@
-"""Fronts of every style of `r2c2r sample`, one random click each: how many come out right, and whether the rest are doubted.
+"""Accuracy of fronts of every style of `r2c2r sample` from one random click each, and whether wrong ones are flagged.
 
     python benchmarks/style_grid.py [--styles slab shaker …] [--seeds 20 21] [--clicks 3] [--workdir DIR] [--update]
 
 Seeds 20 and 21 are for development, 120 and 121 are reported. Each style is drawn alone, in its seed's own colours (or in
---palette's), into DIR/<style>-<seed>; what is there is kept, figures too while the recogniser's source stays as it is. Clicks,
-edges and what is right are those of segment_fronts.py. A wrong front is flagged where nothing was found, it carries a warning,
-its mask in the clicked frame is doubtful (as the annotate page draws it), or it contradicts the other fronts' clicks of the
-same round. --update writes the rows into benchmarks/style_grid.json; DIR/grid.md always has them all.
+--palette's), into DIR/<style>-<seed>; existing recordings are kept, and figures too while the recogniser's source is unchanged.
+Clicks, edges and the criterion for a right front are those of segment_fronts.py. A wrong front is flagged if nothing was found,
+if it carries a warning, if its mask in the clicked frame is doubtful (as the annotate page draws it), or if it contradicts the
+other fronts' clicks of the same round. --update writes the rows into benchmarks/style_grid.json; DIR/grid.md always has all.
 """
 
 import argparse
@@ -34,12 +34,12 @@ Row = dict[str, Any]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw what is missing, click, print the table."""
+    """Draw the missing recordings, click, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--styles", nargs="+", choices=STYLES, default=list(STYLES))
     parser.add_argument("--palette", choices=PALETTES)
     parser.add_argument("--seeds", nargs="+", type=int, default=[20, 21])
-    parser.add_argument("--clicks", type=int, default=3, help="on each front")
+    parser.add_argument("--clicks", type=int, default=3, help="clicks per front")
     parser.add_argument("--workdir", type=Path, default=Path("style-grid"))
     parser.add_argument("--update", action="store_true")
     options = parser.parse_args(arguments)
@@ -58,14 +58,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def draw(folder: Path, seed: int, choice: Choice) -> Path:
-    """The recording's folder; drawn unless it is there."""
+    """The recording's folder; drawn if missing."""
     if not (folder / "prompts.json").exists():  # written last
         write_sample(folder, seed=seed, frames=FRAMES, size=SIZE, choice=choice)
     return folder
 
 
 def measured(kitchen: Path, clicks: int) -> Row:
-    """The kitchen's figures, kept beside it while what finds fronts is the same."""
+    """The kitchen's figures, cached beside it while the code that finds fronts is unchanged."""
     key, kept = f"{source_key('segment', 'kitchen', 'geometry', 'model')}-{clicks}", kitchen / "grid.json"
     if kept.exists():
         row: Row = json.loads(kept.read_text(encoding="utf-8"))
@@ -77,7 +77,7 @@ def measured(kitchen: Path, clicks: int) -> Row:
 
 
 def measure(kitchen: Path, clicks: int) -> Row:
-    """Every front clicked that often."""
+    """Figures of every front clicked `clicks` times."""
     session, capture = opened(kitchen, kitchen / "work")
     rng = np.random.default_rng(zlib.crc32(kitchen.name.encode()))
     by_front = [
@@ -105,7 +105,7 @@ def measure(kitchen: Path, clicks: int) -> Row:
 
 
 def flags(session: Any, trials: Sequence[Trial]) -> list[str]:
-    """Why each of one round's fronts is doubted; empty where nothing says so."""
+    """The reason why each of one round's fronts is flagged; empty if it is not."""
     prompts = [ObjectPrompt(name=t.front.name, category=t.front.category, points=(t.click,)) for t in trials]
     tracks = {}
     for prompt in prompts:

@@ -1,17 +1,18 @@
-"""Kitchens an hour against seats: where rows, files and pages become the limit, and what a thousand kitchens a day would need.
+"""Throughput in kitchens per hour by number of seats: bottlenecks of rows, files and pages, and needs of 1000 kitchens a day.
 
     python benchmarks/throughput.py [--seats 1,2,4] [--quicker 8] [--kitchens 2] [--json benchmarks/throughput.json]
     python benchmarks/throughput.py --one [--seats 1,2,4] [--model-s 10] [--json benchmarks/throughput.json]
 
-A laboratory's set-up on this machine: a server that computes nothing, a Postgres that writes to its disk before it answers, an
-S3 server, and seats whose stages sleep as long as the real ones took (benchmarks/speed.json, 14 objects in 180 frames) and
-store as many files and bytes. So stages cost nothing, and what rows, files, pages and seats cost can be counted: in seconds of
-processor time for each kitchen, from its upload by a program over clicks and a run to its bundle. --quicker repeats the most
-seats with all lengths divided by that number: as much work for everything but the stages as so many more seats make.
+A laboratory's deployment on this machine: a server without compute, a Postgres with durable commits, an S3 server, and seats
+whose stages sleep as long as the real ones took (benchmarks/speed.json, 14 objects in 180 frames) and store as many files and
+bytes. As stages cost no CPU, the cost of rows, files, pages and seats can be measured: CPU seconds per kitchen, from its upload
+by a program over clicks and a run to its bundle. --quicker repeats the largest number of seats with all durations divided by
+that number, which loads everything but the stages like that many times more seats.
 
---one measures the run of a single kitchen instead, whose objects all seats share. What a stage takes before its objects, and
-each object, is a line through kitchens of more and fewer of them (SPEED); to begin takes each process as long as a run in which
-nothing changed. --model-s has each object's meshes take so many seconds, as of a model, one after another in a process.
+--one measures the run of a single kitchen instead, whose objects are distributed over all seats. A stage's time before its
+objects, and per object, is a regression line over kitchens of different object counts (SPEED); a process takes as long to start
+as a run without any change. --model-s makes each object's meshes take so many seconds, as with a generative model, one after
+another in a process.
 """
 
 import argparse
@@ -48,9 +49,9 @@ from tests.app.object_server import BUCKET, ObjectServer, object_server
 from tests.app.postgres import PostgresServer, server
 
 SPEED = ROOT / "benchmarks" / "speed.json"
-OBJECTS, FRAMES, POINTS = 14, 180, 3  # of a kitchen; clicks on each object
+OBJECTS, FRAMES, POINTS = 14, 180, 3  # of a kitchen; POINTS: clicks on each object
 RECORDING_BYTES = 51_000_000
-STORED = {  # files and bytes that each stage of that kitchen leaves (`r2c2r sample` and `run`, seed 0)
+STORED = {  # files and bytes that each stage of that kitchen stores (`r2c2r sample` and `run`, seed 0)
     "ingest": (363, 41_400_000),
     "segment": (48, 22_200_000),
     "generate": (14, 13_400_000),
@@ -72,15 +73,15 @@ commands = replace(FAKE_COMMANDS, worker=slow("worker"), ingest=slow("ingest"))
 run_jobs(Settings(data_dir=data, min_free_bytes=0, job_memory_bytes=0), commands, threading.Event())
 """
 SERVES_ONLY = {"heavy_jobs": 0}
-DURABLE = ("max_connections=200",)  # and all else as it is when it is installed: what is committed is on the disk
-WRITER = 0x72326332  # app.db.postgres
+DURABLE = ("max_connections=200",)  # all else is the default: committed data is on the disk
+WRITER = 0x72326332  # advisory lock of app.db.postgres
 LOOKED_EVERY_S = 0.02
-UPLOADS = 3  # at a time: of one person the server looks at few
-A_DAY, WORKING_DAY_S = 1000, 8 * 3600  # kitchens, which come while people work
+UPLOADS = 3  # at a time: the server examines only a few uploads of one person at once
+A_DAY, WORKING_DAY_S = 1000, 8 * 3600  # kitchens per day, which arrive during working hours
 
 
 class Farm(Server):
-    """A server that computes nothing, and so many seats."""
+    """A server without compute, and a number of seats."""
 
     def __init__(self, folder: Path, seats: int, lengths: Path, rows: PostgresServer, store: ObjectServer) -> None:
         super().__init__(folder / "web", real=False)
@@ -92,12 +93,12 @@ class Farm(Server):
         self.settings = SERVES_ONLY
 
     def environment(self) -> dict[str, str]:
-        """Where rows and files are."""
+        """Environment with the addresses of rows and files."""
         places = {"R2C2R_DATABASE": self.address_of_rows, "R2C2R_STORE": f"s3://{self._place}", "RUST_LOG": "error"}
         return {**super().environment(), **places}
 
     def start(self) -> None:
-        """The server, then the seats."""
+        """Start the server, then the seats."""
         super().start()
         for number in range(self._count):
             data = self._folder / f"seat-{number}"
@@ -113,10 +114,10 @@ class Farm(Server):
             self._seats.append(subprocess.Popen(command, env=self.environment(), cwd=ROOT, stdout=subprocess.PIPE))
         for seat in self._seats:
             assert seat.stdout is not None
-            seat.stdout.readline()  # that it takes jobs
+            seat.stdout.readline()  # wait until it takes jobs
 
     def stop(self) -> None:
-        """The end of all."""
+        """Stop the seats and the server."""
         kill_all([psutil.Process(seat.pid) for seat in self._seats])
         for seat in self._seats:
             seat.wait()
@@ -125,14 +126,14 @@ class Farm(Server):
         super().stop()
 
     def client(self) -> Client:
-        """A program that may do everything."""
+        """An API client with an admin token."""
         with httpx.Client(headers={"X-Requested-With": "throughput"}) as browser:
             browser.get(f"{self.address}/", params={"token": "key"})
             made = browser.post(f"{self.address}/api/tokens", json={"name": "throughput", "scope": "admin"})
         return Client(self.address, made.json()["secret"])
 
     def spent(self, apart: int) -> dict[str, float]:
-        """Seconds of processor time so far, of each part; without the database's process `apart`, which only looks."""
+        """CPU seconds so far, by part; the database's backend with pid `apart`, which only monitors, is excluded."""
         assert self.process is not None
         rows = psutil.Process(self._rows.pid)
         return {
@@ -143,7 +144,7 @@ class Farm(Server):
         }
 
     def stored(self) -> tuple[int, int]:
-        """Objects in the store, and their bytes."""
+        """Number of objects in the store, and their bytes."""
         import obstore
 
         entries = [each for chunk in obstore.list(obstore.store.from_url(f"s3://{self._place}")) for each in chunk]
@@ -151,7 +152,7 @@ class Farm(Server):
 
 
 class Looks:
-    """What the database is at, looked at all the time: how often its one writer holds the lock, and how many wait for it."""
+    """Monitor of the database: samples how often its one writer holds the lock, and how many wait for it."""
 
     def __init__(self, address: str) -> None:
         self._rows = psycopg.connect(address.replace("+psycopg", ""), autocommit=True)
@@ -163,7 +164,7 @@ class Looks:
         self._thread.start()
 
     def end(self, kitchens: int) -> dict[str, float]:
-        """Shares of the time, and what was written for each kitchen."""
+        """Stop sampling; fractions of the time, and WAL and transactions per kitchen."""
         self._ended.set()
         self._thread.join()
         wal, commits = (now - before for now, before in zip(self._counted(), self._before, strict=True))
@@ -194,7 +195,7 @@ class Looks:
 
 
 def one_round(farm: Farm, folder: Path, kitchens: int, stages_s: float, seats: int) -> dict[str, Any]:
-    """So many kitchens, brought at once; what they took, and what each cost."""
+    """Process `kitchens` kitchens, submitted at once; total time, and cost per kitchen."""
     recordings, client = _recordings(folder, kitchens), farm.client()
     looks = Looks(farm.address_of_rows)
     before, began = farm.spent(looks.pid), time.monotonic()
@@ -218,7 +219,7 @@ def one_round(farm: Farm, folder: Path, kitchens: int, stages_s: float, seats: i
 
 
 def one_run(farm: Farm, folder: Path) -> float:
-    """Seconds from the beginning of a run of one kitchen to its bundle."""
+    """Seconds from the start of one kitchen's run to its bundle."""
     (recording,), client = _recordings(folder, 1), farm.client()
     project = client.upload(recording)
     client.wait(project)
@@ -230,7 +231,7 @@ def one_run(farm: Farm, folder: Path) -> float:
 
 
 def _one_kitchen(client: Client, recording: Path, uploading: threading.Semaphore) -> None:
-    """From the upload to the bundle, by a program."""
+    """One kitchen from the upload to the bundle, through the API client."""
     with uploading:
         project = client.upload(recording)
     client.wait(project)
@@ -241,14 +242,14 @@ def _one_kitchen(client: Client, recording: Path, uploading: threading.Semaphore
 
 
 def prompts() -> dict[str, Any]:
-    """Clicks on the objects of a kitchen, on frames that the stand-in for the import has."""
+    """Clicks on the objects of a kitchen, on frames that the import's stand-in provides."""
     points = [{"frame": frame, "x": 80.5, "y": 60.5, "label": 1} for frame in (0, 3, 7)[:POINTS]]
     objects = [{"name": f"drawer_{number}", "category": "drawer", "points": points} for number in range(OBJECTS)]
     return {"version": 1, "objects": objects}
 
 
 def _recordings(folder: Path, count: int) -> list[Path]:
-    """The same under many names: an upload that broke off is known by its name."""
+    """One recording under many names, as interrupted uploads are identified by name."""
     first = folder / "0.r3d"
     with zipfile.ZipFile(first, "w") as archive:
         archive.writestr("metadata", b"{}")
@@ -259,7 +260,7 @@ def _recordings(folder: Path, count: int) -> list[Path]:
 
 
 def _seconds(process: psutil.Process, *, ended: bool = False) -> float:
-    """Of processor time; with that of its children that ended."""
+    """CPU seconds of a process; with `ended`, including its terminated children."""
     with contextlib.suppress(psutil.NoSuchProcess):
         times = process.cpu_times()
         return times.user + times.system + (times.children_user + times.children_system if ended else 0.0)
@@ -267,7 +268,7 @@ def _seconds(process: psutil.Process, *, ended: bool = False) -> float:
 
 
 def lengths_of_stages(quicker: float, model_s: float = 0.0) -> dict[str, dict[str, float]]:
-    """What each stage takes and stores."""
+    """Duration and stored files of each stage."""
     took = _measured(OBJECTS, FRAMES)
     lengths = {
         stage: {"seconds": seconds / quicker, "files": STORED[stage][0], "bytes": STORED[stage][1]}
@@ -282,7 +283,7 @@ def lengths_of_stages(quicker: float, model_s: float = 0.0) -> dict[str, dict[st
 
 
 def _before_objects(stage: str) -> float:
-    """Seconds that it takes before its first object: a line through kitchens of FRAMES frames."""
+    """Seconds of a stage before its first object: intercept of a linear regression over kitchens of FRAMES frames."""
     rows = [row for row in json.loads(SPEED.read_text())["stages"] if row["frames"] == FRAMES]
     return statistics.linear_regression([row["objects"] for row in rows], [row[stage]["wall_s"] for row in rows]).intercept
 
@@ -294,7 +295,7 @@ def _measured(objects: int, frames: int) -> dict[str, float]:
 
 
 def limits(rounds: list[dict[str, Any]]) -> dict[str, float]:
-    """Kitchens an hour at which one core, or the one writer, is busy all the time: by the busiest round, which idles least."""
+    """Kitchens per hour at which one core, or the one writer, is saturated; from the busiest round, which idles least."""
     busiest = max(rounds, key=lambda each: each["kitchens_an_hour"])
     of = {f"one core of the {part}": 3600 / cost for part, cost in busiest["cpu_s_a_kitchen"].items() if part != "seats"}
     of["the one writer of rows"] = busiest["kitchens_an_hour"] / max(busiest["writer_holds_the_lock"], 1e-4)
@@ -302,7 +303,7 @@ def limits(rounds: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def needs(rounds: list[dict[str, Any]]) -> dict[str, Any]:
-    """What a thousand kitchens a day need, all of them in eight hours."""
+    """Seats, cores and storage for a thousand kitchens a day, all within eight hours."""
     busiest, plain = max(rounds, key=lambda each: each["kitchens_an_hour"]), rounds[0]
     share = A_DAY / WORKING_DAY_S
     seats = {
@@ -316,7 +317,7 @@ def needs(rounds: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def table(figures: dict[str, Any]) -> str:
-    """The rounds as Markdown."""
+    """The rounds as a Markdown table."""
     lines = ["| seats | stages of a kitchen | kitchens an hour | seats in stages | database | store | web | seats | writer |"]
     lines += [f"|{'---|' * 9}"]
     for each in figures["rounds"]:
@@ -330,7 +331,7 @@ def table(figures: dict[str, Any]) -> str:
 def farm(
     folder: Path, seats: int, quicker: float, rows: PostgresServer, store: ObjectServer, model_s: float = 0.0
 ) -> Iterator[Farm]:
-    """A running one in a folder of its own."""
+    """A running farm in a folder of its own."""
     folder.mkdir()
     lengths = folder / "lengths.json"
     lengths.write_text(json.dumps(lengths_of_stages(quicker, model_s)))
@@ -354,13 +355,13 @@ def _measure_one(counts: tuple[int, ...], model_s: float, file: Path | None) -> 
 
 
 def main() -> int:
-    """Measure, report."""
+    """Measure and report."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seats", type=lambda text: tuple(int(part) for part in text.split(",")), default=(1, 2, 4))
     parser.add_argument("--quicker", type=float, default=8.0)
-    parser.add_argument("--kitchens", type=int, default=2, help="for each seat")
+    parser.add_argument("--kitchens", type=int, default=2, help="kitchens per seat")
     parser.add_argument("--one", action="store_true", help="measure a single kitchen that all seats share")
-    parser.add_argument("--model-s", type=float, default=0.0, help="with --one: seconds of a model for each object")
+    parser.add_argument("--model-s", type=float, default=0.0, help="with --one: seconds that a model takes per object")
     add_options(parser)
     options = parser.parse_args()
     if options.one:

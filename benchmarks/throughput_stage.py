@@ -1,8 +1,8 @@
-"""A stage that sleeps as long as the real one took, and stores as much: `throughput_stage.py LENGTHS FAKE WORKDIR …`.
+"""Stand-in stage that sleeps as long as the real one took and stores as much: `throughput_stage.py LENGTHS FAKE WORKDIR …`.
 
-LENGTHS is a JSON file: seconds, files and bytes of each stage, and of one that goes object by object the seconds that it takes
-before them ("shared") and that any process takes to begin ("start"). FAKE is the tests' stand-in, which writes what the app
-reads.
+LENGTHS is a JSON file: seconds, files and bytes of each stage; for a stage that works object by object also the seconds before
+the objects ("shared") and the start time of any process ("start"). FAKE is the tests' stand-in, which writes the files that the
+app reads.
 """
 
 import json
@@ -12,11 +12,11 @@ import sys
 import time
 from pathlib import Path
 
-SAID_S = 0.25  # between two words of progress, as the stages say them
+SAID_S = 0.25  # interval of progress messages, as in the real stages
 
 
 def main() -> None:
-    """Sleep, store, and end as the stand-in does; with --only as r2c2r_core.worker does."""
+    """Sleep, store, and end as the tests' stand-in does; with --only as r2c2r_core.worker does."""
     lengths, fake, workdir = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
     stage = sys.argv[sys.argv.index("--until") + 1] if "--until" in sys.argv else "ingest"
     length = json.loads(lengths.read_text())[stage]
@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def some_objects(length: dict[str, float], stage: str, folder: Path, names: list[str]) -> None:
-    """These, or with none what they share."""
+    """Process these objects; with no names, the work that all objects share."""
     known = objects()
     each = (length["seconds"] - length["shared"]) / len(known)
     sleep(stage, length["start"] + each * len(names) if names else length["shared"])
@@ -48,13 +48,13 @@ def some_objects(length: dict[str, float], stage: str, folder: Path, names: list
 
 
 def objects() -> list[str]:
-    """Of the job's request."""
+    """Names of the objects in the job's request."""
     request = Path(sys.argv[len(sys.argv) - sys.argv[::-1].index("--request")])
     return [item["name"] for item in json.loads(request.with_name("prompts.json").read_text())["objects"]]
 
 
 def sleep(stage: str, seconds: float) -> None:
-    """Saying how far it is."""
+    """Sleep while reporting progress."""
     began = time.monotonic()
     while (left := began + seconds - time.monotonic()) > 0:
         say(stage=stage, fraction=1 - left / seconds, text="a kitchen")
@@ -62,12 +62,12 @@ def sleep(stage: str, seconds: float) -> None:
 
 
 def store(folder: Path, name: str, size: int) -> None:
-    """A noun of so many bytes that nothing else has."""
+    """Write a noun of `size` random bytes."""
     (folder / f"{name}.noun").write_bytes(os.urandom(size))
 
 
 def say(**words: object) -> None:
-    """To whoever started it."""
+    """Print a JSON message for the parent process."""
     sys.stdout.write(json.dumps(words) + "\n")
     sys.stdout.flush()
 

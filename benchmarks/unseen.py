@@ -1,14 +1,14 @@
-"""Kitchens that nobody here drew: how many objects come out usable, one random click an object.
+"""Fraction of usable objects in kitchens not drawn for this project, from one random click per object.
 
     python benchmarks/unseen.py FOLDER... [--workdir DIR] [--json benchmarks/unseen.json] [--seed N] [--preset NAME]
 
 A FOLDER holds capture.r3d or scan.r3d, truth.json and masks/NNNNNN.png (number of the object in truth.json + 1), as
-second_styles.py, franka.py and replicacad.py write them, or is a sample of `r2c2r sample`. Clicks are random ones of
+second_styles.py, franka.py and replicacad.py write them, or is a sample of `r2c2r sample`. Clicks are those of
 `recordings.random_clicks`, with the seed.
 
-Usable: every extent within 5 %, the joint of the right type, hinged on the right side. What is missing is wrong in every
-mean: its size by 100 %, its joint, all its mask. Joint figures are over the objects that have joints. Rows are added to the
-JSON file by the folder's name, each as soon as it is known.
+Usable: every extent within 5 %, the joint of the right type, hinged on the right side. A missing object counts as wrong in
+every mean: its size by 100 %, its joint, its whole mask. Joint figures are over the objects that have joints. Rows are added to
+the JSON file by the folder's name, each as soon as it is known.
 """
 
 import argparse
@@ -28,7 +28,7 @@ from r2c2r_core.kitchen.names import category_of
 
 USABLE_PERCENT, FAR_OFF_PERCENT = 5.0, 10.0
 _SIDES = ("width_error", "depth_error", "height_error")
-_HEIGHTS = ("bottle", "wall_cabinet")  # categories whose height has a bound of its own
+_HEIGHTS = ("bottle", "wall_cabinet")  # categories whose height has a separate bound
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
     parser.add_argument("--workdir", type=Path, help="kept afterwards")
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--seed", type=int, default=0, help="of the clicks")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the clicks")
     parser.add_argument("--preset", default="default", help="settings of `r2c2r run`")
     options = parser.parse_args(arguments)
     rows: dict[str, dict[str, Any]] = {}
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run_folder(folder: Path, work: Path, seed: int, preset: str) -> dict[str, Any]:
-    """One kitchen from random clicks to its figures; `work`/masks are compared with the true ones."""
+    """One kitchen from random clicks to its figures; the masks in `work`/masks are compared with the true ones."""
     prompts, clicks = random_clicks(folder, np.random.default_rng(seed)), work.parent / f"{work.name}.prompts.json"
     clicks.parent.mkdir(parents=True, exist_ok=True)
     write_prompts(prompts, clicks)
@@ -72,7 +72,7 @@ def row_of(outcome: Outcome, truth: Sequence[dict[str, Any]], overlaps: dict[str
     largest = {name: max(sides) for name, sides in errors.items()}
     joints = {item["name"]: joint_right(found.get(item["name"], {})) for item in truth if item["joint"]}
     usable = [name for name in errors if largest[name] <= USABLE_PERCENT and joints.get(name, True)]
-    named = {name for name in errors if name in outcome.doubted or name not in outcome.present}  # what is missing is said
+    named = {name for name in errors if name in outcome.doubted or name not in outcome.present}  # missing: reported
     wrong = [name for name in errors if name not in usable]
     category = {item["name"]: item["category"] for item in truth}
     return {
@@ -104,23 +104,23 @@ def row_of(outcome: Outcome, truth: Sequence[dict[str, Any]], overlaps: dict[str
 
 
 def kind_of(category: str) -> str:
-    """Front, appliance or thing."""
+    """The kind of a category: front, appliance or thing."""
     known = category_of(category)
     return "thing" if known is None else known.kind
 
 
 def extents_of(metrics: dict[str, Any]) -> list[float]:
-    """Errors of width, depth and height, percent; 100 where the object is missing."""
+    """Errors of width, depth and height in percent; 100 if the object is missing."""
     return [100.0 if (value := _value(metrics, name)) is None else value for name in _SIDES]
 
 
 def joint_right(metrics: dict[str, Any]) -> bool:
-    """Whether the joint's type is right and its hinge on the right side; missing: wrong."""
+    """Whether the joint's type and hinge side are right; False if it is missing."""
     return _value(metrics, "joint_type") == 1.0 and _value(metrics, "hinge_side") in (None, 1.0)
 
 
 def _failing(sides: list[float], right: bool) -> str:
-    """The sides beyond the bound, as people read them, and the joint where it is wrong."""
+    """The extents beyond the bound, with the names that people use, and the joint if it is wrong."""
     words = [f"{name[0]} {error:.0f}" for name, error in zip(_SIDES, sides, strict=True) if error > USABLE_PERCENT]
     return " ".join([*words, *([] if right else ["joint"])])
 
@@ -136,7 +136,7 @@ def _value(metrics: dict[str, Any], name: str) -> float | None:
 
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
-    """As Markdown; w, d and h are width, depth and height in percent."""
+    """Markdown table; w, d and h are width, depth and height in percent."""
     heads = ("kitchen", "usable", "median %", "worst %", "joints", "masks", "certified", "seconds", "wrong told", "right told")
     lines = [f"| {' | '.join(heads)} | wrong |", "|---" * (len(heads) + 1) + "|"]
     for name, row in rows.items():

@@ -1,14 +1,14 @@
-"""Wait for what another process does."""
+"""Wait for a condition that another process fulfils."""
 
 import os
 import time
 from collections.abc import Callable
 
-PATIENCE = float(os.environ.get("R2C2R_PATIENCE", "1"))  # times every limit: a slow machine's is larger
+PATIENCE = float(os.environ.get("R2C2R_PATIENCE", "1"))  # factor of every time limit; larger on a slow machine
 
 
 def until(condition: Callable[[], object], seconds: float) -> None:
-    """Wait for it; raises TimeoutError."""
+    """Poll until the condition is true; raises TimeoutError after `seconds`."""
     seconds *= PATIENCE
     deadline = time.monotonic() + seconds
     while not condition():

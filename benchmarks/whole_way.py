@@ -1,4 +1,4 @@
-"""A recording through `r2c2r run`, `check` and `evaluate`, from nothing."""
+"""A recording taken through `r2c2r run`, `check` and `evaluate`."""
 
 import json
 import shutil
@@ -17,12 +17,12 @@ CLI = [sys.executable, "-m", "r2c2r_core.cli"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What came out, and what it cost."""
+    """Results of the commands, and their cost."""
 
     cost: Cost
     certified: bool
     evaluation: dict[str, Any] | None  # what `r2c2r evaluate --json` writes; None where there is no bundle
-    doubted: frozenset[str] = frozenset()  # objects of the bundle that the certificate's likeness names
+    doubted: frozenset[str] = frozenset()  # objects of the bundle with a finding of the certificate's likeness check
     present: frozenset[str] = frozenset()  # objects of the bundle
 
 
@@ -31,7 +31,7 @@ def whole_way(
 ) -> Outcome:
     """Run the commands; `work` keeps bundle.zip, run.log, certificate.json and evaluation.json.
 
-    With `anew` it is emptied before; else stages whose inputs and code did not change are read from it.
+    With `anew` it is emptied before; otherwise stages whose inputs and code are unchanged are read from it.
     """
     if anew:
         shutil.rmtree(work, ignore_errors=True)

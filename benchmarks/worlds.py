@@ -1,8 +1,8 @@
-"""Models that others made, recorded as by a hand-held phone: rays, a light, a sensor, a walk, and what is true of them.
+"""Simulated hand-held phone recordings of third-party models: ray casting, lighting, sensor, camera path and ground truth.
 
-A world is surfaces in metres with +z up and the things among them. `record` writes scan.r3d, truth.json, prompts.json (random
-clicks) and masks/NNNNNN.png (number of the thing + 1, 0 = none). Renderer, light and sensor share nothing with the samples of
-`r2c2r sample` nor with the second generator.
+A world is surfaces in metres with +z up and the objects among them. `record` writes scan.r3d, truth.json, prompts.json (random
+clicks) and masks/NNNNNN.png (number of the object + 1, 0 = none). Renderer, light and sensor share no code with `r2c2r sample`
+or with the second generator.
 """
 
 import json
@@ -29,13 +29,13 @@ from r2c2r_core.synthetic.truth import Sightings, TrueJoint, TrueObject, truth_d
 FPS = 10
 DEPTH_SIZE = (256, 192)
 _OVERSAMPLE = 2
-_FOCAL = 0.76  # of the image's width: a phone's main camera
+_FOCAL = 0.76  # fraction of the image's width: a phone's main camera
 _CAPTURE_FROM_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # ARKit's world is y-up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Surface:
-    """A mesh of one material."""
+    """A mesh with one material."""
 
     vertices: Points  # (n, 3) world
     faces: Faces  # (m, 3)
@@ -48,23 +48,23 @@ class Surface:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class World:
-    """What is drawn, what is true, and the way past it."""
+    """Surfaces to draw, ground truth, and the camera path."""
 
     surfaces: tuple[Surface, ...]
     things: tuple[TrueObject, ...]
-    eyes: Points  # (k, 3) that the camera passes
-    targets: Points  # (k, 3) that it looks at there
+    eyes: Points  # (k, 3) waypoints of the camera
+    targets: Points  # (k, 3) looked at from there
     lights: Points  # (l, 3)
 
 
 class Shot(NamedTuple):
-    """One exposure at several times its size."""
+    """One exposure at a multiple of the final resolution."""
 
     light: np.ndarray  # (h, w, 3) linear
-    albedo: np.ndarray  # (h, w) of grey
-    depth_m: np.ndarray  # (h, w); 0 where nothing is
+    albedo: np.ndarray  # (h, w) grey
+    depth_m: np.ndarray  # (h, w); 0 without a hit
     cosine: np.ndarray  # (h, w) between ray and surface
-    thing: np.ndarray  # (h, w) index, -1 where none is
+    thing: np.ndarray  # (h, w) index, -1 for none
 
 
 def record(world: World, out: Path, *, frames: int, size: tuple[int, int], seed: int) -> None:
@@ -91,7 +91,7 @@ def record(world: World, out: Path, *, frames: int, size: tuple[int, int], seed:
 
 
 def walk(world: World, frames: int, rng: np.random.Generator) -> Iterator[Rigid3]:
-    """Poses (world_from_camera, OpenCV axes) along the way, at an even pace, by a hand that trembles and tilts."""
+    """Poses (world_from_camera, OpenCV axes) along the path at constant speed, with tremor and tilt of the hand."""
     pace = np.linalg.norm(np.diff(world.eyes, axis=0), axis=1) + 0.5 * np.linalg.norm(np.diff(world.targets, axis=0), axis=1)
     knots = np.concatenate([[0.0], np.cumsum(pace + 0.1)])
     times = np.linspace(0.0, knots[-1], frames)
@@ -107,7 +107,7 @@ def walk(world: World, frames: int, rng: np.random.Generator) -> Iterator[Rigid3
 
 
 def expose(world: World, castable: Any, camera: Intrinsics, pose: Rigid3) -> Shot:
-    """What the camera's rays meet: lit by an even sky of the room and by lamps that cast shadows."""
+    """Ray-cast view, lit by a uniform sky of the room and by lamps that cast shadows."""
     rays = pose.turn(pixel_rays(pixel_centres(camera), camera).reshape(-1, 3))
     hit = castable.cast_rays(_rays(np.broadcast_to(pose.translation, rays.shape), rays), nthreads=1)
     depth = hit["t_hit"].numpy()  # rays of length 1 along z
@@ -135,10 +135,10 @@ def expose(world: World, castable: Any, camera: Intrinsics, pose: Rigid3) -> Sho
 
 
 def sense(shot: Shot, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Depth (metres, NaN without a return) and confidence 0..2 as a phone's LiDAR gives them.
+    """Depth (metres, NaN without a return) and confidence 0..2 as from a phone's LiDAR.
 
-    A pixel mixes what its beam covers, so that edges fly; the noise grows with the square of the range and with the slant,
-    most of it even over some ten pixels; dark, slanted and far surfaces answer weakly.
+    A pixel averages its beam's footprint, which gives flying pixels at edges; noise grows with the square of the range and with
+    the slant, and is mostly correlated over some ten pixels; returns from dark, slanted and far surfaces are weak.
     """
     there = (shot.depth_m > 0).astype(np.float32)
     mixed = _shrunk(shot.depth_m) / np.maximum(_shrunk(there), 1e-6)
@@ -159,14 +159,14 @@ def sense(shot: Shot, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]
 
 
 def develop(shot: Shot, size: tuple[int, int], rng: np.random.Generator) -> Image:
-    """The picture: exposed a little differently every time, softened by the lens, grained, and encoded."""
+    """The picture: random exposure, lens blur, noise, and encoding."""
     linear = cv2.resize(shot.light, size, interpolation=cv2.INTER_AREA) * (1 + 0.03 * rng.standard_normal())
     soft = cv2.GaussianBlur(linear, (0, 0), 0.5) + 0.006 * rng.standard_normal(linear.shape)
     return np.asarray(255 * np.clip(soft, 0, 1) ** (1 / 2.2) + 0.5, dtype=np.uint8)
 
 
 def box_of(vertices: Points, front: Points, yaw_rad: float) -> tuple[np.ndarray, Rigid3]:
-    """Size and pose of the box that a front (its y) and what is behind it fill; the front faces -y after the yaw."""
+    """Size and pose of the bounding box of a front (its y) and what is behind it; the front faces -y after the yaw."""
     turn = Rotation.from_euler("z", yaw_rad).as_matrix()
     own, face = vertices @ turn, front @ turn
     low, high = own.min(axis=0), own.max(axis=0)
@@ -177,7 +177,7 @@ def box_of(vertices: Points, front: Points, yaw_rad: float) -> tuple[np.ndarray,
 def joint_of(
     name: str, kind: str, axis: np.ndarray, origin: np.ndarray, limits: tuple[float, float], pose: Rigid3
 ) -> TrueJoint:
-    """A joint of a closed thing, turned so that it opens towards positive values."""
+    """A joint of a closed object, with its sign chosen so that it opens towards positive values."""
     opens = 1.0 if limits[1] > -limits[0] else -1.0
     side = pose.inverse.apply(np.asarray(origin))[0]
     return TrueJoint(
@@ -219,7 +219,7 @@ def _rays(origins: Points, directions: Points) -> Any:
 
 
 def _materials(world: World, surface: np.ndarray, face: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Colour (n, 3) and gloss (n,) at hits: of the surface, at a face's barycentric place."""
+    """Colour (n, 3) and gloss (n,) at ray hits: of the surface, at a face's barycentric coordinates."""
     colours, gloss = np.zeros((len(surface), 3)), np.zeros(len(surface))
     for index in np.unique(surface[surface >= 0]):
         each, at = world.surfaces[index], surface == index
@@ -244,7 +244,7 @@ def _sampled(texture: Image, uv: np.ndarray) -> np.ndarray:
 
 
 def _lamp(castable: Any, lamp: np.ndarray, points: Points, normals: Points, towards: Points) -> tuple[np.ndarray, np.ndarray]:
-    """Diffuse light and highlight (n,) of one lamp, without what stands in its way."""
+    """Diffuse light and highlight (n,) of one lamp, with shadows."""
     way = lamp - points
     far = np.linalg.norm(way, axis=1)
     unit = way / far[:, None]
