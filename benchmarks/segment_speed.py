@@ -287,7 +287,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("sample", type=Path, help="folder of `r2c2r sample`")
     parser.add_argument("--workdir", type=Path, help="kept afterwards; the capture read into it is reused")
     parser.add_argument("--clicks", type=int, default=5, help="random clicks per object, besides the one of prompts.json")
-    parser.add_argument("--objects", type=lambda text: set(text.split(",")), default=set(), help="comma-separated names; default: all")
+    parser.add_argument("--objects", type=lambda text: set(text.split(",")), default=set(), help="comma-separated, default all")
     parser.add_argument("--seed", type=int, default=0, help="seed of the random clicks")
     parser.add_argument("--warm", action="store_true", help="keep the prepared cache and skip measuring the preparation")
     parser.add_argument("--no-stream", dest="stream", action="store_false", help="measure clicks only")
