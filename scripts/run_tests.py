@@ -1,7 +1,7 @@
-"""Everything CI runs: JavaScript tests, Python tests, then browser tests, each on two workers; failed tests once more, alone.
+"""Test runner of CI: JavaScript, Python, then browser tests, each on two workers; failed tests are run once more, alone.
 
-Tests marked `slow` are left out; `--slow` runs them and nothing else. Other arguments go to both pytest passes. With
-R2C2R_REQUIRE_ALL set (CI), node and a Chromium are required; without it, what cannot run is reported as not run.
+Tests marked `slow` are left out; `--slow` runs only them. Other arguments are passed to both pytest runs. With
+R2C2R_REQUIRE_ALL set (CI), node and a Chromium are required; without it, tests that cannot run are reported as not run.
 """
 
 import json
@@ -14,19 +14,19 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 PATIENCE = float(os.environ.get("R2C2R_PATIENCE", "1"))
-LONGEST_S = 900 * PATIENCE  # a test, its fixtures included
+LONGEST_S = 900 * PATIENCE  # for one test, including its fixtures
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
-TWO_WORKERS = ("-n", "2", "--dist", "worksteal")  # half of the tests each, then what the other has not begun
-WITHOUT_BROWSER = ("not browser", "--ignore=tests/browser")  # what is ignored is not even imported
+TWO_WORKERS = ("-n", "2", "--dist", "worksteal")  # half of the tests each, then tests that the other has not begun
+WITHOUT_BROWSER = ("not browser", "--ignore=tests/browser")  # ignored folders are not even imported
 WITH_BROWSER = ("browser", "--ignore=tests/app", "--ignore=tests/core")
 PASSED, FAILED, NOTHING_RAN = 0, 1, 5  # exit codes of pytest
-MEMORY = Path("/dev/shm")  # files of tests are put there: a disk is waited for at every transaction
-MIN_MEMORY_B = 4 << 30  # free; a run takes 1 GB
-MAX_RERUN = 20  # tests; more failures than that are no accident of timing
+MEMORY = Path("/dev/shm")  # temporary files of tests: a disk would be waited for at every transaction
+MIN_MEMORY_B = 4 << 30  # required free space; a run takes 1 GB
+MAX_RERUN = 20  # number of tests; more failures are not a matter of timing
 
 
 def main() -> int:
-    """Run the suites; the exit code is 0 when every test passed, at the latest when it was run alone."""
+    """Run the suites; the exit code is 0 if every test passed, in the suite or when rerun alone."""
     node = shutil.which("node")
     chromium = any(map(shutil.which, ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")))
     not_run = [
@@ -35,7 +35,7 @@ def main() -> int:
     if REQUIRED and not_run:
         sys.stderr.write(f"required here but not possible: {', '.join(not_run)}\n")
         return 1
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of processes start: each would compile all it imports
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of processes start: each would compile all its imports
     if MEMORY.is_dir() and shutil.disk_usage(MEMORY).free > MIN_MEMORY_B:
         os.environ.setdefault("TMPDIR", str(MEMORY))
     arguments = sys.argv[1:]
@@ -55,14 +55,14 @@ def main() -> int:
 
 
 def run_python(passes: list[tuple[str, ...]], arguments: list[str]) -> int:
-    """Run pytest once a pass, then each failed test once more in a process of its own."""
+    """Run pytest once per selection, then each failed test once more in its own process."""
     BUILD.mkdir(exist_ok=True)
     failures: dict[str, str] = {}
     codes = []
     for selection in passes:
         code, failed = run_pytest(*selection, "--durations=40", *arguments)
         if code == FAILED and not failed:
-            return FAILED  # nothing to run again: the session itself failed
+            return FAILED  # no test to rerun: the session itself failed
         failures |= failed
         codes.append(code)
     if others := set(codes) - {PASSED, FAILED, NOTHING_RAN}:
@@ -73,7 +73,7 @@ def run_python(passes: list[tuple[str, ...]], arguments: list[str]) -> int:
 
 
 def run_pytest(*arguments: str) -> tuple[int, dict[str, str]]:
-    """Exit code of one pytest run, and the report of each test that failed by its node id."""
+    """Exit code of one pytest run, and the reports of its failed tests by node id."""
     path = BUILD / "failures.jsonl"
     path.unlink(missing_ok=True)
     command = [sys.executable, "-m", "pytest", "-p", "tests.suite", f"--failures={path}", f"--timeout={LONGEST_S}", *arguments]
@@ -83,7 +83,7 @@ def run_pytest(*arguments: str) -> tuple[int, dict[str, str]]:
 
 
 def run_again(failures: dict[str, str]) -> int:
-    """Run failed tests alone: those that pass are reported as flaky with their first failure, the others fail the run."""
+    """Rerun failed tests alone: those that pass are reported as flaky with their first failure, the others fail the run."""
     if len(failures) > MAX_RERUN:
         sys.stdout.write(f"{len(failures)} tests failed; up to {MAX_RERUN} would have been run once more\n")
         return FAILED
