@@ -1,7 +1,7 @@
-"""A bundle's object in Isaac Lab, opened: python examples/bundle_in_isaac_lab.py FOLDER OBJECT (an unpacked bundle)
+"""Open an object of a bundle in Isaac Lab: python examples/bundle_in_isaac_lab.py FOLDER OBJECT (an unpacked bundle)
 
-Runs in Isaac Lab's own Python (isaaclab.sh -p). Nobody who wrote this had a machine that runs it: what of it can be checked
-without Isaac is what the file names.
+Runs in Isaac Lab's own Python (isaaclab.sh -p). Its authors had no machine that runs Isaac Lab: only the USD file that it loads
+has been checked, without Isaac.
 """
 
 import importlib.util
@@ -25,12 +25,12 @@ def main(folder: str, name: str) -> None:
 
     simulation = sim_utils.SimulationContext(sim_utils.SimulationCfg(dt=0.01))
     sim_utils.GroundPlaneCfg().func("/World/ground", sim_utils.GroundPlaneCfg())
-    held = ImplicitActuatorCfg(joint_names_expr=[".*"], stiffness=None, damping=None)  # as the file says
+    held = ImplicitActuatorCfg(joint_names_expr=[".*"], stiffness=None, damping=None)  # gains from the file
     unit = Articulation(
         ArticulationCfg(prim_path="/World/unit", spawn=sim_utils.UsdFileCfg(usd_path=str(asset)), actuators={"joints": held})
     )
     simulation.reset()
-    unit.write_joint_state_to_sim(unit.data.joint_pos_limits[..., 1], unit.data.joint_vel)  # open
+    unit.write_joint_state_to_sim(unit.data.joint_pos_limits[..., 1], unit.data.joint_vel)  # open all joints
     for _ in range(100):
         unit.write_data_to_sim()
         simulation.step()

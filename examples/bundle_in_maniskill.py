@@ -1,6 +1,6 @@
-"""A bundle in a ManiSkill scene, every joint opened: python examples/bundle_in_maniskill.py FOLDER (an unpacked bundle)
+"""Open every joint of a bundle in a ManiSkill scene: python examples/bundle_in_maniskill.py FOLDER (an unpacked bundle)
 
-pip install mani_skill, and a Vulkan device for what is seen. SAPIEN's loader drops the friction of joints: it is set here.
+Needs `pip install mani_skill`, and a Vulkan device for rendering. SAPIEN's loader drops joint friction, so it is set here.
 """
 
 import importlib.util

@@ -13,7 +13,7 @@ def main(folder: str) -> None:
     for joint in (j for j in range(model.njnt) if model.jnt_type[j] in (hinge, slide)):
         mujoco.mj_resetData(model, data)
         upper = model.jnt_range[joint, 1]
-        force = 30.0 if model.jnt_type[joint] == slide else 10.0  # N, or N m
+        force = 30.0 if model.jnt_type[joint] == slide else 10.0  # N for slides, N m for hinges
         for _ in range(round(3.0 / model.opt.timestep)):
             data.qfrc_applied[model.jnt_dofadr[joint]] = force
             mujoco.mj_step(model, data)

@@ -1,6 +1,6 @@
-"""A bundle beside a robot of robosuite's, opened: python examples/bundle_in_robosuite.py FOLDER (an unpacked bundle)
+"""Open a bundle beside a robosuite robot: python examples/bundle_in_robosuite.py FOLDER (an unpacked bundle)
 
-pip install robosuite. Its models are MJCF as the bundle's scene is: one is merged into the other.
+Needs `pip install robosuite`. Its models are MJCF, like the bundle's scene, so one is merged into the other.
 """
 
 import importlib.util

@@ -1,4 +1,4 @@
-"""One object's candidate meshes, best first: python examples/candidates.py SCAN.r3d PROMPTS.json NAME OUT_DIR"""
+"""Export an object's candidate meshes, best first: python examples/candidates.py SCAN.r3d PROMPTS.json NAME OUT_DIR"""
 
 import sys
 import tempfile

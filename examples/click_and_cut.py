@@ -1,4 +1,4 @@
-"""Cut out what one click is on: python examples/click_and_cut.py SCAN.r3d CATEGORY FRAME X Y OUT.png"""
+"""Cut out the object under a click: python examples/click_and_cut.py SCAN.r3d CATEGORY FRAME X Y OUT.png"""
 
 import sys
 import tempfile

@@ -1,6 +1,6 @@
-"""Drive a running server from a program: python examples/drive_the_api.py ADDRESS (as `r2c2r serve` prints it, with its key)
+"""Use a running server's API: python examples/drive_the_api.py ADDRESS (as `r2c2r serve` prints it, with its key)
 
-Makes a sample kitchen, runs it and downloads the bundle. ADDRESS/api/openapi.json describes the whole interface.
+Makes a sample kitchen, runs it and downloads the bundle. ADDRESS/api/openapi.json describes the whole API.
 """
 
 import json
@@ -14,7 +14,7 @@ from urllib.request import HTTPCookieProcessor, Request, build_opener
 
 def main(address: str) -> None:
     browser = build_opener(HTTPCookieProcessor(CookieJar()))
-    browser.open(address).read()  # the printed key signs in, once
+    browser.open(address).read()  # the printed key signs in one browser, once
 
     def api(path: str, body: dict[str, Any] | None = None) -> Any:
         content = None if body is None else json.dumps(body).encode()

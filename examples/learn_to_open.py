@@ -1,8 +1,8 @@
 """Learn to open a joint by imitation, on the CPU: python examples/learn_to_open.py FOLDER JOINT [DEMONSTRATIONS] [TRIALS]
 
-FOLDER is an unpacked bundle, or what `r2c2r vary` wrote. The scripted policy shows how, with noise on its actions so that it
-also shows how to come back; the learner does what was shown in the state most like its own. What is printed is how many
-episodes that were not shown succeed, before and after.
+FOLDER is an unpacked bundle, or the output of `r2c2r vary`. The scripted policy demonstrates, with noise on its actions so that
+recoveries are demonstrated too; the learner repeats the action of the nearest demonstrated state. Prints how many episodes with
+unseen seeds succeed, before and after.
 """
 
 import sys
@@ -17,7 +17,7 @@ NOISE, LEAST_SPREAD = 0.2, 0.02
 
 
 class Policy:
-    """Actions from states: what was shown in the nearest one; untrained, it does nothing."""
+    """Nearest-neighbour policy: the action demonstrated in the nearest state; zero before training."""
 
     def __init__(self) -> None:
         self.states, self.actions = np.zeros((0, 20)), np.zeros((0, 7))

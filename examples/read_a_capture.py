@@ -1,4 +1,4 @@
-"""Read a recording and say what is in it: python examples/read_a_capture.py SCAN.r3d"""
+"""Read a recording and print its contents: python examples/read_a_capture.py SCAN.r3d"""
 
 import sys
 import tempfile
@@ -10,7 +10,7 @@ from r2c2r_core.ingest.stage import IngestConfig, read_capture
 
 
 def main(scan: str) -> None:
-    with tempfile.TemporaryDirectory() as store:  # colour and depth are kept here, one file a frame
+    with tempfile.TemporaryDirectory() as store:  # colour and depth are stored here, one file per frame
         capture = read_capture(Path(scan), Path(store) / "frames", IngestConfig())
         frame = capture.frames[len(capture.frames) // 2]
         depth = capture.images.depth(frame.index)

@@ -1,4 +1,4 @@
-"""A generator: the convex hull of what the depth camera saw of an object, in its mean colour, where it stands."""
+"""Example generator: the convex hull of an object's observed depth points, in their mean colour, in place."""
 
 import numpy as np
 import trimesh

@@ -1,4 +1,4 @@
-"""A recording format: frame_N.npz, each with rgb, depth_m, camera (3x3) and world_from_camera (4x4, OpenCV axes)."""
+"""Example recording format: frame_N.npz, each with rgb, depth_m, camera (3x3) and world_from_camera (4x4, OpenCV axes)."""
 
 import io
 import re
