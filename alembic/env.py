@@ -1,4 +1,4 @@
-"""How migrations are run: by the app on its own connection, or by the `alembic` command on R2C2R_DATABASE."""
+"""Alembic environment: migrations run by the app on its own connection, or by the `alembic` command on R2C2R_DATABASE."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""a bundle knows the inputs it was made from, not the last event before it
+"""key of a bundle's inputs, in place of the last event before it
 
 Revision ID: 0002
 Revises: 0001

@@ -1,4 +1,4 @@
-"""a project remembers which segmenter draws its masks
+"""segmenter of a project
 
 Revision ID: 0003
 Revises: 0002

@@ -1,4 +1,4 @@
-"""accounts, sign-ins, and uploads that can be resumed
+"""accounts, sign-ins, and resumable uploads
 
 Revision ID: 0004
 Revises: 0003

@@ -1,4 +1,4 @@
-"""a project has a review state and comments, and remembers its generator and matcher
+"""review state, comments, generator and matcher of a project
 
 Revision ID: 0005
 Revises: 0004

@@ -1,4 +1,4 @@
-"""a job knows how far it ever got: attempts count only while it gets no further
+"""furthest stage of a job: attempts count only while it makes no progress
 
 Revision ID: 0006
 Revises: 0005

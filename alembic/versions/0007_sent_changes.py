@@ -1,4 +1,4 @@
-"""a change that is sent again is not made again
+"""keys of sent changes, so that a repeated request is not applied twice
 
 Revision ID: 0007
 Revises: 0006

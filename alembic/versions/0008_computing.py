@@ -1,4 +1,4 @@
-"""when a project's live segmenter was at work
+"""times at which a project's live segmenter was computing
 
 Revision ID: 0008
 Revises: 0007

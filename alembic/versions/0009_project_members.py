@@ -1,4 +1,4 @@
-"""Who owns a project, and its members where not everybody may see it."""
+"""Owner of a project, and its members if its visibility is restricted."""
 
 import sqlalchemy as sa
 import sqlmodel
@@ -11,7 +11,7 @@ branch_labels = None
 depends_on = None
 
 TEXT = sqlmodel.sql.sqltypes.AutoString
-# who began a project's first job made it
+# the owner is the person who started a project's first job
 OWNERS = """
 UPDATE projects SET owner_id = (
     SELECT accounts.id FROM jobs JOIN accounts ON accounts.name = jobs.who

@@ -1,4 +1,4 @@
-"""the record of sign-ins and accounts; keys of printed addresses, each good for one browser
+"""audit of sign-ins and accounts; keys of printed addresses, each valid for one browser
 
 Revision ID: 0010
 Revises: 0009

@@ -1,6 +1,6 @@
-"""the history keeps differences and says what stands; keys of masks and results, and sizes, are stored
+"""history as differences with the standing of each change; stored sizes, and keys of masks and results
 
-Going down, whole states come back: they are found by taking the differences back from what is stored now.
+A downgrade restores whole states by reverting the differences from the current state.
 
 Revision ID: 0011
 Revises: 0010
@@ -63,14 +63,14 @@ def downgrade() -> None:
 
 
 def _difference_events() -> None:
-    """What an event replaced and by what, in the place of all there was before and after."""
+    """Reduce each event to the replaced and the new values, instead of the whole states before and after."""
     for event in _changes():
         before, after = _flat(event["scope"], event["before"]), _flat(event["scope"], event["after"])
         _store(event, _without(before, after), _without(after, before))
 
 
 def _note_standing() -> None:
-    """Play the undos and redos once, and write down where that leaves each change."""
+    """Replay the undos and redos once, and store the resulting standing of each change."""
     done: dict[tuple[Any, ...], list[int]] = {}
     undone: dict[tuple[Any, ...], list[int]] = {}
     standing: dict[int, str] = {}
@@ -92,7 +92,7 @@ def _note_standing() -> None:
 
 
 def _whole_events() -> None:
-    """Each object's states, from the one of now back to its first."""
+    """Each object's whole states, from the current one back to its first."""
     states: dict[tuple[int, str], State] = {}
     for event in _changes(newest_first=True):
         of = (event["object_id"], event["scope"])
@@ -137,7 +137,7 @@ def _without(state: State, other: State) -> State:
 
 
 def _note_keys(project: State) -> str:
-    """Store what db/keys.py stores with every change; the project's key."""
+    """Store what db/keys.py stores with every change; return the project's key."""
     given = []
     for item in _rows("SELECT * FROM objects WHERE project_id=:id ORDER BY id", id=project["id"]):
         clicks = [[p["frame"], p["x"], p["y"], p["label"]] for p in _points(item["id"])]
@@ -156,7 +156,7 @@ def _note_keys(project: State) -> str:
 
 
 def _old_key(project: State) -> str:
-    """The key of what a person gave as it was before: of the two documents a run reads."""
+    """The former key of a person's inputs: that of the two documents that a run reads."""
     objects, corrected = [], {}
     for item in _rows("SELECT * FROM objects WHERE project_id=:id AND NOT deleted ORDER BY id", id=project["id"]):
         clicks = [{key: p[key] for key in ("frame", "x", "y", "label")} for p in _points(item["id"])]
@@ -189,7 +189,7 @@ def _override(object_id: int) -> State:
 
 
 def _changes(*, newest_first: bool = False) -> Iterator[State]:
-    """The events of objects' states one by one: whole ones of a long history do not fit into the memory together."""
+    """The events of objects' states one by one: the whole states of a long history do not fit into memory together."""
     numbers = _rows("SELECT id FROM events WHERE scope IN ('prompts', 'review') ORDER BY id" + " DESC" * newest_first)
     for number in numbers:
         (event,) = _rows("SELECT id, object_id, scope, before, after FROM events WHERE id=:id", **number)

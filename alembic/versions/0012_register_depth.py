@@ -1,4 +1,4 @@
-"""Whether a project's depth is moved onto its colour images when the recording is read."""
+"""Option to register a project's depth to its colour images when the recording is read."""
 
 import sqlalchemy as sa
 
@@ -11,7 +11,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    # Not in a batch: that makes the table anew, and with the old one go all rows that refer to it
+    # Not in a batch: that rebuilds the table, and dropping the old one deletes all rows that refer to it
     op.add_column("projects", sa.Column("register_depth", sa.Boolean(), nullable=False, server_default=sa.false()))
 
 

@@ -1,4 +1,4 @@
-"""The front that a person drew of an object."""
+"""Front of an object as drawn by a person."""
 
 import sqlalchemy as sa
 

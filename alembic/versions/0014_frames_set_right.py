@@ -1,4 +1,4 @@
-"""What a person said of an object in single frames."""
+"""Corrections of an object in single frames."""
 
 import sqlalchemy as sa
 

@@ -1,4 +1,4 @@
-"""What an object was called in the last run, where its results are."""
+"""Name of an object in the last run, under which its results are stored."""
 
 import sqlalchemy as sa
 

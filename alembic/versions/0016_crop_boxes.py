@@ -1,4 +1,4 @@
-"""The box that a person drew around a thing."""
+"""Crop box around an object, drawn by a person."""
 
 import sqlalchemy as sa
 

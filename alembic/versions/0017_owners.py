@@ -1,4 +1,4 @@
-"""a running job's owner is named across machines; sizes beyond 2 GiB where integers have a width
+"""owner of a running job, unique across machines; sizes beyond 2 GiB where integers have a fixed width
 
 Revision ID: 0017
 Revises: 0016
@@ -30,6 +30,6 @@ def downgrade() -> None:
 
 
 def _sizes_of(kind: sa.types.TypeEngine[int]) -> None:
-    if op.get_bind().dialect.name != "sqlite":  # there an integer is as wide as it needs to be
+    if op.get_bind().dialect.name != "sqlite":  # SQLite integers have no fixed width
         for table, column in SIZES:
             op.alter_column(table, column, type_=kind)

@@ -1,4 +1,4 @@
-"""tokens with which programs come in
+"""API tokens of programs
 
 Revision ID: 0018
 Revises: 0017

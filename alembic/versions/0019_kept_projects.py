@@ -1,4 +1,4 @@
-"""projects are tagged, archived, and put into a trash before they are deleted
+"""tags and archive of projects, and a trash before deletion
 
 Revision ID: 0019
 Revises: 0018

@@ -1,4 +1,4 @@
-"""webhooks, and what is posted to them
+"""webhooks and their deliveries
 
 Revision ID: 0021
 Revises: 0020

@@ -1,4 +1,4 @@
-"""who signs in at an identity provider, by the name that it never gives another
+"""subject of a person at an identity provider, which is never reassigned
 
 Revision ID: 0022
 Revises: 0021

@@ -1,4 +1,4 @@
-"""how the 3D view was looked at when a comment was made
+"""state of the 3D view when a comment was made
 
 Revision ID: 0023
 Revises: 0022

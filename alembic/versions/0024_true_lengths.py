@@ -1,4 +1,4 @@
-"""lengths that people measured in the room, and the factor that follows from them
+"""lengths measured in the room, and the resulting scale factor
 
 Revision ID: 0024
 Revises: 0023

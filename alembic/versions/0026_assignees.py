@@ -1,4 +1,4 @@
-"""whose turn a project is, and up to where each person has read its history
+"""assignee of a project, and each person's read position in its history
 
 Revision ID: 0026
 Revises: 0025

@@ -1,4 +1,4 @@
-"""whose turn an object is
+"""assignee of an object
 
 Revision ID: 0027
 Revises: 0026

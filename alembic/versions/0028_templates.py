@@ -1,4 +1,4 @@
-"""templates of names and categories, and the objects that a project still has to click
+"""templates of names and categories, and a project's list of objects still to click
 
 Revision ID: 0028
 Revises: 0027

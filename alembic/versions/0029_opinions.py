@@ -1,4 +1,4 @@
-"""projects that are a second opinion of another
+"""projects that are a second opinion on another one
 
 Revision ID: 0029
 Revises: 0028

@@ -1,4 +1,4 @@
-"""projects whose truth is known, to score people by
+"""projects with known ground truth, to score annotators
 
 Revision ID: 0030
 Revises: 0029

@@ -1,4 +1,4 @@
-"""projects remember which arm tries their joints
+"""robot arm that a project tests its joints with
 
 Revision ID: 0031
 Revises: 0030

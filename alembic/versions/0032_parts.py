@@ -1,4 +1,4 @@
-"""objects of a stage that seats share
+"""objects of a stage as parts that seats share
 
 Revision ID: 0032
 Revises: 0031
