@@ -232,7 +232,7 @@ def _masks(rng: random.Random, path: Path) -> None:
 
 
 def _files(data: Path, names: list[str]) -> None:
-    """For the large project: frames of the size that a page shows, and the run's results for every object."""
+    """Files of the large project: frames of the size that a page shows, and the run's results for every object."""
     files = project_files(data, LARGE)
     finish(files.work)
     files.bundles.mkdir(parents=True)

@@ -165,7 +165,7 @@ def _dimensions(truth: Mapping[str, ObjectRecord], built: Mapping[str, SceneObje
 
 
 def figures(claims: Mapping[str, Sequence[Claim]], checked: Set[str]) -> dict[str, Any]:
-    """For each confidence its map, and its calibration before and after; no recording is evaluated with a map fitted on it.
+    """Map of each confidence, and its calibration before and after; no recording is evaluated with a map fitted on it.
 
     The maps are fitted on all recordings except those in `checked`.
     """

@@ -24,7 +24,7 @@ RESULTS, PROBE = HERE / "consumers.json", HERE / "consumer_probes.py"
 MINUTES = 15  # for one program's installation and run
 REQUIRES = {  # by probe: what pip installs; the probe's name with hyphens where it is not listed
     "pinocchio": ["pin"],
-    "dm_control": ["dm_control", "mujoco<4"],  # 1.0.50 asks MuJoCo 4 for fields that it no longer has
+    "dm_control": ["dm_control", "mujoco<4"],  # 1.0.50 reads fields that MuJoCo 4 no longer has
     "mujoco_urdf": ["mujoco"],
     "trimesh_glb": ["trimesh", "pillow"],
     "rod": ["rod"],

@@ -210,7 +210,7 @@ def _iou(mask: np.ndarray, truth: np.ndarray) -> float:
 
 
 def _click_object(person: Person, name: str, category: str) -> None:
-    """On the frame that shows it best: set its category, then click it once."""
+    """Set the object's category and click it once, on the frame that shows it best."""
     page = person.page
     prompts = json.loads((person.sample / "prompts.json").read_text())["objects"]
     point = next(item["points"][0] for item in prompts if item["name"] == name)

@@ -44,7 +44,7 @@ def run_measured(command: Sequence[str], *, cwd: Path, log: Path) -> Cost:
 
 
 class _Watch(threading.Thread):
-    """Samples a process tree's memory until told to stop."""
+    """Sampler of a process tree's memory, until stopped."""
 
     def __init__(self, root: psutil.Process) -> None:
         super().__init__(daemon=True)

@@ -195,7 +195,7 @@ def _units(plain: Callable[..., None], leaves: list[Leaf], rng: np.random.Genera
 
 
 def _way_of(category: str, hinge: str | None, width: float, given: dict[str, int], rng: np.random.Generator) -> str:
-    """How a unit opens; each of the rarer ways is used at most once per kitchen."""
+    """Way in which a unit opens; each of the rarer ways is used at most once per kitchen."""
     rarer = {"cabinet": "bottom" if width < 0.5 else "pair", "wall_cabinet": "top", "refrigerator": "freezer"}.get(category)
     if rarer is not None and not given.get(rarer) and rng.random() < 0.75:
         given[rarer] = 1

@@ -53,7 +53,7 @@ class Seen:
 
     @property
     def kind(self) -> str:
-        """Its group."""
+        """The object's kind: front, appliance or thing."""
         return category_of(self.category).kind
 
 

@@ -142,7 +142,7 @@ def _measure_case(case: Case, options: argparse.Namespace, end: float) -> None:
         started = time.monotonic()
         try:
             found = trial(case, entry)
-        except Exception:  # a number that ends in a programming error is a finding of its own
+        except Exception:  # a value that causes a programming error is itself a finding
             found = {"error": traceback.format_exc().splitlines()[-1]}
         _add(options.json, key, said, {name: found})
         print(f"{time.monotonic() - started:.0f} s {name} {json.dumps(found)}", file=sys.stderr, flush=True)

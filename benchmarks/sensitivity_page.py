@@ -35,7 +35,7 @@ WHY = (
 
 
 def effects(document: Mapping[str, Any]) -> list[tuple[str, float, float]]:
-    """For parameters that still exist, the loss change down and up, averaged over the runs that moved them; largest first."""
+    """Loss change down and up of existing parameters, averaged over the runs that moved them; the largest first."""
     found: dict[str, list[list[float]]] = {}
     for run in document["runs"]:
         for name, moves in run["numbers"].items():

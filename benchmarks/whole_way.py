@@ -21,7 +21,7 @@ class Outcome:
 
     cost: Cost
     certified: bool
-    evaluation: dict[str, Any] | None  # what `r2c2r evaluate --json` writes; None where there is no bundle
+    evaluation: dict[str, Any] | None  # output of `r2c2r evaluate --json`; None without a bundle
     doubted: frozenset[str] = frozenset()  # objects of the bundle with a finding of the certificate's likeness check
     present: frozenset[str] = frozenset()  # objects of the bundle
 

@@ -43,7 +43,7 @@ class Surface:
     texture: Image | None = None
     uv: np.ndarray | None = None  # (m, 3, 2) of the corners, repeating; v counts downwards
     gloss: float = 0.1
-    thing: int = -1  # index in the world's things
+    thing: int = -1  # index in the world's objects, -1 for none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
