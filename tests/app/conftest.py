@@ -1,4 +1,4 @@
-"""An app of one's own, with workers that obey the tests."""
+"""Fixtures with an app of their own, whose workers are stand-ins controlled by the tests."""
 
 import asyncio
 import atexit
@@ -51,12 +51,12 @@ FAKE_COMMANDS = Commands(
 )
 
 
-PATIENT = {"viewer_answer_s": PATIENCE_S, "viewer_page_s": PATIENCE_S, "busy_s": PATIENCE_S}  # settings of a slow machine
+PATIENT = {"viewer_answer_s": PATIENCE_S, "viewer_page_s": PATIENCE_S, "busy_s": PATIENCE_S}  # settings for a slow machine
 
 
 @dataclass
 class Running:
-    """A started app, a signed-in browser, and shorthands."""
+    """A started app, a signed-in client, and shorthands."""
 
     app: FastAPI
     client: TestClient
@@ -68,7 +68,7 @@ class Running:
         return context
 
     def printed(self) -> str:
-        """Another printed address, without its host."""
+        """A further printed address, without its host."""
         return f"/?token={launch_keys.new(self.context.engine)}"
 
     def get(self, path: str, status: int = 200, **options: Any) -> Any:
@@ -85,13 +85,13 @@ class Running:
         return self._checked(self.client.delete(path), status)
 
     def sample(self) -> str:
-        """A project that is ready, with the objects drawer_1 and mug_1; its id."""
+        """Id of a ready project with the objects drawer_1 and mug_1."""
         project = self.post("/api/projects/sample", {}, 202)["id"]
         self.until(lambda: self.get(f"/api/projects/{project}")["status"] == "ready")
         return str(project)
 
     def job(self, job: int, *states: str) -> Any:
-        """The job, once it is in one of the states."""
+        """Wait until the job is in one of the states; return it."""
         self.until(lambda: self.get(f"/api/jobs/{job}")["state"] in states)
         return self.get(f"/api/jobs/{job}")
 
@@ -108,7 +108,7 @@ class Running:
 
 @cache
 def migrated() -> Path:
-    """A database without rows, brought to the newest tables once a process."""
+    """A database without rows, migrated to the newest tables once per process."""
     folder = Path(tempfile.mkdtemp(prefix="r2c2r-db-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     open_engine(folder / DATABASE).dispose()
@@ -119,13 +119,13 @@ def migrated() -> Path:
 def running(
     data_dir: Path, commands: Commands = FAKE_COMMANDS, viewer: Viewer | None = None, **options: Any
 ) -> Iterator[Running]:
-    """The app on a data folder, and a browser that opened the printed address."""
+    """The app on a data folder, and a client that opened the printed address."""
     given = {
         "host": "127.0.0.1",
         "min_free_bytes": 0,
         "job_memory_bytes": 0,
         "kill_grace_s": 0.5,
-        "beat_s": 3600.0,  # no signs of life among the statements that a test counts
+        "beat_s": 3600.0,  # no heartbeats among the statements that a test counts
         "prepare_imports": False,
         "user": "tester",
         "import_roots": (data_dir.parent,),
@@ -144,17 +144,17 @@ def running(
         assert blocked == [], "everybody waited for the database"
 
 
-_POSTGRES: list[PostgresServer] = []  # that of the test which runs, when it runs on one
+_POSTGRES: list[PostgresServer] = []  # the server of the current test, if it uses Postgres
 ASKED_ON_THE_LOOP: list[tuple[URL, str]] = []
 """The database, and what asked it on the thread of an event loop, where everybody waits for the answer."""
-_COUNTED: dict[URL, list[str]] = {}  # the statements that a database is asked, while a test counts them
-_COMMITTED: dict[URL, list[Connection]] = {}  # and what it stores for good, likewise
-_SILENT: dict[URL, Exception] = {}  # what a database answers instead
+_COUNTED: dict[URL, list[str]] = {}  # statements sent to a database while a test counts them
+_COMMITTED: dict[URL, list[Connection]] = {}  # commits of a database while a test counts them
+_SILENT: dict[URL, Exception] = {}  # errors that a database raises instead of starting a transaction
 
 
 @contextmanager
 def statements(engine: Engine) -> Iterator[list[str]]:
-    """What the database is asked meanwhile, by any thread."""
+    """Statements sent to the database within the block, by any thread."""
     _COUNTED[engine.url] = []
     try:
         yield _COUNTED[engine.url]
@@ -164,7 +164,7 @@ def statements(engine: Engine) -> Iterator[list[str]]:
 
 @contextmanager
 def commits(engine: Engine) -> Iterator[list[Connection]]:
-    """The transactions that are committed meanwhile, by any thread but those that run jobs: they give signs of life."""
+    """Transactions committed within the block, by any thread except those that run jobs, which send heartbeats."""
     _COMMITTED[engine.url] = []
     try:
         yield _COMMITTED[engine.url]
@@ -174,7 +174,7 @@ def commits(engine: Engine) -> Iterator[list[Connection]]:
 
 @contextmanager
 def refusing(engine: Engine, error: Exception) -> Iterator[None]:
-    """The database begins no transaction meanwhile."""
+    """Make the database refuse every transaction within the block."""
     _SILENT[engine.url] = error
     try:
         yield
@@ -182,7 +182,7 @@ def refusing(engine: Engine, error: Exception) -> Iterator[None]:
         del _SILENT[engine.url]
 
 
-# Listeners are the class's, and there before any engine is: one that threads use takes no further listener, nor does its class
+# Listeners are on the class and set before any engine exists: an engine used by threads accepts none later, nor does its class
 @event.listens_for(Engine, "before_cursor_execute")
 def _note_statement(connection: Connection, _cursor: object, statement: str, *_: object) -> None:
     if (counted := _COUNTED.get(connection.engine.url)) is not None:
@@ -204,13 +204,13 @@ def _refuse(connection: Connection) -> None:
 
 @event.listens_for(Engine, "begin")
 def _note_where_asked(connection: Connection) -> None:
-    with suppress(RuntimeError):  # no loop runs on this thread, as it should be
+    with suppress(RuntimeError):  # no loop runs on this thread, as expected
         asyncio.get_running_loop()
         ASKED_ON_THE_LOOP.append((connection.engine.url, "".join(traceback.format_stack(limit=12))))
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Tests that start the app run on SQLite, and on Postgres too where its outcome could differ."""
+    """Tests that start the app run on SQLite, and also on Postgres where the outcome could differ."""
     starts = "start" in metafunc.fixturenames or hasattr(metafunc.module, "running")
     if starts and (wanted := metafunc.definition.get_closest_marker("both_databases")):
         marks = () if wanted.kwargs.get("quick", True) else (pytest.mark.slow,)
@@ -225,7 +225,7 @@ def postgres_server() -> Iterator[PostgresServer]:
 
 @pytest.fixture(autouse=True)
 def rows_in(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Where the apps of this test keep their rows; commands it runs are told those of the folder that `start` uses."""
+    """Database of this test's apps; commands that it runs get that of the folder used by `start`."""
     if getattr(request, "param", "sqlite") == "sqlite":
         yield
         return

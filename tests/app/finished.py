@@ -1,4 +1,4 @@
-"""A project as a run leaves it, with the small kitchen as the exporter writes it."""
+"""Projects as a run leaves them, with the small kitchen as exported."""
 
 import atexit
 import shutil
@@ -22,7 +22,7 @@ from tests.core.export.kitchen import reconstruction
 
 
 def copy_finished(data: Path) -> str:
-    """A data folder with a sample that was run and whose drawer_1 is finished; the project."""
+    """Fill a data folder with a sample that was run and whose drawer_1 is finished; return the project."""
     made, project = _finished_sample()
     shutil.copytree(made, data)
     with opened(data / DATABASE) as engine, writing(engine) as session:
@@ -35,7 +35,7 @@ def copy_finished(data: Path) -> str:
 
 @cache
 def _finished_sample() -> tuple[Path, str]:
-    """Made once a process."""
+    """Built once per process."""
     folder = Path(tempfile.mkdtemp(prefix="r2c2r-finished-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     with running(folder / "data") as web:
@@ -46,12 +46,12 @@ def _finished_sample() -> tuple[Path, str]:
 
 
 def _moved(path: str | None, made: Path, data: Path) -> str | None:
-    """A path within the folder that was copied, within its copy."""
+    """A path within the copied folder, mapped to its copy."""
     return path and path.replace(str(made), str(data), 1)
 
 
 def finished_kitchen(web: Running, certificate: Certificate, *bundles: Path) -> str:
-    """A project with the small kitchen's nouns and these bundles, oldest first; its id."""
+    """Project with the small kitchen's nouns and these bundles, oldest first; its id."""
     project = web.sample()
     with writing(web.context.engine) as session:
         row = project_row(session, project)
@@ -64,13 +64,13 @@ def finished_kitchen(web: Running, certificate: Certificate, *bundles: Path) -> 
 
 
 def keep_nouns(work: Path, certificate: Certificate) -> None:
-    """The nouns a run leaves behind."""
+    """Store the nouns that a run leaves."""
     Workspace(work).save("ingest", "scene", reconstruction().capture, {"key": "k", "seconds": 1.0})
     keep_results(work, certificate)
 
 
 def keep_results(work: Path, certificate: Certificate) -> None:
-    """The same but for the recording, which stays what it is."""
+    """Store the same nouns without the recording's."""
     run, space = reconstruction(), Workspace(work)
     nouns: list[tuple[str, str, Any]] = [("warp", "scene", run.scene)]
     nouns += [("segment", track.name, track) for track in run.tracks]

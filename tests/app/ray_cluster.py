@@ -1,4 +1,4 @@
-"""A Ray cluster of the tests' own: one node of two CPUs in a process of its own, which ends it.
+"""Ray cluster for tests: one node of two CPUs, in a process that stops it.
 
 `python -m tests.app.ray_cluster` is that process: it prints the address, and ends with its stdin.
 """
@@ -17,12 +17,12 @@ import pytest
 
 from tests.waiting import PATIENCE_S
 
-QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_worker_niceness": "0"}  # else a busy machine lets its workers wait
+QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_worker_niceness": "0"}  # otherwise its workers starve on a busy machine
 TOKEN = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "not-a-secret-of-the-tests-0123456789abcdef"}
 
 
 class RayNode:
-    """Known to others by RAY_ADDRESS."""
+    """A node that others find by RAY_ADDRESS."""
 
     def __init__(self, environment: dict[str, str]) -> None:
         self._environment = {**os.environ, **environment, **QUIET, **TOKEN}
@@ -38,15 +38,15 @@ class RayNode:
 
     @property
     def environment(self) -> dict[str, str]:
-        """What tells others where it is."""
+        """Environment variables that point others to it."""
         return {"RAY_ADDRESS": self.address, **TOKEN}
 
     def actors(self) -> list[psutil.Process]:
-        """Those of steps of jobs."""
+        """Actor processes of job steps."""
         return [process for process in self._all() if any("NodeSeat" in word for word in _words(process))]
 
     def kill(self) -> None:
-        """All of it, but for what a step's process group is: that has to end by itself."""
+        """Kill the node except for the process groups of steps, which have to end by themselves."""
         for process in [psutil.Process(self.process.pid), *self._all()]:
             if "app.tethered" not in _words(process):
                 with suppress(psutil.Error):
@@ -75,7 +75,7 @@ class RayNode:
 
 @contextmanager
 def ray_node(**environment: str) -> Iterator[RayNode]:
-    """A running one; skips where there is no Ray, which CI does without: its wheel is 79 MB, and each step starts processes."""
+    """A running node; skips without Ray, as in CI: its wheel is 79 MB, and each step starts processes."""
     if importlib.util.find_spec("ray") is None:
         pytest.skip("no Ray here: pip install 'r2c2r[ray]'")
     found = RayNode(environment)

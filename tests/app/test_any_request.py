@@ -1,4 +1,4 @@
-"""Whatever is sent to whichever operation; `benchmarks/any_request.py` tries many more."""
+"""Random requests to every operation; `benchmarks/any_request.py` tries many more."""
 
 from pathlib import Path
 

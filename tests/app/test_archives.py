@@ -28,7 +28,7 @@ def test_too_many_files_are_counted_before_any_of_them_is_listed(tmp_path: Path,
     def list_them(_: Path) -> None:
         raise AssertionError("each entry takes memory")
 
-    names = [f"{number:0{length}}" for number, length in enumerate([3, 200] * 300)]  # marks anywhere in what is read at once
+    names = [f"{number:0{length}}" for number, length in enumerate([3, 200] * 300)]  # signatures anywhere within a read chunk
     path = write(tmp_path / "many.zip", *((name, b"") for name in names))
     monkeypatch.setattr("app.archives.zipfile.ZipFile", list_them)
     with pytest.raises(CaptureError, match="600 files, at most 599"):
@@ -37,9 +37,9 @@ def test_too_many_files_are_counted_before_any_of_them_is_listed(tmp_path: Path,
         check_archive(path, "it", max_bytes=1 << 20, max_files=600)
 
 
-@pytest.mark.parametrize("cut", range(5))  # so many bytes of the mark are read before the border, the rest after it
+@pytest.mark.parametrize("cut", range(5))  # bytes of the signature before the chunk's border; the rest is after it
 def test_an_entry_whose_mark_is_cut_by_the_border_of_a_read_is_counted_once(tmp_path: Path, cut: int) -> None:
-    begins = "n" * (READ_BYTES - 46 - cut)  # the first entry of the table takes 46 bytes and its name
+    begins = "n" * (READ_BYTES - 46 - cut)  # the table's first entry takes 46 bytes and its name
     path = tmp_path / "cut.zip"
     table = b"".join(b"PK\x01\x02" + bytes(42) + name.encode() for name in (begins, "a", "b"))
     path.write_bytes(table)

@@ -1,4 +1,4 @@
-"""Choosing an arm that tries every joint of the bundle."""
+"""Choice of a robot arm that tests every joint of the bundle."""
 
 import importlib.util
 import json

@@ -1,4 +1,4 @@
-"""The scene in the 3D view: joints turn its bodies, a ray meets the first face, eyes hide, corrections show before any run."""
+"""The scene in the 3D view: joint motion, ray picking, visibility, and corrections shown before a run."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,7 +19,7 @@ from tests.app.nouns import finish
 from tests.core.export.kitchen import kitchen
 from tests.core.export.test_report import certificate
 
-AHEAD = np.array([0.0, 1.0, 0.0])  # from before the fronts, which face -Y
+AHEAD = np.array([0.0, 1.0, 0.0])  # looking at the fronts, which face -Y
 
 
 @pytest.fixture
@@ -89,7 +89,7 @@ def test_corrections_are_shown_before_any_run_and_named_only_where_they_change_s
         return view.preview
 
     assert shown() == []
-    assert shown(cabinet_1={"hinge": "left"}) == []  # as it is
+    assert shown(cabinet_1={"hinge": "left"}) == []  # unchanged
     assert shown(cabinet_1={"hinge": "right"}) == ["cabinet_1"]
     assert view.assembly is not None
     assert "counter_1" in {body.object_name for body in view.assembly.plan.bodies}
@@ -139,8 +139,8 @@ def test_a_clip_box_cuts_meshes_and_what_a_click_meets_and_lines_the_cut() -> No
     start = cabinet.world_from_object.translation + np.array([0.0, -3.0, 0.0])
     hit = cut.hit(start, AHEAD)
     assert hit is not None
-    assert hit.point_world[1] > middle - 1e-6  # its front is gone: the click meets what is behind
-    assert cut.span.low == pytest.approx(whole.span.low)  # of all of it, cut or not
+    assert hit.point_world[1] > middle - 1e-6  # its front is hidden: the click hits what is behind
+    assert cut.span.low == pytest.approx(whole.span.low)  # of the whole scene, cut or not
     assert cut.parts["cabinet_1"][0] == pytest.approx(whole.parts["cabinet_1"][0])
 
 
@@ -158,7 +158,7 @@ def test_what_is_cut_stands_where_its_joints_have_it() -> None:
     box = ((0.0, 0.0, 0.0), (1.0, float(low[1] + high[1]) / 2, 1.0))
 
     def back(values: dict[str, float]) -> float:
-        """Where the drawer ends behind, in its own frame."""
+        """Rear end of the drawer in its own frame."""
         cut = assemble(MagicMock(), "/scene", kitchen(), Style(draw="colliders", clip=box), MagicMock(), values)
         return max(float(shape.vertices[:, 1].max()) for shape in cut.shapes["drawer_1_drawer"])
 

@@ -1,4 +1,4 @@
-"""Carrying the data folder away and back, and whether its database and its files agree."""
+"""Backup and restore of the data folder, and consistency checks of its database and files."""
 
 import json
 import shutil
@@ -22,7 +22,7 @@ Start = Callable[..., Any]
 
 @pytest.fixture
 def kept(start: Start, tmp_path: Path) -> tuple[Path, str]:
-    """A data folder at rest with a project that has a bundle; its id."""
+    """A data folder at rest, and the id of its project with a bundle."""
     with start() as web:
         project = web.sample()
         web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "done")
@@ -50,7 +50,7 @@ def test_a_backup_taken_while_the_server_writes_is_whole(start: Start, tmp_path:
     connection = sqlite3.connect(tmp_path / "copy" / "r2c2r.db")
     assert connection.execute("SELECT x FROM prompt_points WHERE label = 0").fetchall() == [(1.5,)]
     connection.close()
-    assert [path.name for path in (tmp_path / "copy").iterdir() if path.is_file()] == ["r2c2r.db"]  # no -wal to forget
+    assert [path.name for path in (tmp_path / "copy").iterdir() if path.is_file()] == ["r2c2r.db"]  # no -wal left behind
 
 
 def test_what_was_lost_comes_back_and_what_is_there_stays(
@@ -60,7 +60,7 @@ def test_what_was_lost_comes_back_and_what_is_there_stays(
     copy, bundle = tmp_path / "copy", data / "projects" / project / "bundles" / "v1.zip"
     assert main(["backup", str(data), "-o", str(copy)]) == 0
     assert "of 1 projects" in capsys.readouterr().out
-    assert main(["backup", str(data), "-o", str(copy)]) == 2  # never written over
+    assert main(["backup", str(data), "-o", str(copy)]) == 2  # never overwritten
     bundle.unlink()
     (data / "projects" / project / "facts.json").write_text("newer")
     (data / "r2c2r.db").write_bytes(b"damaged" * 1000)

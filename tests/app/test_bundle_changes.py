@@ -1,4 +1,4 @@
-"""Formats chosen, a bundle looked at again, and what differs between two."""
+"""Choice of bundle formats, re-checks of a bundle, and differences between two."""
 
 import io
 import zipfile
@@ -53,5 +53,5 @@ def test_a_bundle_of_some_formats_has_those_scenes_and_the_proof(tmp_path: Path)
     assert members("mjcf") == {"scene.xml", "assets/a/a.xml", "meshes/a/a.obj", *proof}
     assert members("usd") == {"scene.usda", "scene.usdz", "assets/a/a.usda", "meshes/a/a.obj", *proof}
     assert members("ros") == {"package.xml", "ros/scene.urdf", "meshes/a/a.obj", *proof}
-    assert members("glb") == {"scene.glb", *proof}  # an asset's names its textures in meshes/
+    assert members("glb") == {"scene.glb", *proof}  # the GLB of an asset refers to textures in meshes/
     assert members("urdf", "mjcf", "usd", "glb", "ros") == names

@@ -1,4 +1,4 @@
-"""An object's points while it is being clicked."""
+"""Point cloud of an object while it is being clicked."""
 
 import base64
 from pathlib import Path
@@ -20,7 +20,7 @@ def test_the_points_of_an_object_lie_where_depth_and_masks_put_them(reviewed: Re
     assert found["count"] == len(points) > 50
     assert len(base64.b64decode(found["rgb"])) == 3 * len(points)
     extent = np.ptp(points, axis=0) / 1000
-    assert (extent <= np.array(found["size_m"]) + 0.05).all()  # nothing far outside the box it is said to fill
+    assert (extent <= np.array(found["size_m"]) + 0.05).all()  # nothing far outside the reported box
 
 
 def test_an_object_without_masks_has_no_points(reviewed: Reviewed) -> None:
@@ -50,9 +50,9 @@ def test_the_placed_mesh_is_drawn_for_the_camera_of_a_photo(reviewed: Reviewed, 
     answer = web.client.get(address)
     image = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_UNCHANGED)
     assert image is not None
-    assert image.shape[1] == 1920  # as wide as the photos of phones
+    assert image.shape[1] == 1920  # as wide as a phone's photos
     assert image.shape[2] == 4
-    assert image[0, 0, 3] == 0  # nothing where the mesh is not
+    assert image[0, 0, 3] == 0  # transparent where the mesh is not
     assert "immutable" in answer.headers["cache-control"]
     assert web.client.get(f"/media/{project}/overlay/{number}/999.png").status_code in (404, 409)
 

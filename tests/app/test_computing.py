@@ -1,4 +1,4 @@
-"""How long was computed, from times that overlap."""
+"""Computing time from overlapping intervals."""
 
 import time
 from pathlib import Path
@@ -15,10 +15,10 @@ from app.db.tables import Computing, Job, Project
     [
         ([], [], 0.0),
         ([(10.0, 20.0)], [], 10.0),
-        ([(10.0, 20.0)], [(15.0, 25.0)], 15.0),  # at the same time counts once
+        ([(10.0, 20.0)], [(15.0, 25.0)], 15.0),  # concurrent intervals count once
         ([(10.0, 20.0), (30.0, 40.0)], [(5.0, 50.0)], 45.0),
         ([(10.0, None)], [(12.0, 14.0)], 90.0),  # still running, at 100
-        ([], [(1.0, 2.0), (2.5, 4.0), (4.0 + JOINED_S + 0.1, 10.0)], 3.0 + 6.0 - JOINED_S - 0.1),  # a short gap is none
+        ([], [(1.0, 2.0), (2.5, 4.0), (4.0 + JOINED_S + 0.1, 10.0)], 3.0 + 6.0 - JOINED_S - 0.1),  # short gaps are ignored
     ],
 )
 def test_what_goes_on_at_the_same_time_counts_once(

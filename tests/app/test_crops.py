@@ -1,4 +1,4 @@
-"""A crop box around a thing is stored, undone, written to prompts.json and read from it; and what it is drawn with."""
+"""Crop box of an object: stored, undone, written to prompts.json and read back; and the data it is drawn with."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ def test_a_crop_box_is_set_undone_and_computes_the_masks_anew(web: Running) -> N
         assert web.patch(here, {"crop": CROP})["crop"] == CROP
         until(socket, type="segment", object=made["id"], restart=True)
         until(socket, type="segment", object=made["id"], state="done")
-    assert web.patch(here, {"name": "renamed"})["crop"] == CROP  # absent is not none
+    assert web.patch(here, {"name": "renamed"})["crop"] == CROP  # a missing field is not null
     assert web.patch(here, {"crop": None})["crop"] is None
     assert web.post(f"{at}/undo", {"object": made["id"]})["object"]["crop"] == CROP
 

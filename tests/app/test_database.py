@@ -1,4 +1,4 @@
-"""A database that cannot be used: one line with the next step, exit 2, before anything is printed or overwritten."""
+"""Unusable databases: a one-line error with the next step and exit code 2, before anything is printed or overwritten."""
 
 import os
 import shutil
@@ -34,7 +34,7 @@ def flipped(path: Path) -> None:
 
 
 def one_table(path: Path) -> None:
-    """The root page of a table that nothing reads when the file is opened."""
+    """Root page of a table that is not read when the file is opened."""
     with closing(sqlite3.connect(path)) as connection:
         (size,) = connection.execute("PRAGMA page_size").fetchone()
         (page,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = 'comments'").fetchone()
@@ -44,7 +44,7 @@ def one_table(path: Path) -> None:
 
 
 def written_by_a_newer_sqlite(path: Path) -> None:
-    """To be read only: its write version is beyond those known (https://www.sqlite.org/fileformat.html, 1.3.2)."""
+    """Read-only file: its write version is unknown (https://www.sqlite.org/fileformat.html, 1.3.2)."""
     found = bytearray(path.read_bytes())
     found[18] = 3
     path.write_bytes(found)
@@ -181,12 +181,12 @@ def test_what_is_stored_is_for_its_owner_alone(tmp_path: Path, monkeypatch: pyte
         (data / "r2c2r.db").chmod(0o644)
         data.chmod(0o755)
         assert main(["user", "list", "--data", str(data)]) == 0
-        assert modes(data) == {0o700, 0o600}  # what an older version left open
+        assert modes(data) == {0o700, 0o600}  # permissions that an older version left open
         shared = tmp_path / "shared"
         (shared / "other").mkdir(parents=True)
         shared.chmod(0o755)
         assert main(["user", "list", "--data", str(shared)]) == 0
-        assert shared.stat().st_mode & 0o777 == 0o755  # it holds more than ours
+        assert shared.stat().st_mode & 0o777 == 0o755  # it holds other files than ours
         assert (shared / "r2c2r.db").stat().st_mode & 0o777 == 0o600
     finally:
         os.umask(was)

@@ -1,6 +1,6 @@
-"""deploy/: the proxies' files on loopback TLS, where pages, sockets and uploads come through; the containers' as they read.
+"""Files of deploy/: the proxies' on loopback TLS, with pages, sockets and uploads; the containers' by their contents.
 
-No image can be built where tests run: what the containers' files name is looked for instead.
+No image can be built where tests run, so the paths and names in the containers' files are checked instead.
 """
 
 import re
@@ -33,7 +33,7 @@ from tests.waiting import PATIENCE_S, until
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
 NAME = "kitchens.example"
-LARGE = archive(("metadata", b"{}"), ("rgbd/0.jpg", bytes(range(256)) * 2**14))  # of 4 MB, no proxy's default limit
+LARGE = archive(("metadata", b"{}"), ("rgbd/0.jpg", bytes(range(256)) * 2**14))  # of 4 MB, above every proxy's default limit
 
 
 class Proxied:
@@ -62,7 +62,7 @@ def certificate(folder: Path) -> tuple[Path, Path]:
 
 
 def with_line(site: str, known: str, instead: str) -> str:
-    """The file with a directive replaced that stands in it once."""
+    """The file with a directive replaced that occurs in it exactly once."""
     changed, count = re.subn(f"{known}.*", lambda _: instead, site)
     assert count == 1
     return changed
@@ -118,7 +118,7 @@ def proxied(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.
 
 @contextmanager
 def behind_proxy(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, signs_in: bool = False) -> Iterator[Proxied]:
-    """By the file as it is; `signs_in` has the proxy ask for ann's password and say who asks."""
+    """Use the file as it is; with `signs_in` the proxy asks for ann's password and passes on her name."""
     program = found(name)
     named = {"identity": "proxy:X-Forwarded-User", "trusted_proxies": ("127.0.0.1",)}
     settings = Settings(data_dir=tmp_path / "data", host="127.0.0.1", min_free_bytes=0, job_memory_bytes=0, **named)  # type: ignore[arg-type]
@@ -133,7 +133,7 @@ def behind_proxy(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, 
 
 
 def found(name: str) -> str:
-    """Where the program is; skips where there is none."""
+    """Path of the program; skips if it is missing."""
     program = shutil.which(name) or shutil.which(name, path="/usr/sbin")
     if program is None:
         pytest.skip(f"no {name} here: apt-get install {name}")
@@ -142,7 +142,7 @@ def found(name: str) -> str:
 
 @contextmanager
 def proxy(program: str, given: list[str], port: int, folder: Path) -> Iterator[None]:
-    """It runs, and listens."""
+    """Run the proxy, and wait until it listens."""
     with (folder / "said").open("wb") as said:
         process = subprocess.Popen([program, *given], stdout=said, stderr=said)
     try:
@@ -233,7 +233,7 @@ def test_of_several_servers_one_keeps_a_3d_view_an_upload_or_a_project_and_any_a
 
 @contextmanager
 def named_server(name: str) -> Iterator[int]:
-    """A server that answers its name to everything; its port."""
+    """A server that returns its name for every request; its port."""
 
     class Named(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -243,7 +243,7 @@ def named_server(name: str) -> Iterator[int]:
             self.wfile.write(name.encode())
 
         def log_message(self, *_: object) -> None:
-            """Nothing."""
+            """Silence the log."""
 
     with ThreadingHTTPServer(("127.0.0.1", 0), Named) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.05,))

@@ -1,4 +1,4 @@
-"""Candidates side by side: pictures from all sides, what lies off another one, the crops they were made from."""
+"""Side-by-side candidates: pictures from all sides, surface that differs from another candidate, and their source crops."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +31,7 @@ def pieces(depth: float = 1.0) -> TexturedMesh:
 
 
 def with_a_deeper_one(work: Path, name: str = "drawer_1") -> None:
-    """The tiny workspace, with a second candidate that is half as deep again, three times as large and elsewhere."""
+    """The tiny workspace with a second candidate half as deep again, scaled by three, and displaced."""
     finish(work, name)
     second = replace(pieces(1.5), vertices=3.0 * pieces(1.5).vertices + 7.0)
     both: tuple[MeshAsset, ...] = (
@@ -55,8 +55,8 @@ def test_a_deeper_candidate_differs_behind_its_front(compared: tuple[Running, st
     found = web.get(f"/api/projects/{project}/objects/{number}/differences?against=c0")
     (other,) = found["candidates"]
     assert other["candidate"] == "c1"
-    assert other["most"] == pytest.approx(0.2 / 0.9, abs=0.01)  # half as deep again, of the width
-    # its back (0.81 of 3.78) and the last third of its other four sides (2.16) lie off
+    assert other["most"] == pytest.approx(0.2 / 0.9, abs=0.01)  # half as deep again, as a fraction of the width
+    # its back (0.81 of 3.78) and the last third of its other four sides (2.16) differ
     assert other["share"] == pytest.approx((0.81 + 2.16 / 3) / 3.78, abs=0.03)
     assert found["longest_m"] == pytest.approx(0.45)  # at half the size
     assert [(crop["frame"], crop["box"]) for crop in found["crops"]] == [
@@ -70,7 +70,7 @@ def test_the_strip_turns_and_marks_what_differs(compared: tuple[Running, str, in
     assert plain.shape == (TURN_SIZE, TURN_SIZE * TURNS, 4)
     sides = np.split(marked, TURNS, axis=1)
     orange = [float(((side[..., 2] > side[..., 0] + 60.0) & (side[..., 3] > 0)).sum()) for side in sides]
-    assert orange[TURNS // 2] > 2 * orange[0] > 0  # its back is seen, rather than its front
+    assert orange[TURNS // 2] > 2 * orange[0] > 0  # its back is visible instead of its front
     assert not (plain[..., 2] > plain[..., 0] + 60.0).any()
     itself = strip_of(web, f"/media/{project}/candidates/{number}/c0/turns.png?against=c0")
     assert not (itself[..., 2] > itself[..., 0] + 60.0).any()
@@ -88,7 +88,7 @@ def test_a_turned_mesh_stays_in_its_picture() -> None:
     for side in np.split(image, TURNS, axis=1):
         shown = side[..., 3] > 0
         assert shown.any()
-        assert not np.pad(shown[1:-1, 1:-1], 1).sum() < shown.sum()  # none at its border
+        assert not np.pad(shown[1:-1, 1:-1], 1).sum() < shown.sum()  # no pixel at its border
 
 
 def strip_of(web: Running, path: str) -> Any:

@@ -1,4 +1,4 @@
-"""Two names on one panel: a click on one parts the other's front, in what the live segmenter shows as in what a run makes.
+"""Two names on one panel: a click on one cuts the other's front, both in the live segmenter's masks and in a run's.
 
 First the desk on a small scene, then the server with two panels half a frame wide.
 """
@@ -34,7 +34,7 @@ from tests.core.segment.scenes import DOORS, FRONT_Y, click_on, kitchen, prompt
 from tests.waiting import PATIENCE_S, held, until
 
 Lines = list[dict[str, Any]]
-DOOR_M, PAIR_M = 0.5, 1.003  # of one door, and of both with the seam between them
+DOOR_M, PAIR_M = 0.5, 1.003  # width of one door, and of both with the seam between them
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def doors(capture: Capture) -> list[ObjectPrompt]:
 
 @pytest.fixture(scope="module")
 def session(capture: Capture, doors: list[ObjectPrompt], tmp_path_factory: pytest.TempPathFactory) -> GeometricSession:
-    """The two doors are one cell of their run: a seam that nobody saw."""
+    """The two doors are one cell of their run: their seam was not detected."""
     opened = open_session(capture, tmp_path_factory.mktemp("segment"))
     assert isinstance(opened, GeometricSession)
     found = opened.find(doors[0])
@@ -82,7 +82,7 @@ def desk(session: GeometricSession, capture: Capture, said: Lines) -> Iterator[S
 
 
 def told(number: int, door: ObjectPrompt, others: Any = None) -> dict[str, Any]:
-    """The object as the server tells of it; its finished masks, if it has some, were drawn with these clicks on others."""
+    """The object as the server describes it; its finished masks, if any, were computed with these clicks on others."""
     points = [{"frame": click.frame, "x": click.x, "y": click.y, "label": click.label} for click in door.points]
     document = {"name": door.name, "category": door.category, "points": points}
     return {"object": number, "key": f"key-{number}", "prompt": document, "others": others}
@@ -97,7 +97,7 @@ def on(door: ObjectPrompt) -> list[list[float]]:
 
 
 def ended(said: Lines, number: int) -> dict[str, Any]:
-    """What is said at the end of the object's masks, once it is."""
+    """Message at the end of the object's masks, once received."""
     until(lambda: any(line["object"] == number and "end" in line for line in said))
     return [line for line in said if line["object"] == number and "end" in line][-1]
 
@@ -121,11 +121,11 @@ def test_a_click_on_the_same_panel_parts_both_and_taken_back_leaves_it_whole(
     assert (width_m(new), new["others"]) == (pytest.approx(DOOR_M, abs=0.01), on(doors[0]))
     assert [line for line in said if "again" in line] == [{"object": 1, "key": "key-1", "again": [2]}]
     said.clear()
-    desk.put(segment(first, [first, second]))  # as the server answers that
+    desk.put(segment(first, [first, second]))  # as sent by the server on that message
     mended = ended(said, 1)
     assert (width_m(mended), mended["others"]) == (pytest.approx(DOOR_M, abs=0.01), on(doors[1]))
     shown = [line["area"] for line in said if line.get("frame") == 60]
-    assert len(shown) == 1  # its first look is the half already
+    assert len(shown) == 1  # its first mask is already the half
 
     said.clear()
     desk.put({"cmd": "objects", "objects": [first]})
@@ -167,7 +167,7 @@ def test_masks_on_their_way_end_when_they_are_asked_for_anew(
         desk.put(segment(second, [first, second]))
         until(lambda: any(line["object"] == 2 for line in said))
     ended(said, 2)
-    desk.put({"cmd": "cancel", "object": 1})  # says so, if there is anything left to cancel
+    desk.put({"cmd": "cancel", "object": 1})  # reported only if there is anything left to cancel
     desk.put(segment(told(3, doors[1]), None))
     ended(said, 3)
     of_first = [line for line in said if line["object"] == 1]
@@ -176,7 +176,7 @@ def test_masks_on_their_way_end_when_they_are_asked_for_anew(
 
 @pytest.fixture
 def panels(start: Callable[..., Any]) -> Callable[..., Any]:
-    """Start the app on this test's data folder, with a live segmenter that sees two panels in every frame."""
+    """Start the app on this test's data folder, with a live segmenter of two panels in every frame."""
     return partial(start, commands=replace(FAKE_COMMANDS, live=fake("panels")))
 
 
@@ -185,7 +185,7 @@ def clicked(x: float) -> dict[str, Any]:
 
 
 def spans(web: Running, project: str, *objects: int) -> list[tuple[int, int] | None]:
-    """From which column to which each object's mask is on frame 3; None while it has not all its masks."""
+    """Column range of each object's mask on frame 3; None until it has all its masks."""
     shown = {mask["object"]: mask["mask"] for mask in web.get(f"/api/projects/{project}/masks/3")}
     lanes = {lane["object"]: lane for lane in web.get(f"/api/projects/{project}/lanes")}
     done = [number if number in shown and lanes[number]["complete"] else None for number in objects]

@@ -1,4 +1,4 @@
-"""What each object cost each person, as a table."""
+"""Table of each person's effort for each object."""
 
 import csv
 import io
@@ -28,7 +28,7 @@ def test_clicks_verdicts_and_minutes_are_counted_by_person_and_object(web: Runni
     with writing(web.context.engine) as session:
         session.add_all([event("prompts", at, "ann") for at in (1000.0, 1030.0, 1060.0)])
         session.add(event("prompts", 5000.0, "ann"))  # after a pause
-        session.add(event("prompts", 5001.0, "ann", action="import"))  # of a file: no click
+        session.add(event("prompts", 5001.0, "ann", action="import"))  # from a file: not a click
         session.add(event("review", 1010.0, "bea"))
         session.add(event("comments", 1070.0, "bea", None))
     found = {(line["person"], line["object"]): line for line in lines(web, project)}

@@ -23,7 +23,7 @@ DRAWN = {"category": "cabinet", "front": FRONT}
 
 
 def drawn(web: Running, project: str) -> dict[str, Any]:
-    """What the live segmenter drew."""
+    """Planes drawn by the live segmenter."""
     at = f"/api/projects/{project}"
     assert web.get(f"{at}/elevations") == {"drawn": False, "items": []}
     web.post(f"{at}/live/open")
@@ -68,7 +68,7 @@ def test_what_is_drawn_is_changed_undone_and_redone(web: Running) -> None:
     assert web.post(f"{at}/undo", {"object": made["id"]})["object"]["front"]["corners_m"][1][0] == 0.7
     assert web.post(f"{at}/undo", {"object": made["id"]})["object"]["front"]["corners_m"][1][0] == 0.6
     assert web.post(f"{at}/redo", {"object": made["id"]})["object"]["front"]["corners_m"][1][0] == 0.7
-    assert web.patch(here, {"name": "renamed"})["front"]["corners_m"][1][0] == 0.7  # absent is not none
+    assert web.patch(here, {"name": "renamed"})["front"]["corners_m"][1][0] == 0.7  # a missing field is not null
 
 
 def test_a_hinge_computes_no_masks_anew(web: Running) -> None:
@@ -125,7 +125,7 @@ def test_a_handle_outside_its_front_is_refused_and_one_stored_before_is_looked_f
 
 
 def clicked(web: Running) -> tuple[str, ProjectFiles, Path]:
-    """A project whose first object's masks are done, and where they are."""
+    """A project whose first object's masks are done, and their path."""
     project = web.sample()
     at = f"/api/projects/{project}"
     number = web.get(f"{at}/objects")[0]["id"]
@@ -138,7 +138,7 @@ def clicked(web: Running) -> tuple[str, ProjectFiles, Path]:
 
 
 def without_front(path: Path) -> None:
-    """The file as it was written before it said what front was found."""
+    """Rewrite the file as an older version that did not store the front."""
     *lines, end = path.read_text().splitlines()
     older = {key: value for key, value in json.loads(end).items() if key != "front"}
     path.write_text("\n".join([*lines, json.dumps(older)]) + "\n")

@@ -26,7 +26,7 @@ def test_every_endpoint_says_what_is_wrong_in_the_one_shape(web: Running) -> Non
             method, filled, params={"filename": "x.glb"}, json={} if method in ("POST", "PATCH") else None
         )
         assert 400 <= answer.status_code < 500, (method, path, answer.status_code)
-        if method != "HEAD":  # which has no body
+        if method != "HEAD":  # has no body
             assert set(answer.json()) == SHAPE, (method, path)
 
 
@@ -124,15 +124,15 @@ def test_a_database_that_does_not_answer_is_said_wherever_it_is_asked(
     asked = [
         lambda: web.client.get("/api/projects"),
         lambda: web.client.post("/api/projects/sample", json={}),
-        lambda: web.client.post("/api/projects/sample", json={}, headers=marked),  # by what remembers keys
-        lambda: web.client.get("/media/x/thumbnail.jpg"),  # by who looks up whose session it is
+        lambda: web.client.post("/api/projects/sample", json={}, headers=marked),  # raised in the code that stores keys
+        lambda: web.client.get("/media/x/thumbnail.jpg"),  # raised in the session look-up
     ]
     with refusing(web.context.engine, OperationalError("BEGIN", None, found)):
         for ask in asked:
             web.context.people.look_again()
             answer = ask()
             assert (answer.status_code, answer.json()["kind"], set(answer.json())) == (status, kind, SHAPE)
-        assert web.client.get("/static/index.html").status_code == 200  # which is for everybody
+        assert web.client.get("/static/index.html").status_code == 200  # public
     assert web.get("/api/projects") == []
 
 

@@ -1,4 +1,4 @@
-"""Live segmenters at a seat: drawn there, shown where pages are served, ended with whoever wanted them."""
+"""Live segmenters at a seat: masks computed there, shown by the server, and stopped with their users."""
 
 import os
 import threading
@@ -33,7 +33,7 @@ def shared(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[dict[str
 
 @contextmanager
 def live_seat(web: Running, folder: Path) -> Iterator[Callable[[], None]]:
-    """`r2c2r work --live --jobs 0`; what ends it."""
+    """`r2c2r work --live --jobs 0`; yields a function that ends it."""
     stopping, settings = threading.Event(), replace(web.settings, data_dir=folder, heavy_jobs=0)
     folder.mkdir(exist_ok=True)
     thread = threading.Thread(target=work.run_jobs, args=(settings, FAKE_COMMANDS, stopping), kwargs={"live": True})
@@ -51,8 +51,8 @@ def live_seat(web: Running, folder: Path) -> Iterator[Callable[[], None]]:
 
 
 def segmenters() -> list[str]:
-    """The folders that live segmenters of this process work on."""
-    processes = [found.info for found in psutil.process_iter(["ppid", "cmdline"])]  # passes over what ends meanwhile
+    """Folders that live segmenters of this process work on."""
+    processes = [found.info for found in psutil.process_iter(["ppid", "cmdline"])]  # skips processes that end meanwhile
     lines = [found["cmdline"] or [] for found in processes if found["ppid"] == os.getpid()]
     return [line[line.index(FAKE_COMMANDS.live[-1]) + 1] for line in lines if FAKE_COMMANDS.live[-1] in line]
 
@@ -62,7 +62,7 @@ def clicked(web: Running, project: str, click: dict[str, Any] = CLICK) -> Any:
 
 
 def state(web: Running, project: str) -> str:
-    """How far the masks of the last object are."""
+    """State of the last object's masks."""
     return str(web.get(f"/api/projects/{project}/objects")[-1]["segment"])
 
 

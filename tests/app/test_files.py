@@ -1,4 +1,4 @@
-"""Folders that others write to while they are measured and deleted."""
+"""Folders that other processes write to while they are measured and deleted."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""What a browser fetches of our own code, as it crosses the wire, before it shows the first page."""
+"""Compressed size of our own code that a browser loads before it shows the first page."""
 
 import posixpath
 import re

@@ -1,4 +1,4 @@
-"""One person asks for more heavy work than the machine can do: nobody else waits for it, and the server still ends."""
+"""Overload by one person's expensive requests: others are still served, and the server still shuts down."""
 
 import os
 import subprocess
@@ -46,7 +46,7 @@ serve.serve(host="127.0.0.1", port=0, data_dir=data)
 
 def test_a_flood_of_heavy_requests_keeps_nobody_waiting_and_the_server_ends_in_the_midst_of_it(tmp_path: Path) -> None:
     with (
-        ThreadPoolExecutor(2 * CROWD) as crowd,  # left last: what it asks ends with the server
+        ThreadPoolExecutor(2 * CROWD) as crowd,  # closed last: its requests end with the server
         served(tmp_path) as (server, printed),
         browser(printed) as ann,
         browser(printed) as eve,
@@ -60,7 +60,7 @@ def test_a_flood_of_heavy_requests_keeps_nobody_waiting_and_the_server_ends_in_t
         for upload in uploads:
             crowd.submit(answers.ask, ann, f"/api/uploads/{upload}/finish", None)
             crowd.submit(answers.ask, ann, show, {"mode": "cloud", "opacity": 0.321})
-        for path in ("finish", "show"):  # 4 of each are taken on, and never end
+        for path in ("finish", "show"):  # 4 of each are accepted, and never end
             Running.until(lambda path=path: answers.count(path) == CROWD - 4)  # type: ignore[misc]
         assert {status for _, status, _ in answers.all} == {429}
         assert all(int(retry) > 0 for _, _, retry in answers.all)
@@ -69,15 +69,15 @@ def test_a_flood_of_heavy_requests_keeps_nobody_waiting_and_the_server_ends_in_t
             assert ann.get("/api/system").status_code == 200
         assert eve.post("/api/login", json={"name": "eve", "password": PASSWORD}).status_code == 204
         theirs = uploaded(eve, "good.r3d", archive(("frame", b"x")))
-        assert eve.post(f"/api/uploads/{theirs}/finish").status_code == 202  # behind one of Ann's at most
+        assert eve.post(f"/api/uploads/{theirs}/finish").status_code == 202  # queued behind one of Ann's at most
         helpers = helpers_of(server)
-        assert len(helpers) > 1  # a look and the 3D view at least
+        assert len(helpers) > 1  # at least a probe and the 3D view
         server.terminate()
         assert server.wait(timeout=PATIENCE_S) in (0, -15)
         assert psutil.wait_procs(helpers, timeout=PATIENCE_S)[1] == []
     engine = open_engine(tmp_path / "r2c2r.db")
     with reading(engine) as session:
-        assert set(session.exec(select(Upload.id))) == set(uploads)  # that nobody could look at them is not their fault
+        assert set(session.exec(select(Upload.id))) == set(uploads)  # uploads that could not be examined are kept
     engine.dispose()
 
 
@@ -117,13 +117,13 @@ def test_a_gate_does_one_piece_of_each_asker_at_a_time_and_refuses_what_is_beyon
 
 
 class Answers:
-    """(path's last word, status, Retry-After) of answered requests."""
+    """(path's last word, status, Retry-After) of received responses."""
 
     def __init__(self) -> None:
         self.all: list[tuple[str, int, str]] = []
 
     def ask(self, client: httpx.Client, path: str, body: Any) -> None:
-        with suppress(httpx.HTTPError):  # the server ended
+        with suppress(httpx.HTTPError):  # the server has ended
             answer = client.post(path, json=body)
             self.all.append((path.rsplit("/", 1)[1], answer.status_code, answer.headers.get("retry-after", "0")))
 
@@ -145,7 +145,7 @@ def uploaded(client: httpx.Client, name: str, content: bytes) -> str:
 
 @contextmanager
 def served(data: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """A server with stand-ins for its slow parts, where Eve has an account, and the address that it prints."""
+    """A server with stand-ins for its slow parts and an account for Eve; the address that it prints."""
     engine = open_engine(data / "r2c2r.db")
     accounts.add(engine, "eve", "annotator", PASSWORD)
     engine.dispose()
@@ -166,7 +166,7 @@ def served(data: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
 
 
 def helpers_of(server: subprocess.Popen[str]) -> list[psutil.Process]:
-    """The processes that it has started and that run; none of one that has ended."""
+    """Running processes that it started; empty for a server that has ended."""
     try:
         return psutil.Process(server.pid).children(recursive=True)
     except psutil.NoSuchProcess:

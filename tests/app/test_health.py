@@ -1,4 +1,4 @@
-"""What a supervisor asks of a server, without a session."""
+"""Health endpoints for supervisors, without a session."""
 
 import sqlite3
 

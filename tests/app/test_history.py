@@ -1,4 +1,4 @@
-"""What the history keeps: differences, from which every state comes back, also of databases from before it kept those."""
+"""History of differences, from which every state is restored, also for databases from before it stored those."""
 
 import json
 import random
@@ -22,11 +22,11 @@ from tests.app.conftest import Running
 pytestmark = pytest.mark.both_databases
 
 
-OLD = "0010"  # the last revision that kept whole states
+OLD = "0010"  # the last revision that stored whole states
 
 
 class OldHistory:
-    """One object as revision 0010 would have stored what somebody does at random."""
+    """Random edits of one object, as revision 0010 would have stored them."""
 
     def __init__(self, seed: int) -> None:
         self.rng, self.at = random.Random(seed), 0
@@ -37,7 +37,7 @@ class OldHistory:
         self.events: list[tuple[Any, ...]] = []
         self.done: dict[str, list[int]] = {"prompts": [], "review": []}
         self.undone: dict[str, list[int]] = {"prompts": [], "review": []}
-        self.past: dict[str, list[Any]] = {"prompts": [], "review": []}  # the states that undo goes back to
+        self.past: dict[str, list[Any]] = {"prompts": [], "review": []}  # states that undo returns to
 
     def do(self, scope: str) -> None:
         before = json.loads(json.dumps(self.states[scope]))
@@ -112,7 +112,7 @@ EVENT = "id, project_id, object_id, scope, action, text, frame, who, at, before,
 
 
 def old_database(path: Path, seed: int) -> OldHistory:
-    """A database of the old revision, and what was done in it."""
+    """Create a database of the old revision; return the edits stored in it."""
     engine = create_engine(f"sqlite:///{path}")
     migrate(engine, OLD)
     engine.dispose()
@@ -147,7 +147,7 @@ def whole(session: Session, scope: history.Scope) -> Any:
     flat = history.snapshot(session, session.get_one(SceneObject, 1), scope)
     if scope == "prompts":
         points = [{"id": int(key.split()[1]), **value} for key, value in flat.items() if key.startswith("point ")]
-        newer = ("front", "crop", "assignee")  # nobody drew or assigned then
+        newer = ("front", "crop", "assignee")  # fields that did not exist at that revision
         fields = {key: value for key, value in flat.items() if " " not in key and key not in newer}
         return fields | {"points": points}
     corrected = {key.split()[1]: value for key, value in flat.items() if key.startswith("override ")}
@@ -208,7 +208,7 @@ def test_results_that_were_current_stay_so_in_both_directions(tmp_path: Path) ->
             item.category = "oven"
         assert project.inputs != before
         history.undo(session, item, "prompts", who="eve")
-        assert (project.inputs, item.masks_key, item.inputs) == (before, *keys)  # what the migration computed is what is stored
+        assert (project.inputs, item.masks_key, item.inputs) == (before, *keys)  # the migration computes the same keys
         session.rollback()
     engine.dispose()
     go_down(path)
@@ -218,7 +218,7 @@ def test_results_that_were_current_stay_so_in_both_directions(tmp_path: Path) ->
 
 
 def _old_key(click: dict[str, Any]) -> str:
-    """What revision 0010 called everything a person gave."""
+    """The key of all inputs by the rule of revision 0010."""
     prompts = {"version": 1, "objects": [{"name": "drawer_1", "category": "drawer", "points": [click]}]}
     return content_key(prompts, {"version": 1, "objects": {"drawer_1": {"hinge": "left"}}}, "geometric")
 
@@ -233,7 +233,7 @@ def test_the_history_grows_with_what_is_done_and_not_with_what_is_there(web: Run
         clicks = session.exec(select(Event).where(Event.object_id == number, Event.action == "add point")).all()
         sizes = {len(json.dumps([event.before, event.after])) for event in clicks}
     assert len(clicks) == 12
-    assert max(sizes) - min(sizes) <= 4  # digits of the numbers
+    assert max(sizes) - min(sizes) <= 4  # only digits of the numbers differ
 
 
 def test_what_is_undone_is_said_so_until_something_else_is_done(web: Running) -> None:

@@ -1,4 +1,4 @@
-"""Sample kitchens in a person's queue, scored against their truth by admins, told to nobody else."""
+"""Honeypots: sample kitchens in a person's queue, scored against ground truth for admins, and unrecognisable to others."""
 
 import csv
 import io
@@ -17,7 +17,7 @@ __all__ = ["kept"]
 
 
 def write_truth(source: Path) -> None:
-    """A cabinet and an oven that are seen in two frames, and a bottle that hardly is."""
+    """Ground truth with a cabinet and an oven visible in two frames, and a bottle that is hardly visible."""
     objects = []
     for name, category, x, size in (("front_1", "cabinet", 60, 20), ("oven_1", "oven", 120, 20), ("bottle_1", "bottle", 20, 4)):
         objects.append({"name": name, "category": category})
@@ -32,7 +32,7 @@ def write_truth(source: Path) -> None:
 
 @pytest.fixture
 def slipped(kept: Kept) -> str:
-    """A honeypot in Alice's queue."""
+    """Id of a honeypot in Alice's queue."""
     write_truth(kept.web.settings.data_dir / "projects" / kept.project / "source")
     body = {"person": "alice", "name": "Flat 7"}
     answer = kept.of["root"].post(f"/api/projects/{kept.project}/honeypot", json=body)
@@ -60,7 +60,7 @@ def test_admins_alone_are_told_and_slip(kept: Kept, slipped: str) -> None:
         assert kept.of[name].post(f"/api/projects/{kept.project}/honeypot", json=body).status_code == 403
     assert kept.of["root"].get(f"/api/projects/{kept.project}/honeypot").status_code == 404
     copy = kept.of["alice"].post(f"/api/projects/{slipped}/duplicate").json()["id"]
-    assert kept.of["root"].get(f"/api/projects/{copy}/honeypot").status_code == 404  # a copy is none
+    assert kept.of["root"].get(f"/api/projects/{copy}/honeypot").status_code == 404  # a copy is not a honeypot
 
 
 def test_a_sample_that_is_kept_to_an_admin_is_slipped_in_all_the_same(kept: Kept, slipped: str) -> None:
@@ -85,10 +85,10 @@ def test_objects_found_are_scored_by_mask_and_category(kept: Kept, slipped: str)
     at = f"/api/projects/{slipped}"
     blank: dict[str, Any] = kept.of["root"].get(f"{at}/honeypot").json()
     assert [blank[key] for key in ("found", "extra", "mean_iou", "same_category")] == [0, 0, None, 0]
-    assert [one["name"] for one in blank["objects"]] == ["front_1", "oven_1"]  # the bottle is too small to be asked for
+    assert [one["name"] for one in blank["objects"]] == ["front_1", "oven_1"]  # the bottle is too small to be required
 
     paint(kept, slipped, "door_1", "door", 60, 16)
-    click(kept, slipped, "fridge", "refrigerator", 30)  # on nothing of the kind
+    click(kept, slipped, "fridge", "refrigerator", 30)  # not on any such object
     found: dict[str, Any] = kept.of["root"].get(f"{at}/honeypot").json()
     assert [found[key] for key in ("found", "extra", "same_category")] == [1, 1, 1]
     assert found["mean_iou"] == pytest.approx(16 / 20)
@@ -108,7 +108,7 @@ def test_objects_found_are_scored_by_mask_and_category(kept: Kept, slipped: str)
 
 
 def paint(kept: Kept, project: str, name: str, category: str, x: int, width: int) -> None:
-    """An object whose masks in the frames of the truth are the true one, narrower."""
+    """An object whose masks in the truth's frames are the true ones, narrower."""
     click(kept, project, name, category, x)
     item = next(row for row in kept.of["root"].get(f"/api/projects/{project}/objects").json() if row["name"] == name)
     folder = kept.web.settings.data_dir / "projects" / project / "masks" / str(item["id"])

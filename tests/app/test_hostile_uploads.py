@@ -1,4 +1,4 @@
-"""Uploads that mean harm; `benchmarks/hostile_uploads.py` sends a thousand."""
+"""Malicious uploads; `benchmarks/hostile_uploads.py` sends a thousand."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ def test_each_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, monkeypa
 
     kinds = hostile_uploads.KINDS[::every]
     monkeypatch.setattr(hostile_uploads, "KINDS", kinds)
-    count = len(kinds) + 1  # one of each, and the protocol abused
+    count = len(kinds) + 1  # one of each kind, and one misuse of the protocol
     figures = hostile_uploads.send_all(tmp_path, count, seed=1)
     assert len(figures["kinds"]) == count
     assert figures["wrong"] == []

@@ -28,7 +28,7 @@ def test_a_listener_gets_what_it_missed_while_it_is_remembered(monkeypatch: pyte
         assert [(each["seq"], each.get("reset")) for each in told(second, "hello", "object")] == [
             (6, False), (4, None), (5, None), (6, None),
         ]  # fmt: skip
-        assert resets(hub, 2)  # message 3 is forgotten
+        assert resets(hub, 2)  # message 3 is no longer buffered
         assert resets(hub, 5, "another epoch")
         assert not resets(hub, 0, "")
 
@@ -68,7 +68,7 @@ def test_a_tab_that_comes_to_a_project_reads_what_changed_before_it_was_heard_th
     async def scene() -> None:
         hub = Hub()
         listener = hub.join(None, None, None)
-        hub.publish("project", "kitchen")  # after the tab has read it, before its word of where it is
+        hub.publish("project", "kitchen")  # after the tab has loaded it, before it reports its page
         hub.move(listener, "kitchen", "overview", None)
         hub.move(listener, "kitchen", "overview", 1)
         await asyncio.sleep(0)
@@ -141,7 +141,7 @@ def test_everybody_at_a_project_knows_who_else_is_there_and_on_what() -> None:
         hub.publish("object", "kitchen")
         again = hub.join("kitchen", 0, hub.epoch, "eve")
         await here(ann)
-        assert [each["type"] for each in told(again)] == ["hello", "object", "presence"]  # of presence only what is now
+        assert [each["type"] for each in told(again)] == ["hello", "object", "presence"]  # of presence only the current state
 
     asyncio.run(scene())
 
@@ -171,7 +171,7 @@ def test_an_older_state_that_comes_late_is_not_told() -> None:
 
 
 def told(listener: Listener, *types: str) -> list[dict[str, Any]]:
-    """The messages that wait for a tab, of these types or all."""
+    """The messages queued for a tab, of these types or all."""
     found = [json.loads(listener.queue.get_nowait()) for _ in range(listener.queue.qsize())]
     return [each for each in found if not types or each["type"] in types]
 
@@ -181,7 +181,7 @@ def resets(hub: Hub, since: int, epoch: str | None = None) -> bool:
 
 
 async def here(listener: Listener) -> set[tuple[str, str, int | None]]:
-    """Who is here by the next message that says so."""
+    """The people present, from the next presence message."""
     while True:
         message = json.loads(await listener.next())
         if message["type"] == "presence":

@@ -1,4 +1,4 @@
-"""Who asks as a trusted proxy says it: believed of it alone, and given an account at first sight."""
+"""Identity from a trusted proxy: accepted from that proxy only, with an account created on first use."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -34,13 +34,13 @@ def web(start: Callable[..., Any]) -> Iterator[Running]:
 
 
 def by(web: Running, peer: str, named: str = "", **headers: str) -> TestClient:
-    """A browser whose requests come from that address, and say so of who asks."""
+    """A client whose requests come from that address and carry that name."""
     given = {"X-Requested-With": "tests", **headers, **({"X-Forwarded-User": named} if named else {})}
     return TestClient(web.app, base_url=ORIGIN, headers=given, client=(peer, 50000), raise_server_exceptions=False)
 
 
 def record(web: Running) -> list[schemas.AuditEntry]:
-    """Without the browser that `running` opens the printed address with."""
+    """The audit without the entry of the browser that `running` signs in."""
     return [line for line in audit.entries(web.context.engine, None, 200).entries if line.client != "testclient"]
 
 
@@ -57,7 +57,7 @@ def test_who_a_trusted_proxy_names_is_in_at_first_sight_with_the_default_role(we
 
 def test_requests_that_come_together_make_one_person_and_one_session(web: Running) -> None:
     ann = by(web, PROXY, "ann")
-    with ThreadPoolExecutor(LOOK_UPS) as crowd:  # each has a loop of its own here: no look-up may wait for another
+    with ThreadPoolExecutor(LOOK_UPS) as crowd:  # each has its own event loop here: no look-up may wait for another
         assert {answer.status_code for answer in crowd.map(lambda _: ann.get("/api/projects"), range(24))} == {200}
     assert [line.action for line in record(web)] == ["signed in", "added"]
 

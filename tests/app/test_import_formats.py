@@ -1,4 +1,4 @@
-"""Every recording format goes through the app, zipped as an upload and as a folder on this machine."""
+"""Every recording format imported by the app, zipped as an upload and as a folder on this machine."""
 
 import json
 from collections.abc import Callable

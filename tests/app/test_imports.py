@@ -155,9 +155,9 @@ def test_of_an_upload_that_shows_late_that_it_cannot_be_read_only_the_reason_and
     project = upload(web, R3D, "broken.r3d")
     web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] == "failed")
     log = web.settings.data_dir / "projects" / project["id"] / "logs" / f"job-{project['job']['id']}.log"
-    kept = {path for path in left_behind(web) if path.is_file()} - {log.parent.parent / "project.json"}  # what the folder is
+    kept = {path for path in left_behind(web) if path.is_file()} - {log.parent.parent / "project.json"}  # describes the folder
     assert kept == {log}
-    told = web.get(f"/api/jobs/{project['job']['id']}")["no_retry"]  # before anybody asks for it
+    told = web.get(f"/api/jobs/{project['job']['id']}")["no_retry"]  # before it is requested
     assert ("refused" in told, web.post(f"/api/jobs/{project['job']['id']}/retry", status=409)["message"]) == (True, told)
     web.delete(f"/api/projects/{project['id']}")
     web.delete(f"/api/trash/{project['id']}")
@@ -203,11 +203,11 @@ def test_a_sample_comes_with_its_clicks(web: Running) -> None:
 
 
 def break_off(web: Running, method: str, path: str, content: bytes, query: str = "", headers: Any = None) -> list[Any]:
-    """Send a request whose sender leaves after `content`; what the app answered."""
+    """Send a request whose client disconnects after `content`; return the app's responses."""
     told = [{"type": "http.request", "body": content, "more_body": True}, {"type": "http.disconnect"}]
     said: list[Any] = []
     sent = {
-        "host": "127.0.0.1:8000",  # the session's cookie is named after its port
+        "host": "127.0.0.1:8000",  # the session cookie's name contains its port
         "cookie": f"{COOKIE}={web.client.cookies[COOKIE]}",
         "x-requested-with": "tests",
         **(headers or {}),

@@ -1,4 +1,4 @@
-"""Work of several: whose turn a project is, what waits for whom, and what the others did meanwhile."""
+"""Collaboration: assignment of projects, each person's inbox, and changes by others since the last visit."""
 
 import pytest
 
@@ -60,7 +60,7 @@ def test_what_is_sent_back_waits_for_its_assignee_else_for_who_had_sent_it(kept:
     kept.of["bob"].put(f"{at}/assignee", json={"name": "carol"})
     assert of(kept, "alice")["returned"] == []
     assert [row["id"] for row in of(kept, "carol")["returned"]] == [kept.project]
-    assert of(kept, "carol")["assigned"] == []  # it is in one of the lists
+    assert of(kept, "carol")["assigned"] == []  # each project is in one list only
     kept.of["bob"].patch(at, json={"archived": True})
     assert of(kept, "carol")["returned"] == []
 
@@ -68,7 +68,7 @@ def test_what_is_sent_back_waits_for_its_assignee_else_for_who_had_sent_it(kept:
 def test_a_comment_waits_for_whom_it_names_until_it_is_resolved(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}/comments"
     number = kept.of["alice"].post(at, json={"text": "is this a door, @bob?"}).json()["id"]
-    kept.of["bob"].post(at, json={"text": "yes, says @bob; not @bobby"})  # of his own
+    kept.of["bob"].post(at, json={"text": "yes, says @bob; not @bobby"})  # Bob's own comment
     (row,) = of(kept, "bob")["mentions"]
     assert row["comment"]["text"] == "is this a door, @bob?"  # type: ignore[index]
     assert of(kept, "alice")["mentions"] == []
@@ -89,7 +89,7 @@ def test_news_are_what_others_did_since_one_read_them_or_did_something(kept: Kep
     told = carol.get(f"{at}/news").json()
     assert [entry["text"] for entry in told["entries"]] == ["commented: three", "commented: two", "commented: one"]
     assert told["people"] == [{"who": "bob", "changes": 2}, {"who": "alice", "changes": 1}]
-    assert carol.get(f"{at}/news").json() == told  # looking again loses nothing
+    assert carol.get(f"{at}/news").json() == told  # reading it again removes nothing
     assert carol.put(f"{at}/news", json={"event": told["last"]}).json()["entries"] == []
     assert [entry["text"] for entry in kept.of["alice"].get(f"{at}/news").json()["entries"]] == [
         "commented: three",
@@ -128,7 +128,7 @@ def test_an_object_waits_for_whom_it_is_assigned_to_as_long_as_its_project_is_in
     assert (row["object"], row["name"], row["category"]) == (first["id"], "drawer_1", "drawer")
     assert (row["project"], row["project_name"]) == (kept.project, kept.of["bob"].get(at).json()["name"])
     assert of(kept, "alice")["objects"] == []
-    assert kept.of["alice"].get(f"{at}/figures").json()["clicks"] == 0  # nobody clicked
+    assert kept.of["alice"].get(f"{at}/figures").json()["clicks"] == 0  # assigning is not a click
     refused = kept.of["alice"].patch(f"{at}/objects/{second['id']}", json={"assignee": "nobody-here"})
     assert (refused.status_code, refused.json()["message"]) == (422, "nobody called nobody-here sees this project")
 
@@ -138,9 +138,9 @@ def test_an_object_waits_for_whom_it_is_assigned_to_as_long_as_its_project_is_in
     kept.of["bob"].post(f"{at}/redo", json={"object": first["id"]})
     assert len(of(kept, "bob")["objects"]) == 1
     renamed = kept.of["bob"].patch(f"{at}/objects/{first['id']}", json={"name": "top_drawer"}).json()
-    assert renamed["assignee"] == "bob"  # what is not said stays
+    assert renamed["assignee"] == "bob"  # omitted fields are unchanged
     kept.keep_to()
-    assert of(kept, "bob")["objects"] == []  # who does not see the project is told nothing of it
+    assert of(kept, "bob")["objects"] == []  # people without access to the project get no entry
     kept.keep_to("bob")
     kept.of["alice"].delete(f"{at}/objects/{first['id']}")
     assert of(kept, "bob")["objects"] == []
@@ -174,7 +174,7 @@ def test_a_folder_keeps_whose_turn_an_object_is_and_a_copy_is_nobodys(kept: Kept
         row = project_row(session, kept.project)
         description = describe(session, row, context.files(row))
     kept.of["alice"].patch(f"{at}/objects/{number}", json={"assignee": None})
-    description.objects[1].assignee = "stranger"  # of another server
+    description.objects[1].assignee = "stranger"  # an account of another server
     with writing(context.engine) as session:
         adopting.adopt(session, context.settings.data_dir, description, "root")
     assert [item["assignee"] for item in kept.of["alice"].get(f"{at}/objects").json()] == ["bob", None]

@@ -25,7 +25,7 @@ from tests.forked import Forked
 from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.both_databases
-about_workers = pytest.mark.both_databases(quick=False)  # rather than rows: which database it is matters little
+about_workers = pytest.mark.both_databases(quick=False)  # about workers, not rows: the kind of database hardly matters
 
 STAGES = ["segment", "generate", "align", "synthesize", "warp", "export"]
 
@@ -41,7 +41,7 @@ def run(web: Running, project: str) -> int:
 
 
 def request_of(web: Running, project: str, job: int) -> Path:
-    """The folder of what the job was given."""
+    """Folder of the job's request files."""
     return web.settings.data_dir / "projects" / project / "requests" / str(job)
 
 
@@ -186,7 +186,7 @@ def test_an_import_does_not_wait_for_a_run(web: Running) -> None:
     run(web, first)
     web.until(lambda: (folder / "hanging").exists())
     waiting = run(web, second)
-    imported = web.sample()  # is ready while one run is at work and another waits
+    imported = web.sample()  # ready while one run is running and another is queued
     assert web.get(f"/api/projects/{imported}")["status"] == "ready"
     assert web.get(f"/api/jobs/{waiting}")["position"] == 1
 
@@ -364,7 +364,7 @@ def test_a_server_killed_outright_loses_no_click_and_the_next_one_goes_on(start:
         (job,) = session.exec(select(Job).where(Job.kind == "run"))
         was, worker = job.state, job.worker_pid
         assert worker is not None
-        job.heartbeat = 0.0  # long ago: where servers share the database, that is what tells
+        job.heartbeat = 0.0  # expired: servers that share a database rely on the heartbeat
         session.add(job)
     engine.dispose()
     (folder / "behave.json").unlink()

@@ -1,4 +1,4 @@
-"""Projects are tagged, archived, duplicated, and wait in a trash before anything of them is deleted."""
+"""Tags, archive and duplicates of projects, and the trash before deletion."""
 
 import json
 from pathlib import Path

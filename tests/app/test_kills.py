@@ -11,7 +11,7 @@ BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
 
 
 class Begun(Forked):
-    """As much of `subprocess.Popen` as who kills it asks for."""
+    """The part of `subprocess.Popen` that the code which kills it uses."""
 
     def poll(self) -> int | None:
         return self.process.exitcode

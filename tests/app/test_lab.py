@@ -1,4 +1,4 @@
-"""docs/lab.md as it reads: its commands in their order, in one shell, with a Postgres, a store, a provider and a proxy here."""
+"""Commands of docs/lab.md, run in order in one shell, with a local Postgres, store, provider and proxy."""
 
 import os
 import re
@@ -24,7 +24,7 @@ from tests.waiting import PATIENCE_S
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "lab.md"
 
-# What a terminal of one's own would do otherwise: servers run on while the next line is typed, and end with Ctrl-C
+# In place of separate terminals: servers keep running while the next line is typed, and end with Ctrl-C
 SHELL = """
 ended() { if [ -n "${!1:-}" ]; then kill "${!1}" && wait "${!1}" || true; fi; }
 trap 'ended serving; ended seat; ended proxy' EXIT
@@ -48,7 +48,7 @@ caddy() {
 
 
 def lines() -> list[str]:
-    """Every line of every block, as somebody would type them."""
+    """Every line of every block, as a person would type them."""
     return [line for block in re.findall(r"^```bash\n(.*?)^```$", PAGE.read_text(), re.M | re.S) for line in block.splitlines()]
 
 
@@ -67,7 +67,7 @@ def test_every_line_of_the_page_does_what_it_says(
     postgres_server: PostgresServer,
     tmp_path: Path,
 ) -> None:
-    proxy = shutil.which("caddy")  # without it the server itself is asked: one line less is run
+    proxy = shutil.which("caddy")  # without it the server is addressed directly, and one line less is run
     port, tls_port, folder = free_port(), free_port(), tmp_path / "proxy"
     folder.mkdir()
     if proxy is not None:

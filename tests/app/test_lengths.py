@@ -1,4 +1,4 @@
-"""True lengths: kept beside what the scan says, and the scale that follows, with which the recording is read again."""
+"""True lengths: stored beside the measured ones, with a resulting scale for reading the recording again."""
 
 import json
 

@@ -14,7 +14,7 @@ from app.services import masks, prompts
 from tests.app.conftest import ORIGIN, SOCKETS, Running
 
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
-HELD = {**CLICK, "x": 156.5}  # gets one frame and no further: tests/app/fakes/live.py
+HELD = {**CLICK, "x": 156.5}  # yields one frame and then blocks: tests/app/fakes/live.py
 
 
 @contextmanager
@@ -36,7 +36,7 @@ def until(socket: Any, **wanted: Any) -> tuple[list[dict[str, Any]], dict[str, A
 
 
 def decoded(mask: dict[str, Any]) -> np.ndarray:
-    """As the browser does it."""
+    """A mask decoded as in the browser."""
     bits = np.unpackbits(np.frombuffer(zlib.decompress(base64.b64decode(mask["bits"])), np.uint8))
     shape = (mask["box_height"], mask["box_width"])
     return bits[: shape[0] * shape[1]].reshape(shape).astype(bool)
@@ -55,7 +55,7 @@ def test_a_click_brings_its_masks_the_clicked_frame_first_and_they_stay(start: C
             assert decoded(masks[0]["mask"]).sum() == 100
             assert any(m["type"] == "segment" and m["restart"] for m in seen)
             until(socket, type="object")
-    with start() as web:  # kept on disk
+    with start() as web:  # stored on disk
         (lane,) = [lane for lane in web.get(f"/api/projects/{project}/lanes") if lane["object"] == made["id"]]
         assert (lane["frames"], lane["complete"], lane["source"]) == ([0, 3, 7], True, "live")
         (shown,) = [m for m in web.get(f"/api/projects/{project}/masks/7") if m["object"] == made["id"]]
@@ -70,7 +70,7 @@ def test_the_end_of_masks_is_told_last_however_the_threads_meet(web: Running, mo
         if shape.segment == "done":
             ended.set()
         elif shape.points:
-            ended.wait(0.5)  # what was read before the end is told after it, if it can be
+            ended.wait(0.5)  # masks computed before the end are delivered after it, if possible
         return prompts_tell(context, shape)
 
     monkeypatch.setattr(prompts, "_tell", tell_late)
@@ -169,7 +169,7 @@ def test_an_idle_segmenter_is_stopped_and_comes_back(start: Callable[..., Any], 
         web.post(f"/api/projects/{project}/live/open")
         web.until(lambda: web.get(f"/api/projects/{project}/proposals")["state"] == "done")
         assert web.get(f"/api/projects/{project}/live")["state"] == "ready"
-        web.context.live._sessions[project].used -= web.settings.live_idle_s  # as if so long had passed
+        web.context.live._sessions[project].used -= web.settings.live_idle_s  # as if idle for that long
         web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "off")
         web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
         web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
@@ -200,7 +200,7 @@ def test_clicks_that_came_with_a_recording_get_their_masks_when_it_is_opened(web
     with listening(web, project) as socket:
         socket.receive_json()
         web.post(f"/api/projects/{project}/live/open")
-        told: set[int] = set()  # every tab shows that they come
+        told: set[int] = set()  # every tab is notified of them
         while told != {item["id"] for item in items}:
             told.add(until(socket, type="object")[1]["object"]["id"])
     web.until(lambda: {item["segment"] for item in web.get(f"/api/projects/{project}/objects")} == {"done"})
@@ -235,7 +235,7 @@ def test_one_recording_is_prepared_at_a_time(start: Callable[..., Any]) -> None:
 
 
 def unclick(web: Running, project: str) -> None:
-    """Delete the objects that came with a sample: nobody waits for their masks."""
+    """Delete the sample's own objects, so that no masks are computed for them."""
     for item in web.get(f"/api/projects/{project}/objects"):
         web.delete(f"/api/projects/{project}/objects/{item['id']}")
 

@@ -1,4 +1,4 @@
-"""The desk of the live segmenter: who is answered when. Its session is a fake whose pace the test sets."""
+"""Scheduling of the live segmenter's desk, with a fake session whose pace the test controls."""
 
 import json
 import threading
@@ -26,7 +26,7 @@ def mask(size: int) -> PackedMask:
 
 
 class Session:
-    """Four frames; the area of an object's masks is the x of its last click. The gate holds its stream up."""
+    """Session of four frames; the area of an object's masks is the x of its last click. The gate blocks its stream."""
 
     def __init__(self) -> None:
         self.gate = threading.Event()
@@ -155,7 +155,7 @@ def test_one_whose_masks_or_front_cannot_be_shown_fails_alone(
 def test_a_first_look_that_cannot_be_shown_fails_its_object_alone(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.session.gate.set()
     desk.start()
-    broken = SimpleNamespace(area_px=1, width=80, height=60)  # no bits in it
+    broken = SimpleNamespace(area_px=1, width=80, height=60)  # lacks its bits
     look = desk.session.glimpse
     desk.session.glimpse = lambda prompt: (0, broken, 0.5)
     desk.put(click(1, 20.0))

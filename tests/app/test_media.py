@@ -20,7 +20,7 @@ def test_a_frame_comes_at_its_stored_bytes_or_at_a_kept_width(web: Running) -> N
     project = web.sample()
     stored = web.settings.data_dir / "projects" / project / "work" / "capture" / "rgb" / "000003.jpg"
     assert web.client.get(f"/media/{project}/frames/3.jpg").content == stored.read_bytes()
-    assert web.client.get(f"/media/{project}/frames/3.jpg?w=960").content == stored.read_bytes()  # never enlarged
+    assert web.client.get(f"/media/{project}/frames/3.jpg?w=960").content == stored.read_bytes()  # images are never enlarged
     previews = web.settings.data_dir / "projects" / project / "previews"
     assert not previews.exists()
     assert web.client.get(f"/media/{project}/thumbnail.jpg").status_code == 200
@@ -41,7 +41,7 @@ def test_depth_is_a_coloured_picture(web: Running) -> None:
 
 def test_the_scan_drawn_when_it_was_read_is_sent(web: Running) -> None:
     project = web.sample()
-    assert web.client.get(f"/media/{project}/scan/plan.png").json()["kind"] == "not-found"  # a project from before
+    assert web.client.get(f"/media/{project}/scan/plan.png").json()["kind"] == "not-found"  # an older version's project
     drawn = web.settings.data_dir / "projects" / project / "scan-plan.png"
     drawn.write_bytes(b"\x89PNG drawn")
     answer = web.client.get(f"/media/{project}/scan/plan.png?v=1")
@@ -66,7 +66,7 @@ def test_the_report_may_not_run_anything(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     policy = web.client.get(f"/media/{project}/report.html").headers["content-security-policy"]
-    assert policy.startswith("sandbox allow-same-origin; default-src 'none'")  # whose cookie brings its pictures
+    assert policy.startswith("sandbox allow-same-origin; default-src 'none'")  # for the cookie that loads its pictures
     assert "script" not in policy
 
 
@@ -89,6 +89,6 @@ def test_chosen_formats_are_a_download_of_their_own_that_can_go_on(web: Running)
     assert (tail.status_code, tail.content) == (206, part.content[20:])
     assert "glb, mjcf, ros, sdf, urdf, usd" in web.get(f"/media/{project}/bundles/1.zip?formats=exe", 422)["hint"]
     offered = [(entry["name"], entry["file"]) for entry in web.get("/api/system")["formats"]]
-    assert offered == [(entry.name, entry.file) for entry in FORMATS]  # the core's table is the only one
+    assert offered == [(entry.name, entry.file) for entry in FORMATS]  # only the core's table defines formats
     assert web.get(f"/api/projects/{project}/bundles/1/changes?since=1") == []
     web.get(f"/api/projects/{project}/bundles/1/changes?since=7", 404)

@@ -1,4 +1,4 @@
-"""A mesh that a person made: taken whole or not at all."""
+"""Upload of a person's own mesh: accepted completely or not at all."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -48,7 +48,7 @@ def test_it_is_kept_under_a_name_of_its_own(shared: Reviewed) -> None:
         send(web, address(project, number), b"glTF", 201, "../../m%C3%BCg.glb")["group"]["override"]["candidate"] for _ in "ab"
     ]
     kept = set(left_behind(web, project)) - set(before)
-    assert sorted(path.name for path in kept) == sorted(set(names))  # the answer says the name alone
+    assert sorted(path.name for path in kept) == sorted(set(names))  # the response contains only the file name
     for path in kept:
         assert path.is_relative_to(web.settings.data_dir / "projects" / project / "uploads")
 
@@ -73,7 +73,7 @@ def test_it_is_looked_at_before_it_is_used_and_not_kept(shared: Reviewed) -> Non
     ("name", "content", "words"),
     [
         ("x.exe", b"MZ", "not a mesh"),
-        ("x.gltf", b"{}", "not a mesh"),  # its other files could not come with it
+        ("x.gltf", b"{}", "not a mesh"),  # its other files are not uploaded with it
         ("x.glb", b"", "empty"),
         ("x.glb", b"unreadable", "x.glb: no triangles found"),
     ],
@@ -110,7 +110,7 @@ def test_one_that_somebody_overtook_is_refused_and_leaves_nothing(shared: Review
     look = mesh_uploads.probing.look_at
 
     def meanwhile(*given: Any) -> Any:
-        """Somebody else corrects the object while the mesh is looked at."""
+        """Another person's correction of the object while the mesh is examined."""
         seen = look(*given)
         web.patch(f"{at}/override", {"hinge": "left", "rerun": False})
         return seen
@@ -120,7 +120,7 @@ def test_one_that_somebody_overtook_is_refused_and_leaves_nothing(shared: Review
         late = send(web, f"{at}/candidates", b"glTF", 409, version=seen)
     assert late["current"]["override"]["hinge"] == "left"
     assert left_behind(web, project) == before
-    assert send(web, f"{at}/candidates", b"glTF", 409, version=seen)["kind"] == "conflict"  # known before it is sent
+    assert send(web, f"{at}/candidates", b"glTF", 409, version=seen)["kind"] == "conflict"  # detected before the upload
     assert left_behind(web, project) == before
     now = web.get(f"{at}/candidates")["version"]
     assert send(web, f"{at}/candidates", b"glTF", 201, version=now)["group"]["version"] > now

@@ -13,7 +13,7 @@ SIZES = np.array([0.9, 0.5, 0.6])
 
 
 def cupboard() -> TexturedMesh:
-    """A box whose front (-Y) is red, top blue, the rest grey; every face has corners of its own."""
+    """A box whose front (-Y) is red, top blue, the rest grey; no vertices are shared between faces."""
     triangles = BOX[FACES] * SIZES
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     texture = np.full((3, 3, 3), 128, np.uint8)
@@ -31,7 +31,7 @@ def test_a_candidate_is_turned_until_it_looks_like_the_one_that_was_placed(seed:
     turned = replace(model, vertices=2.5 * model.vertices @ unknown.T + rng.normal(size=3))
     found = turned_like(turned, model) @ unknown
     angle = np.degrees(Rotation.from_matrix(found).magnitude())
-    assert angle < 1.0  # degrees: a box is exact, only sampling is not
+    assert angle < 1.0  # degrees: the box is exact, the error is from sampling
 
 
 def test_the_picture_shows_the_front_from_its_side() -> None:

@@ -1,4 +1,4 @@
-"""What Prometheus reads, and what the log says: requests by route, stages by outcome, the queue; ids that join the lines."""
+"""Prometheus metrics and log lines: requests by route, stages by outcome, the queue, and ids that correlate the lines."""
 
 import json
 import logging
@@ -15,7 +15,7 @@ from tests.app.test_jobs import behave, run
 
 
 def samples(web: Running) -> dict[str, float]:
-    """Every line of /metrics, checked against the text format."""
+    """Every sample of /metrics, checked against the text format."""
     answer = web.client.get("/metrics")
     assert answer.headers["content-type"].startswith("text/plain; version=0.0.4")
     found = {}
@@ -75,7 +75,7 @@ def test_a_bucket_counts_what_takes_at_most_as_long() -> None:
 
 
 class Lines(logging.Handler):
-    """What is logged, as the server would write it."""
+    """Log handler that stores lines as the server would write them."""
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)

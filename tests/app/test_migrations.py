@@ -23,7 +23,7 @@ def test_an_empty_file_becomes_what_tables_py_says(tmp_path: Path) -> None:
 
 def test_migrations_can_go_down_and_up_again(tmp_path: Path) -> None:
     engine = open_engine(tmp_path / "round.db")
-    migrate(engine)  # twice is once
+    migrate(engine)  # a repeated migration does nothing
     engine.dispose()
     assert {"projects", "objects", "events", "jobs"} <= _tables(tmp_path / "round.db")
 
@@ -35,7 +35,7 @@ def test_no_migration_deletes_what_refers_to_a_table_it_makes_anew(tmp_path: Pat
     engine.dispose()
     with closing(sqlite3.connect(path)) as connection, connection:
         before = {table: _filled(connection, table) for table in FIRST_TABLES}
-    open_engine(path).dispose()  # foreign keys are followed by its connections
+    open_engine(path).dispose()  # connections of this engine enforce foreign keys
     with closing(sqlite3.connect(path)) as connection:
         after = {table: connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0] for table in before}
     assert before == after == dict.fromkeys(before, 1)
@@ -56,7 +56,7 @@ def test_the_migrations_travel_with_the_app() -> None:
 
 
 def _filled(connection: sqlite3.Connection, table: str) -> int:
-    """A row in the table, with something in every column that wants it, referring to the first of every other."""
+    """Insert a row with a value in every required column and references to the first row of other tables."""
     columns = connection.execute(f"PRAGMA table_info({table})").fetchall()
     referring = {row[3] for row in connection.execute(f"PRAGMA foreign_key_list({table})")}
     values: dict[str, object] = {}

@@ -1,4 +1,4 @@
-"""Two machines whose data folders are caches of one store: what one keeps the other fetches, whatever the store is."""
+"""Two machines whose data folders mirror one store: files stored by one are fetched by the other, for any kind of store."""
 
 import os
 import threading
@@ -119,7 +119,7 @@ def test_who_lost_a_job_keeps_nothing_it_made_and_still_what_pages_wrote(objects
     here.hold("p", "first")
     write(tmp_path / "a", "work/nouns/old.noun", "kept in time")
     here.keep("p")
-    there.hold("p", "second")  # the first was silent for long
+    there.hold("p", "second")  # the first has been silent for too long
     there.fetch("p")
     write(tmp_path / "b", "work/nouns/x.noun", "by the second")
     there.keep("p")
@@ -181,7 +181,7 @@ def test_room_is_made_by_what_the_store_holds_and_not_by_what_is_in_use(
     cache.keep("p")
     cache.fetch("p")
     cache.tidy(frozenset())
-    assert read_all(tmp_path / "a") == {"work/x": "four"}  # a page may be reading
+    assert read_all(tmp_path / "a") == {"work/x": "four"}  # a page may be reading it
     monkeypatch.setattr("app.store.mirror.UNUSED_S", -1.0)
     cache.tidy(frozenset({"p"}))
     assert read_all(tmp_path / "a") == {"work/x": "four"}
@@ -219,7 +219,7 @@ def test_a_browser_takes_a_kept_file_from_the_store_under_its_name(
         monkeypatch.setenv(name, value)
     mirror = Mirror(open_objects(f"s3://{BUCKET}/{tmp_path.name}"), tmp_path / "a")
     bundle = write(tmp_path / "a", "bundles/v1.zip", "bundle")
-    assert mirror.link("p", bundle, "Kitchen-v1.zip") is None  # not kept yet
+    assert mirror.link("p", bundle, "Kitchen-v1.zip") is None  # not stored yet
     mirror.keep("p")
     link = mirror.link("p", bundle, "Kitchen-v1.zip")
     assert link is not None

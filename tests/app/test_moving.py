@@ -1,4 +1,4 @@
-"""Rows carried from a file to a Postgres and back: the same rows, and nothing that is there is written over."""
+"""Transfer of rows from a SQLite file to Postgres and back: equal rows, and existing ones are never overwritten."""
 
 import sqlite3
 from pathlib import Path
@@ -19,7 +19,7 @@ from tests.app.test_jobs import run
 
 @pytest.fixture
 def worked_on(tmp_path: Path) -> Path:
-    """A data folder at rest with clicks, a comment that was deleted, and a finished run."""
+    """A data folder at rest with clicks, a deleted comment, and a finished run."""
     data = tmp_path / "data"
     with running(data) as web:
         project = web.sample()
@@ -41,7 +41,7 @@ def test_rows_move_to_a_postgres_and_back_and_are_the_same(
     before = moving.check(worked_on)
     assert {held.table for held in before if held.rows} >= {"projects", "objects", "prompt_points", "jobs", "bundles", "events"}
     assert moving.move(str(worked_on / "r2c2r.db"), address) == before
-    with opened(address) as engine, writing(engine) as session:  # no number is given twice
+    with opened(address) as engine, writing(engine) as session:  # ids are not reused
         comment = Comment(project_id=session.exec(select(Project.id)).one(), text="new", who="ann", at=1.0)
         session.add(comment)
         session.flush()
@@ -55,7 +55,7 @@ def test_rows_move_to_a_postgres_and_back_and_are_the_same(
                 == web.client.get(f"/api/projects/{project}/{at}").json()
             )
     held = moving.move(address, str(back))
-    same = {"sign_ins", "launch_keys", "audit"}  # the browsers above were let in
+    same = {"sign_ins", "launch_keys", "audit"}  # differ, as the browsers above signed in
     assert [each for each in held if each.table not in same] == [each for each in before if each.table not in same]
     with sqlite3.connect(back) as connection:
         assert connection.execute("SELECT seq FROM sqlite_sequence WHERE name='comments'").fetchone() == (3,)
@@ -115,12 +115,12 @@ def test_a_backup_of_a_postgres_is_restored_into_an_empty_one(
     before = moving.move(str(worked_on / "r2c2r.db"), first)
     monkeypatch.setenv("R2C2R_DATABASE", first)
     assert main(["db", "backup", str(worked_on), "-o", str(kept)]) == 0
-    assert main(["db", "backup", str(worked_on), "-o", str(kept)]) != 0  # nothing is written over
+    assert main(["db", "backup", str(worked_on), "-o", str(kept)]) != 0  # existing files are not overwritten
     monkeypatch.setenv("R2C2R_DATABASE", second)
     assert main(["db", "restore", str(kept), str(worked_on)]) == 0
     assert main(["restore", str(kept), str(worked_on)]) != 0
     assert "r2c2r db restore" in capsys.readouterr().err
-    assert main(["check-data", str(worked_on)]) == 2  # the file that is still there is of before
+    assert main(["check-data", str(worked_on)]) == 2  # the remaining file is outdated
     assert "r2c2r db check" in capsys.readouterr().err
     assert moving.check(worked_on) == before
     assert main(["db", "check", str(worked_on)]) == 0

@@ -1,4 +1,4 @@
-"""The node's side of a step, without Ray: fetched, started, heard, kept; and the process group that ends with who began it."""
+"""Node side of a step, without Ray: fetch, start, progress, storing; and the process group that ends with its starter."""
 
 import subprocess
 import sys
@@ -30,7 +30,7 @@ WAITS = 'import time; print(\'{"stage": "segment"}\', flush=True); time.sleep(60
 
 @pytest.fixture
 def order(tmp_path: Path) -> Order:
-    """Of a project that the store has."""
+    """An order for a project that is in the store."""
     if not REQUIRED:
         pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
     data, store = tmp_path / "web", f"file://{tmp_path / 'store'}"

@@ -1,4 +1,4 @@
-"""Signing in at an OpenID provider, by a real one on this machine: whom it names is in, and nobody else."""
+"""Sign-in at a real local OpenID provider: only people it authenticates are admitted."""
 
 import os
 import subprocess
@@ -24,7 +24,7 @@ from tests.waiting import PATIENCE_S
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
 if not REQUIRED:
     for name in ("authlib", "oidc_provider_mock"):
-        if find_spec(name) is None:  # imported, the second warns
+        if find_spec(name) is None:  # importing the second one emits a warning
             pytest.skip(f"no {name}: pip install --group dev", allow_module_level=True)
 
 ROLES = "lab-admins=admin,cn=reviewers=reviewer,lab=annotator"
@@ -32,7 +32,7 @@ ANN = {"preferred_username": "Ann", "groups": ["lab", "lab-admins", "choir"]}
 
 
 class Identities:
-    """The provider, and what it knows of people."""
+    """The provider, and its users."""
 
     def __init__(self, port: int) -> None:
         self.issuer = f"http://127.0.0.1:{port}"
@@ -42,11 +42,11 @@ class Identities:
         assert self.client.put(f"/users/{subject}", json=claims).status_code == 204
 
     def bend(self, **claims: Any) -> None:
-        """Have it say something else in its tokens."""
+        """Falsify claims in its tokens."""
         assert self.client.put("/bend", json=claims).status_code == 200
 
     def lets_in(self, page: str, subject: str) -> str:
-        """Where it sends the browser of somebody who signed in on its page."""
+        """The redirect of a browser whose user signed in on the provider's page."""
         assert self.client.get(page).status_code == 200
         return str(self.client.post(page, data={"sub": subject}).headers["location"])
 
@@ -79,7 +79,7 @@ def asking(provider: Identities, **further: str) -> dict[str, Any]:
 
 
 def begin(web: Running, wanted: str = "/") -> tuple[TestClient, str]:
-    """A browser on its way, and the page of the provider that it is sent to."""
+    """A client that started signing in, and the provider's page that it is redirected to."""
     client = browser(web)
     answer = client.get("/login/provider", params={"next": wanted}, follow_redirects=False)
     assert answer.status_code == 303, answer.text
@@ -87,7 +87,7 @@ def begin(web: Running, wanted: str = "/") -> tuple[TestClient, str]:
 
 
 def sign_in(web: Running, provider: Identities, subject: str, wanted: str = "/") -> tuple[TestClient, httpx.Response]:
-    """The browser that went the whole way, and the last answer."""
+    """A client that completed the sign-in, and the last response."""
     client, page = begin(web, wanted)
     back = provider.lets_in(page, subject)
     assert back.startswith(f"{ORIGIN}/login/provider/back?")

@@ -1,4 +1,4 @@
-"""A change that is sent again, because its answer got lost, is not made again."""
+"""Idempotency keys: a change that is repeated because its response was lost is not applied twice."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -97,7 +97,7 @@ def test_a_server_that_died_before_it_could_answer_says_that_the_change_is_store
     with start() as web:
         at = f"/api/projects/{web.sample()}"
         with monkeypatch.context() as patch:
-            patch.setattr(sending, "keep", lambda *_: None)  # the server is gone
+            patch.setattr(sending, "keep", lambda *_: None)  # the server has died
             keyed(web, "POST", f"{at}/comments", "k", {"text": "look"})
     with start() as web:
         again = keyed(web, "POST", f"{at}/comments", "k", {"text": "look"})
@@ -108,7 +108,7 @@ def test_a_server_that_died_before_it_could_answer_says_that_the_change_is_store
 def test_a_click_and_its_answer_are_one_transaction(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
     with start() as web:
         at = f"/api/projects/{web.sample()}"
-        monkeypatch.setattr(sending, "keep", lambda *_: None)  # the server is gone once the change is stored
+        monkeypatch.setattr(sending, "keep", lambda *_: None)  # the server dies after the change is stored
         with commits(web.context.engine) as stored:
             first = keyed(web, "POST", f"{at}/objects/1/points?infer=false", "k", CLICK)
             undone = keyed(web, "POST", f"{at}/undo", "u", {"object": 1})
@@ -148,7 +148,7 @@ def test_the_same_change_sent_at_once_is_made_once_and_answered_each_time(
         check(*given)
 
     def add_late(*given: Any) -> Any:
-        web.until(lambda: len(came) == 4)  # the first is still at work when the last one comes
+        web.until(lambda: len(came) == 4)  # the first is still in progress when the last arrives
         return add(*given)
 
     monkeypatch.setattr(sending, "check_person", arrive)
@@ -175,7 +175,7 @@ def test_keys_are_forgotten_after_a_while_and_with_their_project(
     assert _kept(web) == 0
     keyed(web, "POST", f"{at}/objects/1/points", "k2", CLICK)
     web.delete(at)
-    assert _kept(web) == 1  # in the trash a project is whole
+    assert _kept(web) == 1  # a project in the trash is complete
     web.delete(at.replace("/projects/", "/trash/"))
     assert _kept(web) == 0
 
@@ -202,12 +202,12 @@ def test_whatever_may_be_sent_again_changes_nothing_the_second_time(start: Calla
 
 CHANGES_NOTHING_STORED = {"openLive", "segmentObject", "cancelSegment", "cancelJob", "deleteVariants"} | {
     "openViewer", "showInViewer", "setJoints", "placeInViewer",
-    "lookAtMesh", "assignProject", "markSeen",  # nobody has an account here
+    "lookAtMesh", "assignProject", "markSeen",  # there are no accounts here
 }  # fmt: skip
 
 
 def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
-    """(operation, method, path, body) of every change that may be sent again, each one possible when its turn comes."""
+    """(operation, method, path, body) of every repeatable change, in an order in which each is possible."""
     project = web.sample()
     at, on = f"/api/projects/{project}", f"/api/projects/{project}/objects/1"
     web.job(run(web, project), "done")
@@ -279,7 +279,7 @@ def changes(web: Running, folder: Path) -> Iterator[tuple[str, str, str, Any]]:
 
 
 def _missing_recording(web: Running, at: str) -> tuple[str, dict[str, str]]:
-    """A project that came without its recording, which has arrived as an upload."""
+    """A project without its recording, which has been uploaded."""
     web.until(lambda: web.get(at)["status"] == "ready")
     said = web.client.get(f"/media/{at.removeprefix('/api/projects/')}/project.zip").content
     lacks = web.post("/api/projects/upload?filename=x.zip", content=said, status=202)["id"]
@@ -289,7 +289,7 @@ def _missing_recording(web: Running, at: str) -> tuple[str, dict[str, str]]:
 
 
 def covered(web: Running) -> set[str]:
-    """Every operation that changes something and may be sent again."""
+    """Every operation that changes something and may be repeated."""
     paths = web.app.openapi()["paths"]
     return {
         said["operationId"]
@@ -300,7 +300,7 @@ def covered(web: Running) -> set[str]:
 
 
 def stored(web: Running) -> Any:
-    """What people gave, and what was queued: all that a change may change, once no import is about to add something."""
+    """People's inputs and queued jobs: all that a change may affect, once no import is about to add something."""
     busy = ("queued", "running")
     web.until(lambda: not [job for job in web.get("/api/jobs") if job["kind"] != "run" and job["state"] in busy])
     people = (Project.id, Project.members_only, ProjectMember, Job.id, Comment, Event)
@@ -332,12 +332,12 @@ def _kept(web: Running) -> int:
 
 
 def _cut_off(web: Running, path: str, body: bytes, key: str) -> None:
-    """Send a change, and vanish before the answer."""
+    """Send a change, and disconnect before the response."""
     cookies = "; ".join(f"{name}={value}" for name, value in web.client.cookies.items())
     told = {"host": "127.0.0.1:8000", "cookie": cookies, "x-requested-with": "t", "idempotency-key": key}
     headers = [(name.encode(), value.encode()) for name, value in {**told, "content-type": "application/json"}.items()]
     scope = {"type": "http", "method": "POST", "path": path, "query_string": b"", "headers": headers}
-    scope["server"] = ("127.0.0.1", 8000)  # the session's cookie is named after the port
+    scope["server"] = ("127.0.0.1", 8000)  # the session cookie's name contains the port
     asked: Iterator[dict[str, Any]] = iter([{"type": "http.request", "body": body}])
 
     async def receive() -> dict[str, Any]:

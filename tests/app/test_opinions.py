@@ -1,4 +1,4 @@
-"""Second opinions: two people work on one recording apart, and their objects are compared."""
+"""Second opinions: two people annotate one recording independently, and their objects are compared."""
 
 import csv
 import io
@@ -59,10 +59,10 @@ def test_agreement_is_told_by_object_and_what_one_alone_has(kept: Kept) -> None:
     found: dict[str, Any] = kept.of["carol"].get(f"/api/projects/{kept.project}/opinions/{other}").json()
     assert [found[key] for key in ("both", "only_first", "only_second", "same_category", "frames")] == [2, 1, 0, 1, 3]
     assert [one["name"] for one in found["unmasked"]] == ["waits"]
-    lone, moved, same = found["objects"]  # what disagrees most is first
+    lone, moved, same = found["objects"]  # the largest disagreement is first
     assert (lone["first"]["name"], lone["second"], lone["iou"]) == ("jar", None, None)
     assert (moved["first"]["name"], moved["second"]["name"], moved["same_category"]) == ("top", "drawer_1", True)
-    assert (moved["iou"], moved["frames"]) == (80 / 120, 3)  # two columns of ten are each one's own
+    assert (moved["iou"], moved["frames"]) == (80 / 120, 3)  # each has two columns of ten to itself
     assert (same["iou"], same["same_category"], same["second"]["name"]) == (1.0, False, "oven_1")
     assert found["mean_iou"] == (80 / 120 + 1.0) / 2
     assert (found["first"]["project"], found["second"]["assignee"]) == (kept.project, "bob")
@@ -79,7 +79,7 @@ def test_agreement_is_told_by_object_and_what_one_alone_has(kept: Kept) -> None:
 def test_opinions_of_one_recording_know_each_other_and_nobody_is_told_of_what_they_do_not_see(kept: Kept) -> None:
     second, third = ask(kept), ask(kept, None)
     of_copy = kept.of["bob"].post(f"/api/projects/{second}/opinions", json={"name": "carol"}).json()["id"]
-    copy = kept.of["bob"].post(f"/api/projects/{second}/duplicate").json()["id"]  # is no opinion
+    copy = kept.of["bob"].post(f"/api/projects/{second}/duplicate").json()["id"]  # a copy is not an opinion
 
     def others(project: str, by: str = "root") -> set[str]:
         return {row["project"] for row in kept.of[by].get(f"/api/projects/{project}/opinions").json()}

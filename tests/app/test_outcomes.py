@@ -1,4 +1,4 @@
-"""What a finished job leaves."""
+"""Results of a finished job."""
 
 import json
 import zipfile
@@ -46,13 +46,13 @@ def test_others_may_write_while_a_bundle_is_copied(web: Running, monkeypatch: py
     def look(path: Path) -> str:
         looked.append(path)
         with connect(web.settings.database, timeout=0) as other:
-            other.execute("BEGIN IMMEDIATE")  # raises where somebody writes
+            other.execute("BEGIN IMMEDIATE")  # raises if another connection is writing
             other.rollback()
         return digest(path)
 
     monkeypatch.setattr(outcomes, "_sha256", look)
     web.job(run(web, project), "done")
-    assert len(looked) >= 2  # what was made, and what is kept
+    assert len(looked) >= 2  # the bundle as made, and the stored copies
     assert [bundle["current"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [True]
     web.job(run(web, project), "done")
     assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")][-1] == 1

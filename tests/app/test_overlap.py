@@ -1,4 +1,4 @@
-"""Pixels that masks of two sets share."""
+"""Number of pixels shared by the masks of two sets."""
 
 import numpy as np
 import pytest

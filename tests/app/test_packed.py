@@ -17,7 +17,7 @@ def test_an_answer_in_words_is_packed_for_who_takes_that_and_pictures_are_not(we
     assert len(raw) < len(plain.content) / 2
     assert gzip.decompress(raw) == plain.content
     for path in (f"/media/{project}/frames/3.jpg", "/api/health"):
-        assert "content-encoding" not in web.client.get(path).headers  # is compressed already; is as small as it is
+        assert "content-encoding" not in web.client.get(path).headers  # already compressed, or small
 
 
 def test_what_an_answer_says_beside_its_bytes_stays(web: Running) -> None:
@@ -32,4 +32,4 @@ def test_what_an_answer_says_beside_its_bytes_stays(web: Running) -> None:
     made = {"Idempotency-Key": "k"}
     first = web.client.post(f"/api/projects/{project}/objects", json={"category": "drawer"}, headers=made)
     again = web.client.post(f"/api/projects/{project}/objects", json={"category": "drawer"}, headers=made)
-    assert (again.json(), again.headers["idempotency-replayed"]) == (first.json(), "true")  # kept as it was said
+    assert (again.json(), again.headers["idempotency-replayed"]) == (first.json(), "true")  # the stored response is replayed

@@ -1,4 +1,4 @@
-"""What each who comes in may do, and the accounts themselves."""
+"""Permissions of each role, and management of accounts."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -110,7 +110,7 @@ def test_a_new_password_and_a_removed_account_end_sessions(shared: Running) -> N
 
 
 def closed_with(socket: Any) -> int:
-    """The code that an open connection is closed with, whatever it says before."""
+    """Close code of an open connection, after any messages."""
     while True:
         try:
             socket.receive_json()
@@ -178,7 +178,7 @@ def test_the_last_admin_stays(shared: Running) -> None:
     with signed_in(shared, "the-admin") as admin:
         assert admin.delete("/api/accounts/the-admin").status_code == 409
         assert admin.patch("/api/accounts/the-admin", json={"role": "annotator"}).status_code == 409
-    for change in (accounts.remove, partial(accounts.change, role="reviewer")):  # as r2c2r user does it
+    for change in (accounts.remove, partial(accounts.change, role="reviewer")):  # as `r2c2r user` does it
         with pytest.raises(Conflict, match="only admin"):
             change(shared.context.engine, "the-admin")
 

@@ -1,4 +1,4 @@
-"""A front that was filmed open is drawn over its photos as open as it was; photos that show an object whole come first."""
+"""Overlays of opened fronts on photos at their estimated joint state; photos that show an object completely come first."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -37,7 +37,7 @@ BEFORE = Rigid3(np.eye(3), np.array([0.0, 0.0, 3.0]))  # the camera, which looks
 
 
 def filmed(reviewed: Reviewed, motion: JointMotion | None) -> None:
-    """The drawer of the finished scene, as it was filmed."""
+    """Store the finished scene's drawer with this motion."""
     web, project, _ = reviewed
     store(web.settings.data_dir / "projects" / project / "work", drawer(motion), motion)
 
@@ -50,7 +50,7 @@ def drawer(motion: JointMotion | None) -> ArticulatedScene:
 
 
 def store(work: Path, made: ArticulatedScene, motion: JointMotion | None) -> None:
-    """The scene as a run made it of such a track."""
+    """Store the scene as built by a run from such a track."""
     space, motions = Workspace(work), () if motion is None else (motion,)
     space.save("segment", "drawer_1", replace(track("drawer_1"), motions=motions), {"key": "k2", "seconds": 1.0})
     space.save("warp", "scene", made, {"key": "k2", "seconds": 1.0})

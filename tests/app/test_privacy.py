@@ -1,4 +1,4 @@
-"""Where things lie on the server is told to admins alone."""
+"""Server paths are shown to admins only."""
 
 from collections.abc import Iterator
 from pathlib import Path

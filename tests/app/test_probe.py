@@ -1,4 +1,4 @@
-"""The real look at a file, in its own process: what a run would refuse is refused at once, in the sender's words."""
+"""Real file probe in its own process: files that a run would refuse are refused at once, by the sender's file name."""
 
 import base64
 import json
@@ -45,7 +45,7 @@ def test_a_mesh_is_refused_when_no_candidate_can_be_made_of_it(tmp_path: Path, c
         assert (seen["triangles"], seen["notes"]) == (12, ["it has no colours: shown grey"])
         drawn = cv2.imdecode(np.frombuffer(base64.b64decode(seen["picture"]), np.uint8), cv2.IMREAD_UNCHANGED)
         rows, columns = np.nonzero(drawn[..., 3])
-        assert np.ptp(columns) > np.ptp(rows) > 50  # wide as it is long, and upright as glTF means it
+        assert np.ptp(columns) > np.ptp(rows) > 50  # as wide as it is long, and upright by glTF's convention
     assert str(tmp_path) not in said.stdout
 
 

@@ -1,4 +1,4 @@
-"""A project goes out as one file and comes in on another server, as far as it can be believed."""
+"""Export of a project as one file, and its import and validation on another server."""
 
 import io
 import json
@@ -35,7 +35,7 @@ LISTED = [{"name": "oven_1", "category": "oven"}]
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, str]]:
-    """A server with a project that people worked on; its id."""
+    """A server and the id of a project that people worked on."""
     with running(tmp_path_factory.mktemp("first") / "data", user="ann") as web:
         project = upload(web, R3D, "Old kitchen.r3d")["id"]
         web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")
@@ -89,7 +89,7 @@ def take_in(web: Running, content: bytes, status: int = 202) -> Any:
 
 
 def given(web: Running, project: str) -> tuple[Any, Any]:
-    """prompts.json and overrides.json as an export says them."""
+    """prompts.json and overrides.json as exported."""
     found = members(web.client.get(f"/media/{project}/project.zip").content)
     return json.loads(found["prompts.json"]), json.loads(found["overrides.json"])
 
@@ -123,7 +123,7 @@ def test_all_that_people_made_comes_back_on_another_server(first: tuple[Running,
 def test_what_was_approved_there_is_a_draft_here_and_nothing_is_said_by_people_of_there(
     first: tuple[Running, str], second: Running
 ) -> None:
-    accounts.add(second.context.engine, "ann", "admin", "three plain words")  # another one of that name
+    accounts.add(second.context.engine, "ann", "admin", "three plain words")  # a different person of the same name
     made = take_in(second, exported(first))
     second.until(lambda: second.get(f"/api/projects/{made['id']}")["status"] == "ready")
     assert (made["review_state"], made["assignee"], made["archived"]) == ("draft", None, False)
@@ -217,7 +217,7 @@ def test_a_damaged_or_hostile_file_leaves_nothing(first: tuple[Running, str], st
     linked = io.BytesIO(content)
     with zipfile.ZipFile(linked, "a") as opened:
         opened.writestr(link, "/etc/passwd")
-    at = content.index(b"project.json") + 60  # in its compressed bytes
+    at = content.index(b"project.json") + 60  # within its compressed bytes
     flipped = bytearray(content)
     flipped[at] ^= 0xFF
     broken = archive(*{**found, "project.json": found["project.json"][:-40]}.items())
@@ -288,7 +288,7 @@ def test_who_does_not_see_a_project_gets_no_file_of_it(first: tuple[Running, str
     for path in (f"/media/{made}/project.zip", f"/api/projects/{made}/file"):
         assert eve.get(path).status_code == 404
     own = eve.post("/api/projects/upload?filename=x.zip", content=exported(first))
-    assert own.status_code == 202  # whoever may upload may import
+    assert own.status_code == 202  # permission to upload suffices to import
     assert own.json()["review_state"] == "draft"
 
 
@@ -310,7 +310,7 @@ def test_another_recording_is_refused_by_its_frames() -> None:
         return [{"index": k, "width": width, "height": 120, "camera": [x, 0.0, 1.5]} for k, x in enumerate(cameras)]
 
     ours = table(0.0, 0.5, 1.0)
-    refuse_another("a.r3d", ours, table(3.0, 3.5, 4.0))  # the world may lie elsewhere
+    refuse_another("a.r3d", ours, table(3.0, 3.5, 4.0))  # the world frame may differ
     for theirs, words in (
         (table(0.0, 0.5), "3 frames, 2 or others expected"),
         (table(0.0, 0.5, 1.0, width=320), "160x120 pixels, 320x120 expected"),

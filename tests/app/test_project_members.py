@@ -1,4 +1,4 @@
-"""A project that its owner keeps to some people is not there for anybody else."""
+"""A project restricted to its members is invisible to everybody else."""
 
 import re
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ PEOPLE = {"alice": "annotator", "bob": "reviewer", "carol": "reviewer", "root": 
 
 
 class Kept:
-    """A server, a browser of each person, and Alice's project, kept to her and Bob."""
+    """A server, a client for each person, and Alice's project, restricted to her and Bob."""
 
     def __init__(self, web: Running) -> None:
         self.web = web
@@ -52,7 +52,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Kept]:
 
 
 def about(kept: Kept) -> list[tuple[str, str, str]]:
-    """(operation, method, its address about Alice's project) of all operations about a project or a job."""
+    """(operation, method, its path for Alice's project) of all operations about a project or a job."""
     found = []
     for path, methods in kept.web.app.openapi()["paths"].items():
         if "{project}" in path or "{job}" in path:
@@ -118,7 +118,7 @@ def test_who_is_at_a_project_and_loses_sight_of_it_is_told(kept: Kept) -> None:
     address, sockets = f"{SOCKETS}/api/live?project={kept.project}", {"headers": {"origin": ORIGIN}}
 
     def told_gone(socket: Any) -> bool:
-        """Whether it was told until all that happened so far was told."""
+        """Whether its deletion is reported among the messages sent so far."""
         kept.web.context.hub.publish("projects", None, last=True)
         gone = False
         while not (message := socket.receive_json()).get("last"):
@@ -206,6 +206,6 @@ def test_an_account_that_goes_takes_its_membership_and_opens_nothing(kept: Kept)
 
 def test_members_hold_after_a_restart(kept: Kept) -> None:
     kept.keep_to("bob")
-    kept.web.context.access.look_again()  # what a start does
+    kept.web.context.access.look_again()  # as at a restart
     assert kept.of["carol"].get(f"/api/projects/{kept.project}").status_code == 404
     assert kept.of["bob"].get(f"/api/projects/{kept.project}").status_code == 200

@@ -122,7 +122,7 @@ def test_names_are_unique_and_usable_in_simulators(web: Running) -> None:
     long = web.patch(f"/api/projects/{project}/objects/{number}", {"name": "x" * 300}, 422)["message"]
     assert long == "name: 300 characters, at most 60 expected"
     made = web.post(f"/api/projects/{project}/objects", {"category": "2-door cabinet"})
-    assert made["name"] == "item_2_door_cabinet_1"  # its category stays as it was typed
+    assert made["name"] == "item_2_door_cabinet_1"  # the category stays as typed
     assert made["category"] == "2-door cabinet"
 
 
@@ -241,6 +241,6 @@ def test_what_is_said_of_a_frame_that_the_recording_lacks_is_neither_imported_no
     entry = {"name": "mug_9", "category": "mug", "points": [CLICK], "frames": [{"frame": 999, "mask": None}]}
     web.post(f"{at}/prompts.json", {"version": 2, "objects": [entry]}, 422)
     item = web.get(f"{at}/objects")[0]
-    with writing(web.context.engine) as session:  # as an import left it before
+    with writing(web.context.engine) as session:  # as an import by an older version stored it
         queries.object_row(session, project, item["id"]).frames = {"999": None}
     assert web.delete(f"{at}/objects/{item['id']}/frames/999")["frames"] == []

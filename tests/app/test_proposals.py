@@ -86,7 +86,7 @@ def test_dismissals_outlive_the_server_and_can_be_taken_back(start: Callable[...
         first = proposed(web, project)[0]
         after = web.post(f"/api/projects/{project}/proposals/dismiss", {"ids": [first["id"]]})
         assert (len(after["items"]), after["dismissed"]) == (2, 1)
-    with start() as web:  # proposals themselves are kept too: no segmenter is needed to show them
+    with start() as web:  # proposals are stored: no segmenter is needed to show them
         kept = web.get(f"/api/projects/{project}/proposals")
         assert (kept["state"], len(kept["items"]), kept["dismissed"]) == ("done", 2, 1)
         assert web.get(f"/api/projects/{project}/live")["state"] == "off"

@@ -1,4 +1,4 @@
-"""What one person may take of the server is bounded, and refused in one line with what to do."""
+"""Quotas per person, refused with a one-line message that states the remedy."""
 
 from collections.abc import Iterator
 from pathlib import Path

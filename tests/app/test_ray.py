@@ -1,4 +1,4 @@
-"""Jobs that a small Ray cluster of this machine computes: as on one machine, and when a part of it dies."""
+"""Jobs on a small local Ray cluster: same results as on one machine, and recovery when a part dies."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -32,14 +32,14 @@ def node() -> Iterator[RayNode]:
 
 
 def processes_of(folder: Path) -> list[psutil.Process]:
-    """What a step of a project there runs, but for the relay to it."""
+    """Processes of a project's step in that folder, except the relay to it."""
     words = {found: " ".join(found.info["cmdline"] or []) for found in psutil.process_iter(["cmdline"])}
     return [found for found, said in words.items() if folder.name in said and "ray_relay" not in said]
 
 
 def test_a_step_whose_node_dies_ends_with_it_is_begun_anew_and_is_cancelled(node: RayNode, tmp_path: Path) -> None:
     with running(tmp_path / "web", compute="ray", store=f"file://{tmp_path / 'store'}") as web:
-        project = web.sample()  # what the node made is here, and was made in a folder of the node's own
+        project = web.sample()  # fetched here from the node's own folder
         cache = tmp_path / f"web/ray/0/projects/{project}"
         assert (cache / "facts.json").is_file()
         folder = behave(web, project, segment="hang")
@@ -72,7 +72,7 @@ def test_the_objects_of_one_job_are_computed_by_actors_side_by_side(node: RayNod
         web.context.store.keep(project)
         job = run(web, project)
         caches = tmp_path / "web/ray"
-        web.until(lambda: len([*caches.glob(f"*/projects/{project}/at-*.part")]) == len(NAMES))  # each in one of its own
+        web.until(lambda: len([*caches.glob(f"*/projects/{project}/at-*.part")]) == len(NAMES))  # each in a folder of its own
         for at in caches.glob(f"*/projects/{project}/at-*.part"):
             at.with_name(f"hold-{at.stem.removeprefix('at-')}").unlink()
         for name in NAMES:
@@ -106,7 +106,7 @@ def test_a_step_asks_for_what_it_needs(tmp_path: Path, monkeypatch: pytest.Monke
     orders = [ray_relay.order_of(command[-1]) for command in started]
     assert [(order.cpus, order.gpu) for order in orders] == [(4, True), (1, False)]
     assert [order.memory_bytes for order in orders] == [(2 << 30) + 3 * WORKER_BYTES, 2 << 30]
-    assert seat.memory_bytes < 1 << 30  # here there is only the relay
+    assert seat.memory_bytes < 1 << 30  # only the relay runs here
 
 
 def test_what_is_no_way_to_compute_is_one_line(tmp_path: Path) -> None:

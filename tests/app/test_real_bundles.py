@@ -1,4 +1,4 @@
-"""Every address that reads a bundle, asked about bundles as the exporter writes them."""
+"""Every endpoint that reads a bundle, with bundles from the real exporter."""
 
 import io
 import re
@@ -39,7 +39,7 @@ WANTS = {
 
 @pytest.fixture(scope="module")
 def shorter_bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The kitchen with a drawer less."""
+    """The kitchen without one drawer."""
     scene = kitchen()
     path = tmp_path_factory.mktemp("shorter") / "bundle.zip"
     with pytest.MonkeyPatch.context() as patch:
@@ -59,7 +59,7 @@ def made(
 
 
 def readers(web: Running, project: str) -> list[tuple[str, str]]:
-    """Every GET operation of the API with its address here."""
+    """Every GET operation of the API, with its path here."""
     found = []
     for path, operations in web.app.openapi()["paths"].items():
         if "get" in operations:
@@ -124,7 +124,7 @@ def test_what_is_inside_for_robots(made: tuple[Running, str]) -> None:
     assert (gripper["joints"], gripper["joints_opened"], gripper["map"]) == (4, 4, None)
     sheet = web.client.get(next(grip["picture"] for grip in gripper["grips"] if grip["name"] == "drawer_1_slide"))
     assert (sheet.status_code, sheet.headers["content-type"]) == (200, "image/jpeg")
-    assert web.client.get(f"/media/{project}/gripper/drawer_1_slide.jpg").content == sheet.content  # as report.html asks
+    assert web.client.get(f"/media/{project}/gripper/drawer_1_slide.jpg").content == sheet.content  # as report.html requests
     for link in re.findall(r'href="([^":#]+)"', web.client.get(f"/media/{project}/report.html").text):
         assert web.client.get(f"/media/{project}/{link}").status_code == 200, link
     assert "MuJoCo" in {lines["simulator"] for lines in inside["simulators"]}
@@ -166,7 +166,7 @@ def test_variants_are_made_of_it_again_the_same_and_load(made: tuple[Running, st
         web.delete(f"{at}/v2-n3-s7")
         assert not files.exists()
     assert len(digests) == 1
-    # what was promised holds the fixed parts: two thirds and three halves, for the pictures of a bundle vary in how they pack
+    # the offer includes the fixed parts; within two thirds and three halves, as pictures of bundles compress differently
     promised = offer["zip_bytes"] + 3 * offer["each_zip_bytes"]
     assert 0.67 * found["size"] < promised < 1.5 * found["size"]
     zipfile.ZipFile(io.BytesIO(answer.content)).extractall(tmp_path)

@@ -1,4 +1,4 @@
-"""The real processes behind the queue, once, on a very small kitchen."""
+"""The real worker processes behind the queue, run once on a very small kitchen."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +13,7 @@ def test_a_sample_is_made_read_and_segmented_by_the_real_processes(start: Callab
     with start(commands=Commands()) as web:
         wish = {"seed": 1, "frames": 10, "width": 320, "height": 240}
         project = web.post("/api/projects/sample", wish, 202)["id"]
-        web.until(lambda: web.get(f"/api/projects/{project}")["thumbnail"])  # a frame, while others are still rendered
+        web.until(lambda: web.get(f"/api/projects/{project}")["thumbnail"])  # a first frame, while others are still rendered
         (shown,) = [one["thumbnail"] for one in web.get("/api/projects")]
         assert "arriving" in shown
         assert web.client.get(shown).content[:2] == b"\xff\xd8"  # JPEG

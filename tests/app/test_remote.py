@@ -1,4 +1,4 @@
-"""Upload, click, run, wait and download from another machine, by a token."""
+"""Remote client with a token: upload, click, run, wait and download."""
 
 import json
 import os
@@ -28,7 +28,7 @@ PROMPTS = {
 
 
 class Served:
-    """An app on a port, and a program's token for it."""
+    """An app on a port, and an API token for it."""
 
     def __init__(self, tmp_path: Path) -> None:
         settings = Settings(data_dir=tmp_path / "data", host="127.0.0.1", min_free_bytes=0, job_memory_bytes=0)
@@ -143,7 +143,7 @@ def test_an_upload_goes_on_where_it_broke_off(
 
 
 class Stub(BaseHTTPRequestHandler):
-    """Answers as the test says, and keeps what it was asked."""
+    """HTTP stub that returns the test's responses and records requests."""
 
     answers: list[Callable[["Stub"], None]]
     asked: list[tuple[str, dict[str, str]]]

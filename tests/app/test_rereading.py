@@ -1,4 +1,4 @@
-"""A recording is read again with its depth registered when a person says so, and back."""
+"""Re-reading of a recording with its depth registered, on request, and back."""
 
 import json
 
@@ -14,7 +14,7 @@ def read_again(web: Running, project: str, registered: bool, status: int = 202) 
 
 
 def requests(web: Running) -> list[dict]:
-    """What the jobs were given, oldest first."""
+    """Requests of the jobs, oldest first."""
     paths = sorted(web.settings.data_dir.rglob("request.json"), key=lambda path: int(path.parent.name))
     return [json.loads(path.read_text()) for path in paths]
 
@@ -28,8 +28,8 @@ def test_a_project_is_read_again_with_registered_depth_and_its_result_is_stale(w
     assert requests(web)[-1]["config"] == {"ingest": {"register_depth": True}}
     assert all("config" not in request for request in requests(web)[:-1])
     web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "done")
-    assert requests(web)[-1]["config"] == {"ingest": {"register_depth": True}}  # the run reads it in the same way
-    assert web.get(f"/api/projects/{project}")["counts"]["objects"] > 0  # the clicks stay
+    assert requests(web)[-1]["config"] == {"ingest": {"register_depth": True}}  # the run uses the same setting
+    assert web.get(f"/api/projects/{project}")["counts"]["objects"] > 0  # the clicks are kept
     assert read_again(web, project, False)["register_depth"] is False
     web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")
     assert "config" not in requests(web)[-1]

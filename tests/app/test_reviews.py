@@ -46,7 +46,7 @@ def test_candidates_come_with_their_evidence_the_choice_and_its_reason(reviewed:
     assert [c["id"] for c in group["candidates"]] == ["c0", "c1"]
     metrics = group["candidates"][0]["metrics"]
     assert metrics["volume"] == 1.0
-    assert "odd" not in metrics  # what is not a number is left out
+    assert "odd" not in metrics  # non-numeric values are left out
     assert group["candidates"][0]["assumes"] == "0.58 m deep, to the wall behind it"
     assert (group["placement"]["candidate"], group["placement"]["rms_m"], group["placement"]["votes"]) == (
         "c0",
@@ -108,7 +108,7 @@ def test_the_candidate_that_is_shown_as_used_is_the_one_that_the_run_takes_after
 
     assert shown_and_taken() == ("c0", "c0")
     said = web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "rejected", "rerun": False})
-    assert said["group"]["chosen"] == "c1"  # at once, before any run
+    assert said["group"]["chosen"] == "c1"  # immediately, before any run
     assert shown_and_taken() == ("c1", "c1")
     web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "accepted", "rerun": False})
     assert shown_and_taken() == ("c0", "c0")
@@ -116,7 +116,7 @@ def test_the_candidate_that_is_shown_as_used_is_the_one_that_the_run_takes_after
     assert shown_and_taken() == ("c1", "c1")
     web.post(f"{address}/verdicts", {"candidate": "c1", "verdict": "rejected", "rerun": False})
     group = web.get(f"{address}/candidates")
-    assert group["chosen"] == ""  # nothing is used until further ones are made
+    assert group["chosen"] == ""  # none is used until new candidates are made
     assert "every candidate was rejected" in group["reason"]
 
 
@@ -147,7 +147,7 @@ def test_verdicts_are_undone_and_redone_apart_from_clicks(reviewed: Reviewed) ->
     assert web.get(f"{address}/override")["rejected"] == []
     web.post(f"/api/projects/{project}/redo", {"object": number, "scope": "review"})
     assert web.get(f"{address}/candidates")["candidates"][0]["verdict"] == "rejected"
-    assert web.get(f"/api/projects/{project}/objects")[0]["points"]  # the clicks stay
+    assert web.get(f"/api/projects/{project}/objects")[0]["points"]  # the clicks are kept
 
 
 def test_a_verdict_can_be_taken_back(reviewed: Reviewed) -> None:
@@ -293,7 +293,7 @@ def test_nothing_is_undone_or_redone_over_what_somebody_said_meanwhile(reviewed:
     seen = web.patch(f"{at}/override", {"hinge": "left", "rerun": False})["group"]["version"]
     if direction == "redo":
         seen = web.post(f"{base}/undo", {**mine, "version": seen})["version"]
-        web.post(f"{base}/redo", mine)  # by somebody who looked at it before
+        web.post(f"{base}/redo", mine)  # by somebody who loaded it before
     else:
         web.patch(f"{at}/override", {"hinge": "right", "rerun": False})
     stored = web.get(f"{at}/candidates")
@@ -341,7 +341,7 @@ def test_a_rename_keeps_masks_candidates_verdicts_and_the_scenes_object_until_th
     assert [item["name"] for item in web.get(f"{at}/scene")["items"]] == ["cutlery"]
     assert [(group["name"], group["run_name"]) for group in web.get(f"{at}/candidates")] == [("cutlery", "drawer_1")]
     (other,) = [item for item in web.get(f"{at}/objects") if item["id"] != number]
-    web.patch(f"{at}/objects/{other['id']}", {"name": "drawer_1"})  # a name that is free; its results are another's
+    web.patch(f"{at}/objects/{other['id']}", {"name": "drawer_1"})  # a free name; results under it are another's
     assert seen() == before
     web.post(f"{at}/undo", {"object": other["id"]})
     web.post(f"{at}/undo", {"object": number})
@@ -376,13 +376,13 @@ def test_what_nobody_clicked_is_corrected_by_its_name_left_out_and_brought_back(
     told = web.get(f"/api/projects/{project}/scene")
     assert [(item["object"], item["name"]) for item in told["unused"]] == [(counter["id"], "counter_1")]
     web.patch(f"/api/projects/{project}/objects/{counter['id']}/override", {"left_out": True, "rerun": False})
-    assert web.get(f"/api/projects/{project}/scene")["unused"] == []  # as was wished
+    assert web.get(f"/api/projects/{project}/scene")["unused"] == []  # as requested
     web.patch(f"/api/projects/{project}/scene/absent/override", {"left_out": True}, 404)
     web.patch(f"/api/projects/{project}/objects/{counter['id']}/override", {"built_as": "frobnicator", "rerun": False}, 422)
 
 
 def clicked(web: Running, project: str) -> dict[str, int]:
-    """How many clicks each object of the newest run has, by its name there."""
+    """Number of clicks of each object of the newest run, by its name there."""
     job = web.get(f"/api/jobs?project={project}")[0]["id"]
     path = web.settings.data_dir / "projects" / project / "requests" / str(job) / "prompts.json"
     return {entry["name"]: len(entry["points"]) for entry in json.loads(path.read_text())["objects"]}
@@ -404,7 +404,7 @@ def test_a_correction_runs_its_object_and_leaves_out_what_is_clicked_meanwhile(w
     said = web.patch(f"/api/projects/{project}/objects/{first}/override", {"joint_upper": 0.3})
     web.job(said["job"]["id"], "done")
     assert clicked(web, project) == {names[first]: before[names[first]], "renamed": before[names[second]]}
-    assert web.get(f"/api/projects/{project}")["result"] == "stale"  # others' clicks are not in it
+    assert web.get(f"/api/projects/{project}")["result"] == "stale"  # clicks by others are missing in it
 
     web.job(run(web, project), "done")
     assert clicked(web, project)["half_done"] == 1

@@ -1,4 +1,4 @@
-"""What a question costs does not depend on how much there is: counted in queries and bytes, for those need no clock."""
+"""Cost of requests independent of the amount of data, counted in queries and bytes, which need no clock."""
 
 import json
 import re
@@ -28,12 +28,12 @@ from tests.app.test_jobs import run
 pytestmark = pytest.mark.both_databases
 
 
-OBJECTS, CLICKS = 40, 12  # more of each than there were
+OBJECTS, CLICKS = 40, 12  # added to the project
 MOST_BYTES = 40_000  # on the wire, at that size: 300 kB at 200 objects and 5,000 clicks
 
 
 def questions(web: Running, project: str, item: int) -> list[str]:
-    """Every address of the API that can be asked about the project."""
+    """Every GET path of the API that concerns the project."""
     values = {
         "project": project,
         "object": item,
@@ -50,7 +50,7 @@ def questions(web: Running, project: str, item: int) -> list[str]:
 
 
 def grow(web: Running, project: str) -> None:
-    """More objects, clicks, comments, verdicts, jobs and bundles in the project, and more projects."""
+    """Add objects, clicks, comments, verdicts, jobs and bundles to the project, and more projects."""
     with writing(web.context.engine) as session:
         row = project_row(session, project)
         for k in range(OBJECTS):
@@ -83,12 +83,12 @@ def _entry(frame: int) -> mask_store.Entry:
 
 @pytest.fixture
 def finished(web: Running, monkeypatch: pytest.MonkeyPatch) -> tuple[Running, str, int]:
-    monkeypatch.setattr("app.services.people.REMEMBERED_S", 1e6)  # whose session it is, is asked once
+    monkeypatch.setattr("app.services.people.REMEMBERED_S", 1e6)  # session look-ups are cached
     web.context.people.look_again()
     project = web.sample()
     web.job(run(web, project), "done")
     finish(web.settings.data_dir / "projects" / project / "work")
-    web.context.runner.stop()  # the queue of the other projects stays a queue
+    web.context.runner.stop()  # jobs of the other projects stay queued
     return web, project, web.get(f"/api/projects/{project}/objects")[0]["id"]
 
 
@@ -98,7 +98,7 @@ def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_i
 ) -> None:
     web, project, item = finished
     asked = questions(web, project, item)
-    web.context.runner.stop()  # what is counted is asked for by a request
+    web.context.runner.stop()  # no background statements are counted
     web.context.descriptions.stop()
 
     def count(path: str) -> tuple[int, int]:
@@ -109,7 +109,7 @@ def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_i
 
     before = {path: count(path)[0] for path in asked}
     grow(web, project)
-    after = {path: min(count(path), count(path)) for path in asked}  # a tidy falls into one of them at most
+    after = {path: min(count(path), count(path)) for path in asked}  # at most one of the two counts includes a clean-up
     assert len(asked) > 25
     more = {path: (before[path], number) for path, (number, _) in after.items() if number > before[path] + QUEUE.get(path, 0)}
     assert more == {}
@@ -123,7 +123,7 @@ def test_no_question_reads_what_events_replaced_nor_the_events_to_say_what_stand
     grow(web, project)
     with writing(web.context.engine) as session:
         stored = session.exec(select(Event.before, Event.after)).all()
-    assert sum(before is not None or after is not None for before, after in stored) > OBJECTS  # there is something to read
+    assert sum(before is not None or after is not None for before, after in stored) > OBJECTS  # there are states to read
     web.context.descriptions.stop()
     loaded: list[Event] = []
     listen(Event, "load", count := lambda event, _: loaded.append(event))
@@ -134,15 +134,15 @@ def test_no_question_reads_what_events_replaced_nor_the_events_to_say_what_stand
                 web.client.get(path)
             whole = [ONE_WORD.sub("", query) for query in queries]
             bodies = [query for query in whole if re.search(r'events\."?(before|after)\b', query)]
-            last = path.endswith("/review")  # the project's last change of state is said with its reason
+            last = path.endswith("/review")  # the project's last change of state is shown with its reason
             assert len(bodies) <= last, f"{path} asked {bodies}"
             assert (len(loaded) > last) == path.endswith("/history"), f"{path} loaded {len(loaded)} events"
     finally:
         remove(Event, "load", count)
 
 
-ONE_WORD = re.compile(r"JSON_EXTRACT\([^)]*\)|events\.(before|after) ->> ")  # of a state, as SQLite and Postgres ask for it
-QUEUE = {"/api/projects": 1, "/api/jobs": 1}  # once something waits, its place among all that do is looked up
+ONE_WORD = re.compile(r"JSON_EXTRACT\([^)]*\)|events\.(before|after) ->> ")  # one field of a state, in SQLite and Postgres
+QUEUE = {"/api/projects": 1, "/api/jobs": 1}  # a waiting job's position in the queue takes one more query
 
 
 @pytest.mark.both_databases(quick=False)
@@ -173,7 +173,7 @@ def test_what_nouns_say_is_read_once_for_all_servers_and_anew_when_one_changed(
         return [noun.object_name]
 
     def look() -> list[str] | None:
-        monkeypatch.setattr(views, "_FACTS", FileCache(1000))  # as a server that was just started
+        monkeypatch.setattr(views, "_FACTS", FileCache(1000))  # as after a restart of the server
         kept = views.KeptFacts(files)
         said = kept.of("generate", "drawer_1", told)
         kept.keep()
@@ -197,12 +197,12 @@ def test_facts_that_are_kept_say_which_version_they_are_of() -> None:
     assert (views.FACTS_VERSION, content_key(fields)) == (1, "76d66364613bb625a1d514b4b602d08a")
 
 
-MOST_OF_A_CLICK = 16  # statements, the transactions' begins aside; a row is written once
+MOST_OF_A_CLICK = 16  # statements without the transactions' begins; each row is written once
 
 
 def test_a_click_stores_what_it_adds_and_asks_no_more_where_there_is_more(finished: tuple[Running, str, int]) -> None:
     web, project, item = finished
-    web.context.descriptions.stop()  # it writes of the projects that grow makes, meanwhile
+    web.context.descriptions.stop()  # it would write the descriptions of the added projects meanwhile
 
     def click() -> int:
         point = {"frame": 3, "x": 1.5, "y": 1.5, "label": 0}
@@ -234,7 +234,7 @@ def test_a_cache_of_files_holds_so_many_bytes_and_sees_that_a_file_changed(tmp_p
         (tmp_path / name).write_text(name * 10)
     assert [look(name) for name in "abab"] == ["a" * 10, "b" * 10, "a" * 10, "b" * 10]
     assert (made, cache.bytes) == (["a", "b"], 20)
-    look("c")  # the third does not fit: what was unused longest goes
+    look("c")  # the third exceeds the size: the least recently used is evicted
     assert (look("b"), made, cache.bytes) == ("b" * 10, ["a", "b", "c"], 20)
     (tmp_path / "b").write_text("new")
     assert (look("b"), cache.bytes) == ("new", 13)
@@ -255,11 +255,11 @@ def test_where_masks_lie_is_read_from_the_end_of_their_file_and_found_without_on
     assert (done.end, done.index.tolist()) == ("done", begun.index.tolist())
     assert (done.entry(7) or {})["confidence"] == 0.7
     with path.open("a") as handle:
-        handle.write('{"frame": 9, "conf')  # a crash
+        handle.write('{"frame": 9, "conf')  # as after a crash
     cut = mask_store.read(path)
     assert cut is not None
     assert cut.seen().tolist() == done.seen().tolist()
-    mask_store.begin(path)  # computed anew meanwhile: the old places mean nothing
+    mask_store.begin(path)  # recomputed meanwhile: the old offsets are invalid
     assert done.entry(7) is None
 
 
@@ -291,7 +291,7 @@ def test_nouns_are_kept_by_their_bytes_and_read_anew_when_their_file_changed(
     for _ in range(2):
         views.facts(files, "generate", "drawer_1", told)
     assert len(reads) == 1
-    views.facts(files, "align", "drawer_1", told)  # takes its place
+    views.facts(files, "align", "drawer_1", told)  # replaces it
     views.facts(files, "generate", "drawer_1", told)
     assert len(reads) == 3
     assert views.facts(files, "generate", "nothing", told) is None

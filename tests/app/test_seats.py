@@ -1,4 +1,4 @@
-"""Machines that take jobs from one database: what each does, which may join, and how one is drained."""
+"""Seats that take jobs from one database: their state, permission to join, and draining."""
 
 import threading
 from collections.abc import Iterator

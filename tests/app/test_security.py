@@ -16,7 +16,7 @@ from tests.app.conftest import COOKIE, ORIGIN, SOCKETS, Running
 
 
 def fresh(web: Running, **options: Any) -> TestClient:
-    """A browser without a session, on the same app."""
+    """A client without a session, for the same app."""
     return TestClient(web.app, base_url=options.pop("base_url", ORIGIN), raise_server_exceptions=False, **options)
 
 
@@ -53,7 +53,7 @@ def test_the_printed_token_becomes_a_cookie_and_leaves_the_address(web: Running)
     assert "httponly" in cookie
     assert "samesite=lax" in cookie
     assert other.get("/api/projects").status_code == 200
-    again = other.get(address, follow_redirects=False)  # no matter to the browser that used it
+    again = other.get(address, follow_redirects=False)  # reopening it in the browser that used it is harmless
     assert (again.status_code, again.headers["location"]) == (303, "/p/abc/annotate")
     assert "set-cookie" not in again.headers
 
@@ -70,7 +70,7 @@ def test_a_printed_address_signs_one_browser_in_and_says_what_to_do_to_others(we
 
 def test_two_servers_of_a_host_do_not_share_a_cookie(web: Running) -> None:
     there = fresh(web, base_url="http://127.0.0.1:9000", headers={"X-Requested-With": "tests"})
-    there.cookies = web.client.cookies  # a browser sends them to every port
+    there.cookies = web.client.cookies  # browsers send cookies to every port
     assert there.get("/api/projects").status_code == 401
     there.get(web.printed())
     assert {cookie.name for cookie in there.cookies.jar} == {"r2c2r_session_8000", "r2c2r_session_9000"}
@@ -98,7 +98,7 @@ def test_signing_out_ends_the_session_also_on_a_full_disk(web: Running, monkeypa
     stored = {row.digest for row in sessions(web)}
     web.context.people.forget_ended()
     gone = stored - {row.digest for row in sessions(web)}
-    assert len(gone) == 1  # the row too, once there is room
+    assert len(gone) == 1  # the row is removed too, once there is space
     assert other.get("/api/projects").status_code == 401
 
 
@@ -210,7 +210,7 @@ def test_what_is_read_at_once_is_bounded_also_for_strangers(web: Running) -> Non
     known = {"content-type": "application/json"}
     stranger = fresh(web, headers={"X-Requested-With": "tests"})
     for client, path in ((stranger, "/api/login"), (web.client, "/api/projects/sample"), (web.client, "/api/uploads")):
-        for content in (pieces(), b"x" * (20 << 20)):  # without and with an announced length
+        for content in (pieces(), b"x" * (20 << 20)):  # without and with a Content-Length
             assert client.post(path, content=content, headers=known).status_code == 413, path
     upload = web.post("/api/uploads", {"file_name": "a", "size": 40 << 20}, 201)["id"]
     sent = web.client.patch(f"/api/uploads/{upload}", content=b"x" * (20 << 20), headers={"Upload-Offset": "0"})

@@ -1,4 +1,4 @@
-"""Choosing who draws the masks."""
+"""Choice of the segmenter that draws the masks."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
 
 @pytest.fixture
 def sam2(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Weights that are there as far as anyone can see without loading them."""
+    """Weights that look installed as long as they are not loaded."""
     folder = tmp_path / "weights"
     folder.mkdir()
     (folder / "config.json").write_text("{}")
@@ -65,7 +65,7 @@ def test_the_chosen_one_draws_all_objects_and_each_says_who_drew_it(web: Running
     assert "--segmenter sam2" in work.read_text()
     work.unlink()
     choose(web, project, "geometric")
-    assert drawn_by() == "geometric"  # kept: nothing is computed for it again
+    assert drawn_by() == "geometric"  # stored: not computed again
     assert [entry["action"] for entry in web.get(f"/api/projects/{project}/history")][:2] == ["segmenter", "segmenter"]
 
 
@@ -74,7 +74,7 @@ def test_a_live_process_is_ended_while_others_can_write(web: Running, sam2: Path
     ended = []
 
     def close(of: str) -> None:
-        with writing(web.context.engine) as session:  # would wait for a transaction that is open around it
+        with writing(web.context.engine) as session:  # would wait for a surrounding open transaction
             session.add(Upload(id=of, file_name="a", size=1, who="x", created=0.0))
         ended.append(of)
 

@@ -91,7 +91,7 @@ def test_a_key_for_another_browser_is_printed_while_the_server_runs(tmp_path: Pa
     code, said = key()
     assert (code > 0, "no r2c2r serves" in said, said.count("\n")) == (True, True, 0)
     with served(tmp_path) as address:
-        early = key()[1]  # while the server only begins: forgotten keys are those of servers before it
+        early = key()[1]  # while the server is starting: forgotten keys are those of earlier servers
         Running.until(lambda: _answers(address))
         assert [_status(early), _status(address), _status(address)] == [200, 200, 401]
         code, printed = key()
@@ -133,13 +133,13 @@ def test_a_proxy_is_named_by_its_address(tmp_path: Path, address: str) -> None:
 
 @contextmanager
 def served(data: Path, **options: Any) -> Iterator[str]:
-    """A server of its own process; the address it prints."""
+    """A server in its own process; the address it prints."""
     with forked(serve, host="127.0.0.1", port=0, data_dir=data, **options) as server:
         yield server.readline().split(" ", 1)[1].strip()
 
 
 def _status(address: str) -> int:
-    """As a browser that was never there."""
+    """HTTP status for a client without cookies."""
     browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
     try:
         with browser.open(address, timeout=PATIENCE_S) as answer:
@@ -158,7 +158,7 @@ def _answers(address: str) -> bool:
 
 def test_another_folder_is_allowed_to_import_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class _StoppedError(Exception):
-        """Before anything is served."""
+        """Raised before anything is served."""
 
     roots: list[Path] = []
 

@@ -1,4 +1,4 @@
-"""Servers that share a Postgres: one runs a job, the others take it up when it is silent, and what it lost it leaves alone."""
+"""Servers that share a Postgres: a job is taken over from a silent server, which then no longer writes to it."""
 
 import threading
 import time
@@ -134,7 +134,7 @@ def test_a_job_that_is_cancelled_at_another_server_stops_where_it_runs(postgres_
         second.post(f"/api/jobs/{job}/cancel")
         assert second.job(job, "cancelled", "done", "failed")["state"] == "cancelled"
         (folder / "behave.json").unlink()
-        assert first.job(run(first, project), "done")["state"] == "done"  # it runs others
+        assert first.job(run(first, project), "done")["state"] == "done"  # it runs other jobs
     postgres_server.drop_all()
 
 

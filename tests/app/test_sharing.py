@@ -1,4 +1,4 @@
-"""The objects of a stage at several seats: each once, together what one seat makes, and what becomes of them when one ends."""
+"""Objects of a stage shared by several seats: each computed once, common parts by one seat, with recovery from lost seats."""
 
 import contextlib
 from collections.abc import Iterator
@@ -22,12 +22,12 @@ from tests.waiting import FACTOR, gone
 
 SHARED = {"segment": "objects", "generate": "objects"}
 NAMES = ("drawer_1", "mug_1")  # of the sample
-FREE = {"sharing_costs_s": 0.0}  # so that two objects are worth it
-QUICK = {"beat_s": 0.3, "beats_missed_s": 6.0 * FACTOR}  # longer than a seat is silent between two of its signs of life
+FREE = {"sharing_costs_s": 0.0}  # so that sharing two objects pays off
+QUICK = {"beat_s": 0.3, "beats_missed_s": 6.0 * FACTOR}  # longer than the interval between a seat's heartbeats
 
 
 def held(web: Running, *names: str) -> tuple[str, Path]:
-    """A project whose stages go by objects, each of these held where it is computed; and its folder."""
+    """A project whose stages work object by object, with these objects blocked while computed; and its folder."""
     project = web.sample()
     folder = behave(web, project, **SHARED)
     for name in names:
@@ -41,7 +41,7 @@ def both_at_work(web: Running, folder: Path) -> None:
 
 
 def computed(folder: Path) -> list[tuple[str, str, str]]:
-    """Each computation of an object: its stage, the object, and whether it was a part."""
+    """Each computation of an object: its stage, the object, and whether it was a shared part."""
     return [tuple(line.split()[:3]) for line in (folder / "parts.txt").read_text().splitlines()]  # type: ignore[misc]
 
 
@@ -133,7 +133,7 @@ def test_cancelling_stops_every_seat(tmp_path: Path) -> None:
         processes = [process_at(folder, name) for name in NAMES]
         web.post(f"/api/jobs/{job}/cancel")
         assert web.job(job, "cancelled", "done", "failed")["state"] == "cancelled"
-        assert all(gone(process) for process in processes)  # before it is said
+        assert all(gone(process) for process in processes)  # before the end is reported
         assert parts(web) == []
 
 
@@ -148,7 +148,7 @@ def test_an_object_that_fails_ends_the_job_with_its_line(tmp_path: Path) -> None
 
 
 def test_objects_that_take_no_longer_than_a_process_to_begin_are_not_shared(tmp_path: Path) -> None:
-    with running(tmp_path, heavy_jobs=2) as web:  # two objects without a model are a second or two of work
+    with running(tmp_path, heavy_jobs=2) as web:  # without a model two objects take a second or two
         project, folder = held(web)
         assert web.job(run(web, project), "done", "failed")["state"] == "done"
         assert {how for _, _, how in computed(folder)} == {"whole"}
@@ -180,10 +180,10 @@ def test_seats_with_jobs_of_their_own_are_not_counted_on(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("waiting", "seats", "fewest", "taken"),
     [
-        (20, 20, 4, 1),  # each its own
+        (20, 20, 4, 1),  # one each
         (14, 2, 1, 4),  # half of a seat's share, so that both end about the same time
         (14, 2, 4, 4),
-        (14, 2, 16, 7),  # all that is its share: its processors would idle
+        (14, 2, 16, 7),  # its whole share: otherwise its processors would idle
         (3, 8, 4, 1),
         (5, 1, 8, 5),
     ],
@@ -207,7 +207,7 @@ def test_a_server_that_stops_leaves_no_process_and_the_next_goes_on(tmp_path: Pa
 
 @contextmanager
 def seat(web: Running, folder: Path) -> Iterator[Forked]:
-    """`r2c2r work` in a process and on a data folder of its own, that takes jobs."""
+    """`r2c2r work` in its own process and data folder, accepting jobs."""
     folder.mkdir()
     process = Forked(take_jobs, folder, {"postgres": web.settings.postgres, "store": web.settings.store, **FREE, **QUICK})
     try:
@@ -222,7 +222,7 @@ def seat(web: Running, folder: Path) -> Iterator[Forked]:
 
 @pytest.fixture
 def served(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[Running]:
-    """A server that computes nothing, with rows and files that seats reach."""
+    """A server without compute, with rows and files that seats can reach."""
     if not REQUIRED:
         pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
     places = {"postgres": postgres_server.of_folder(tmp_path), "store": f"file://{tmp_path / 'store'}"}
@@ -232,7 +232,7 @@ def served(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[Running]
 
 
 def held_at(web: Running, one: Forked, two: Forked) -> tuple[int, dict[int, Path]]:
-    """A job of which each of both seats holds an object; and the project's folder at each, by its process."""
+    """A job of which each of two seats computes one object; and the project's folder at each seat, by its process."""
     project, _ = held(web, *NAMES)
     web.context.store.keep(project)
     job = run(web, project)
@@ -252,8 +252,8 @@ def test_what_a_machine_that_vanishes_was_at_another_one_computes(served: Runnin
         at_it = {found["process"]: found["jobs"][0]["objects"] for found in served.get("/api/seats")["seats"] if found["jobs"]}
         assert at_it == {owner: [], helper: [name]}
         (one if one.pid == helper else two).kill()
-        served.until(lambda: gone(lost))  # what the machine had begun ends with it
-        for each in (*({*NAMES} - {name}), name):  # its own, then the other's
+        served.until(lambda: gone(lost))  # processes started by the lost machine end with it
+        for each in (*({*NAMES} - {name}), name):  # its own object, then the other's
             served.until((folders[owner] / f"at-{each}.part").exists)
             (folders[owner] / f"hold-{each}").unlink()
         project = served.job(job, "done", "failed")["project"]

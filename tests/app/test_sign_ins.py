@@ -1,4 +1,4 @@
-"""Who may come in: sessions, guessing, passwords, and what is recorded of it."""
+"""Sign-in: sessions, password guessing, passwords, and the audit."""
 
 import re
 import threading
@@ -90,7 +90,7 @@ def test_after_five_wrong_passwords_each_waits_and_many_at_once_are_no_more(
     for _ in range(5):
         shared.context.people._attempts.take("guessed", "testclient")
     assert browser(shared).post("/api/login", json=right).status_code == 204
-    assert 3.0 < waited[-1] <= 4.0  # late, and in
+    assert 3.0 < waited[-1] <= 4.0  # delayed, but accepted
 
 
 def test_sign_ins_wait_outside_the_threads_that_requests_share(shared: Running, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,7 +101,7 @@ def test_sign_ins_wait_outside_the_threads_that_requests_share(shared: Running, 
         return verified(*arguments)
 
     async def at_once(_: float) -> None:
-        """Without the wait that slows guessing down."""
+        """No delay after wrong passwords."""
 
     monkeypatch.setattr(accounts, "verified", late)
     monkeypatch.setattr(people, "pause", at_once)
@@ -113,9 +113,9 @@ def test_sign_ins_wait_outside_the_threads_that_requests_share(shared: Running, 
     with ThreadPoolExecutor(51) as crowd:
         asked = [crowd.submit(sign_in, number) for number in range(50)]
         try:
-            Running.until(lambda: sum(each.done() for each in asked) == 20)  # 30 of an address are taken on
+            Running.until(lambda: sum(each.done() for each in asked) == 20)  # 30 per address are accepted
             assert {each.result() for each in asked if each.done()} == {429}
-            page = crowd.submit(shared.client.get, "/login")  # which takes a shared thread
+            page = crowd.submit(shared.client.get, "/login")  # uses a shared thread
             assert page.result(PATIENCE_S).status_code == 200
         finally:
             going.set()
@@ -125,7 +125,7 @@ def test_sign_ins_wait_outside_the_threads_that_requests_share(shared: Running, 
 def test_whatever_was_guessed_the_right_password_is_in_after_a_bounded_wait() -> None:
     now = [0.0]
     attempts = Attempts(lambda: now[0])
-    for number in range(30):  # behind a proxy that says nothing of who asks: one address for all
+    for number in range(30):  # behind a proxy that does not identify clients: one address for all
         attempts.take(f"person-{number}", "proxy")
     assert attempts.take("ann", "proxy") <= 1.0
     for number in range(500):
@@ -153,7 +153,7 @@ def test_guesses_are_forgotten_after_a_while_and_with_the_right_password() -> No
     assert attempts.take("ann", "10.0.0.1") == 0.0
     now[0] = 300.0
     assert [attempts.take("ann", "10.0.0.2") for _ in range(5)] == [0.0] * 5
-    assert {key[1:] for key in attempts._due} == {("ann", "10.0.0.2"), ("", "10.0.0.2"), ("ann", "")}  # no more is kept
+    assert {key[1:] for key in attempts._due} == {("ann", "10.0.0.2"), ("", "10.0.0.2"), ("ann", "")}  # nothing else is stored
 
 
 @pytest.mark.parametrize(
@@ -190,7 +190,7 @@ def test_a_weak_password_is_refused_wherever_one_is_set(shared: Running) -> None
         assert admin.patch("/api/accounts/the-reviewer", json={"password": "the-reviewer!"}).status_code == 422
         change = {"old": PASSWORD, "new": "aaaaaaaaaa"}
         assert "over and over" in admin.post("/api/account/password", json=change).json()["message"]
-        assert admin.get("/api/system").status_code == 200  # nothing ended
+        assert admin.get("/api/system").status_code == 200  # the session continues
 
 
 def test_the_record_says_who_came_in_who_was_refused_and_who_changed_whose_account(shared: Running) -> None:
@@ -232,5 +232,5 @@ def test_of_refusals_only_the_newest_are_kept(shared: Running, monkeypatch: pyte
         audit.note_refusal(shared.context.engine, "nobody", "10.0.0.1", str(number))
     found = audit.entries(shared.context.engine, None, 200)
     assert [each.detail for each in found.entries if each.action == "refused"] == ["5", "4", "3"]
-    assert [each.id for each in found.entries if each.action != "refused"]  # the rest stays
+    assert [each.id for each in found.entries if each.action != "refused"]  # other entries remain
     assert found.total <= before + 3

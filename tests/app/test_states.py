@@ -1,4 +1,4 @@
-"""The review states, enforced on the server, and the comments pinned to a spot."""
+"""Review states, enforced by the server, and comments pinned to a place."""
 
 from typing import Any
 

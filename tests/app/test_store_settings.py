@@ -1,4 +1,4 @@
-"""Settings that open no object store are said when a server or a seat starts; a store that is away is waited for."""
+"""Invalid settings of the object store are reported when a server or a seat starts; an unavailable store is waited for."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -27,7 +27,7 @@ def s3() -> Iterator[ObjectServer]:
 def known(s3: ObjectServer, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in s3.environment.items():
         monkeypatch.setenv(name, value)
-    monkeypatch.setenv("R2C2R_DATABASE", "postgresql+psycopg://nobody@127.0.0.1:9/none")  # is looked at after the store
+    monkeypatch.setenv("R2C2R_DATABASE", "postgresql+psycopg://nobody@127.0.0.1:9/none")  # checked after the store
 
 
 def start_server(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Servers with a data folder each, on one Postgres and one store of files."""
+"""Servers with a data folder each, on one Postgres and one object store."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Lists of objects to click: kept as templates of the server, taken over by projects."""
+"""Templates of objects to click: stored on the server, and adopted by projects."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def test_a_project_takes_over_a_template_and_keeps_it_when_the_template_changes(
     at = f"/api/projects/{project}"
     taken = web.client.put(f"{at}/checklist", json={"template": template["id"]}).json()
     assert taken["checklist"] == OBJECTS
-    assert taken["counts"]["objects"] == 2  # a list makes no object
+    assert taken["counts"]["objects"] == 2  # a list creates no objects
     changed = {"name": "Flat 4", "objects": OBJECTS[1:]}
     assert web.client.put(f"/api/templates/{template['id']}", json=changed).json()["objects"] == OBJECTS[1:]
     assert web.get(at)["checklist"] == OBJECTS

@@ -1,4 +1,4 @@
-"""Text that people give is bounded and can be shown, wherever it comes in."""
+"""Bounds and printability of texts, at every input."""
 
 import json
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ UNSHOWN = {
 
 
 def send(web: Running, method: str, path: str, body: Any) -> Any:
-    """A body as JSON of plain ASCII, so that half of a surrogate pair can travel."""
+    """Send a body as pure-ASCII JSON, so that a lone surrogate can be sent."""
     return web.client.request(method, path, content=json.dumps(body), headers={"content-type": "application/json"})
 
 
@@ -90,7 +90,7 @@ def test_every_text_of_every_body_has_a_bound(web: Running) -> None:
 
 
 def texts(document: dict[str, Any], schema: dict[str, Any], where: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Every string a body may hold, keys included, with where it is."""
+    """Every string that a body may contain, including keys, with its location."""
     if "$ref" in schema:
         yield from texts(document, document["components"]["schemas"][schema["$ref"].rsplit("/", 1)[-1]], where)
     for part in (*schema.get("anyOf", ()), *schema.get("allOf", ())):

@@ -1,4 +1,4 @@
-"""What a kitchen costs rows, files and pages: counted by benchmarks/throughput.py, said in docs/how-to/servers.md."""
+"""Cost of a kitchen in rows, files and pages: counted by benchmarks/throughput.py, documented in docs/how-to/servers.md."""
 
 import json
 from pathlib import Path

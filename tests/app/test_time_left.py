@@ -1,4 +1,4 @@
-"""The time that a job says it still needs."""
+"""Estimated time left of a job."""
 
 import time
 from pathlib import Path
@@ -20,7 +20,7 @@ def test_a_run_that_finds_most_done_does_not_promise_the_rest_as_fast(monkeypatc
     monkeypatch.setattr("app.jobs.steps.time", SimpleNamespace(monotonic=lambda: now[0]))
     progress = JobProgress([Step(stage, (), 30.0, took_s) for stage, took_s in TOOK_S.items()], began=now[0])
     said = [progress.eta_s]
-    for at, took_s in enumerate((2.0, 2.0, 60.0)):  # the first two were done before
+    for at, took_s in enumerate((2.0, 2.0, 60.0)):  # the first two were computed before
         progress.at(at)
         for tenth in range(1, 11):
             now[0] += took_s / 10
@@ -29,7 +29,7 @@ def test_a_run_that_finds_most_done_does_not_promise_the_rest_as_fast(monkeypatc
     assert said[0] == 110.0
     told = [seconds for seconds in said if seconds is not None]
     assert len(told) == len(said)
-    assert told == sorted(told, reverse=True)  # it never rises
+    assert told == sorted(told, reverse=True)  # it never increases
 
 
 def test_a_run_that_is_slower_than_before_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -37,7 +37,7 @@ def test_a_run_that_is_slower_than_before_says_so(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("app.jobs.steps.time", SimpleNamespace(monotonic=lambda: now[0]))
     progress = JobProgress([Step(stage, (), 30.0, took_s) for stage, took_s in TOOK_S.items()], began=now[0])
     progress.at(1)
-    now[0] += 60.0  # what took half a minute
+    now[0] += 60.0  # a stage that took half a minute
     assert progress.eta_s == pytest.approx(160.0)
 
 

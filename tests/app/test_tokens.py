@@ -1,4 +1,4 @@
-"""Programs come in with a token: as far as it reaches, until it is revoked, and never to make another."""
+"""API tokens: limited to their scope, revocable, and unable to create further tokens."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +24,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
 
 
 def program(web: Running, secret: str, **headers: str) -> TestClient:
-    """It sends its token and nothing that only pages send."""
+    """A client that sends its token and no page-specific headers."""
     given = {"Authorization": f"Bearer {secret}", **headers}
     return TestClient(web.app, base_url=ORIGIN, headers=given, raise_server_exceptions=False)
 

@@ -1,4 +1,4 @@
-"""Traces of requests and stages, taken where a setting says so; tests/test_architecture.py: imported only then."""
+"""Traces of requests and stages, enabled by a setting; tests/test_architecture.py checks that they are imported only then."""
 
 from pathlib import Path
 from typing import Any

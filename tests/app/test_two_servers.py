@@ -1,4 +1,4 @@
-"""Two servers on one Postgres and one store: what happens at one is seen at the other."""
+"""Two servers on one Postgres and one store: events at one server are seen at the other."""
 
 import threading
 from collections.abc import Iterator
@@ -66,7 +66,7 @@ def test_people_masks_and_jobs_of_one_server_are_seen_at_the_other(two: tuple[Ru
         assert [message["frame"] for message in seen if message["type"] == "mask"] == [3, 0, 7]
         lane = {"object": made["id"], "frames": [0, 3, 7], "complete": True}
         a.until(lambda: [one for one in a.get(f"/api/projects/{project}/lanes") if lane.items() <= one.items()] != [])
-        job = run(b, project)  # it runs at a
+        job = run(b, project)  # runs at a
         told: list[dict[str, Any]] = []
         while not told or told[-1]["state"] != "done":
             message = at_b.receive_json()
@@ -101,7 +101,7 @@ def test_all_messages_arrive_in_their_order_also_over_broken_connections(
                 waiting.until(lambda number=number: len(told) > number - 50)
                 postgres_server.run("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'r2c2r'")
         waiting.until(lambda: bool(told) and told[-1] == 299)
-    assert list(dict.fromkeys(told)) == list(range(300))  # one whose commit was not heard of is sent again
+    assert list(dict.fromkeys(told)) == list(range(300))  # one whose commit notification is lost is sent again
     assert gaps == []
 
 
@@ -184,7 +184,7 @@ def channel(engine: Engine, name: str, beat_s: float = 3600.0) -> Iterator[Chann
 
 
 def presence(socket: Any, *, at_least: int = 0) -> list[dict[str, Any]]:
-    """Who is here, as it is told next, or once so many are."""
+    """The people present, from the next presence message or the next one with at least that many."""
     while True:
         message = socket.receive_json()
         if message["type"] == "presence" and len(message["people"]) >= at_least:

@@ -1,4 +1,4 @@
-"""A lost or restored database costs nobody their work: folders say what they are, are set aside, and are adopted."""
+"""Recovery of projects after a lost or restored database: folders describe themselves, are set aside, and are adopted."""
 
 import json
 import os
@@ -55,7 +55,7 @@ def worked_on(web: Running) -> str:
 
 
 def known(web: Running, project: str) -> Any:
-    """What people made of it, as the app shows it."""
+    """People's work on the project, as the app shows it."""
     base = f"/api/projects/{project}"
     shown = web.get(base)
     objects = [{key: row[key] for key in ("id", "name", "category", "colour", "points")} for row in web.get(f"{base}/objects")]
@@ -99,7 +99,7 @@ def test_a_lost_database_is_made_anew_from_what_the_folders_say(start: Start, tm
     with start() as web:
         assert known(web, project) == before
         base = f"/api/projects/{project}"
-        web.post(f"{base}/undo", {"scope": "prompts"})  # the deleted mug comes back
+        web.post(f"{base}/undo", {"scope": "prompts"})  # restores the deleted mug
         assert [item["name"] for item in web.get(f"{base}/objects")] == ["drawer_1", "mug_1"]
 
 
@@ -160,7 +160,7 @@ def test_who_may_see_a_project_is_adopted_by_name_and_others_see_nothing_of_it(s
     lose(data)
     (data / "projects" / project).rename(tmp_path / project)
     with start() as web:
-        add(web, "dave", "bob", "alice")  # other numbers than they had, and nobody is carol
+        add(web, "dave", "bob", "alice")  # with other ids than before, and without carol
         web.settings.unknown.mkdir(exist_ok=True)
         (tmp_path / project).rename(web.settings.unknown / project)
         web.post(f"/api/unknown/{project}/adopt")

@@ -1,4 +1,4 @@
-"""Uploads stop and go on."""
+"""Interruption and resumption of uploads."""
 
 import os
 from collections.abc import Callable
@@ -59,7 +59,7 @@ def test_the_time_to_approval_begins_with_the_first_byte(web: Running) -> None:
     with writing(web.context.engine) as session:
         row = session.get(Upload, upload)
         assert row is not None
-        row.created -= 1000.0  # seconds that sending it takes
+        row.created -= 1000.0  # duration of the upload in seconds
     send(web.client, upload, 0, R3D)
     finish(web, upload)
     web.until(lambda: web.get(f"/api/projects/{upload}")["status"] == "ready")
@@ -136,7 +136,7 @@ def test_what_is_done_to_an_upload_is_not_undone_by_another_request_and_every_se
     for first, second, waits in (
         ("sent", "sent", True),
         ("sent", "finished", True),
-        ("sent", "deleted", False),  # who gives up need not wait for the last piece
+        ("sent", "deleted", False),  # a cancellation need not wait for the last piece
         ("finished", "deleted", True),
         ("deleted", "finished", True),
     ):
@@ -146,7 +146,7 @@ def test_what_is_done_to_an_upload_is_not_undone_by_another_request_and_every_se
             with pytest.raises(Unavailable) if waits else nullcontext(), mine.on("a", second):
                 pass
     with mine.on("a", "finished"):
-        pass  # nothing is left behind
+        pass  # no files are left
 
 
 def test_uploads_that_nobody_goes_on_with_are_forgotten(web: Running) -> None:
@@ -168,7 +168,7 @@ def test_what_no_row_knows_is_set_aside_and_only_what_is_marked_half_made_goes(
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"bytes")
     leftovers.tidy(web.context)
-    assert recording.exists()  # something may begin just now
+    assert recording.exists()  # recent files may belong to an operation that is starting
     assert all(path.exists() for path in half)
     for path in (*projects.iterdir(), *web.settings.uploads.iterdir()):
         os.utime(path, (1, 1))
@@ -185,7 +185,7 @@ def test_what_no_row_knows_is_set_aside_and_only_what_is_marked_half_made_goes(
 def test_an_upload_of_a_restored_database_takes_no_project_with_it(web: Running) -> None:
     upload = interrupted(web)
     finish(web, upload)
-    with writing(web.context.engine) as session:  # as it was before it was finished
+    with writing(web.context.engine) as session:  # the state before finishing
         session.delete(session.get(Project, upload))
         session.add(Upload(id=upload, file_name="Kitchen.r3d", size=len(R3D), who="tester", created=1.0))
     uploads.forget_stopped(web.context)
@@ -194,7 +194,7 @@ def test_an_upload_of_a_restored_database_takes_no_project_with_it(web: Running)
 
 
 def interrupted(web: Running, content: bytes = R3D) -> str:
-    """An upload whose server was killed while finishing it, after its bytes were moved."""
+    """Id of an upload whose server was killed while finishing it, after its bytes were moved."""
     upload = begin(web, content)
     send(web.client, upload, 0, content)
     source = web.settings.data_dir / "projects" / upload / "source"

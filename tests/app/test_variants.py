@@ -1,4 +1,4 @@
-"""Variants of a bundle for training are asked for with a number and a seed, and made by a job."""
+"""Training variants of a bundle, requested with a number and a seed, and made by a job."""
 
 import shutil
 from collections import namedtuple
@@ -30,7 +30,7 @@ def test_they_are_made_by_a_job_of_their_own_and_kept_beside_the_bundle(web: Run
     (made,) = web.get(f"/api/projects/{project}/variants")["sets"]
     assert (made["version"], made["count"], made["seed"]) == (1, 2, 5)
     assert web.client.get(made["url"]).content.startswith(b"PK")
-    assert web.get(f"/api/projects/{project}")["result"] == "current"  # nothing that people gave has changed
+    assert web.get(f"/api/projects/{project}")["result"] == "current"  # people's inputs are unchanged
 
 
 def test_the_same_are_not_made_again_and_another_seed_gives_others(web: Running, project: str) -> None:
@@ -62,7 +62,7 @@ def test_what_was_made_is_deleted_and_nothing_else_can_be(web: Running, project:
     assert web.delete(f"/api/projects/{project}/variants/{made['name']}")["sets"] == []
     assert web.client.get(made["url"]).status_code == 404
     assert not (web.settings.data_dir / "projects" / project / "variants" / made["name"]).exists()
-    assert web.delete(f"/api/projects/{project}/variants/{made['name']}")["sets"] == []  # asked again
+    assert web.delete(f"/api/projects/{project}/variants/{made['name']}")["sets"] == []  # a repeated request
     for name in ("%2e%2e", "v1-n2-s5%2f..%2f..%2fbundles", "bundles"):
         assert web.client.delete(f"/api/projects/{project}/variants/{name}").status_code in (404, 422)
     assert len(web.get(f"/api/projects/{project}/bundles")) == 1

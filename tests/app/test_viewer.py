@@ -26,7 +26,7 @@ MOVED = [[0.0, -1.0, 0.0, 0.3], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 0.5], [0.0
 
 @pytest.fixture
 def seen(tmp_path: Path) -> Iterator[Running]:
-    """An app whose viewer is a fake upstream that echoes."""
+    """An app whose viewer is a stand-in with an echoing upstream."""
     viewer = Viewer(Settings(data_dir=tmp_path / "data", **PATIENT), fake("viewer"))
     with running(tmp_path / "data", viewer=viewer) as web:
         yield web
@@ -100,7 +100,7 @@ def test_the_same_session_gets_the_same_token(seen: Running) -> None:
 def test_a_viewer_that_died_is_said_and_started_anew(seen: Running) -> None:
     project = seen.sample()
     url = seen.post(f"/api/projects/{project}/viewer")["url"]
-    seen.post(f"/api/projects/{project}/viewer/show", {"mode": "cloud", "opacity": 0.123}, 503)  # the fake dies of it
+    seen.post(f"/api/projects/{project}/viewer/show", {"mode": "cloud", "opacity": 0.123}, 503)  # kills the stand-in
     assert seen.client.get(url).status_code == 200
     assert seen.post(f"/api/projects/{project}/viewer")["url"] == url
 
@@ -139,7 +139,7 @@ def test_a_view_closed_between_finding_and_asking_it_is_opened_again(seen: Runni
     show = f"/api/projects/{project}/viewer/show"
     seen.post(show, {"mode": "cloud"})
     (view,) = viewer._views.values()
-    ask, closings = viewer._ask, [0]  # how often it is closed as idle before it is asked
+    ask, closings = viewer._ask, [0]  # how often it is closed as idle before the request
 
     def ask_late(command: dict[str, Any]) -> dict[str, Any]:
         if command["cmd"] != "open" and closings[0] > 0:
@@ -187,7 +187,7 @@ def test_a_view_started_anew_shows_what_it_showed(seen: Running) -> None:
     assert seen.context.viewer._worker
     seen.context.viewer._worker.kill()
     seen.until(lambda: not (seen.context.viewer._worker and seen.context.viewer._worker.alive))
-    assert seen.post(show, {"mode": "cloud"})["text"] == "shown 2 times"  # the first was again what had been shown
+    assert seen.post(show, {"mode": "cloud"})["text"] == "shown 2 times"  # the first one repeated the last view
 
 
 def test_the_view_used_least_makes_room(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -247,11 +247,11 @@ def test_the_real_viewer_shows_the_scan_a_candidate_the_placement_and_a_scene_th
     assert moved["joints"][0]["value"] == 0.4  # clamped
     web.post(f"/api/projects/{project}/viewer/joints", {"values": {"absent": 1.0}}, 422)
     place = f"/api/projects/{project}/viewer/place"
-    assert web.post(place, {"pose": None})["pose"] is None  # nothing is being moved
+    assert web.post(place, {"pose": None})["pose"] is None  # no object is being moved
     web.post(place, {"pose": MOVED}, 422)
     web.post(show, {"mode": "aligned", "object": drawer, "box": {"pose": STANDING, "size": [0.5, 0.6, 0.2]}})
     assert web.post(place, {"pose": None})["pose"] == STANDING
-    assert np.allclose(web.post(place, {"pose": MOVED})["pose"], MOVED, atol=1e-6)  # single precision on the way
+    assert np.allclose(web.post(place, {"pose": MOVED})["pose"], MOVED, atol=1e-6)  # single precision in transit
     web.post(place, {"pose": [[0.0] * 4] * 3}, 422)
     web.post(show, {"mode": "aligned", "object": drawer + 1}, 422)
     with web.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN}) as socket:

@@ -1,4 +1,4 @@
-"""The camera of the 3D view stays where a person moved it while only the look of the same thing changes."""
+"""The camera of the 3D view stays where a person moved it as long as only the appearance of the same scene changes."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,7 +26,7 @@ def view(tmp_path: Path) -> View:
 
 
 def after(view: View, **wish: Any) -> Any:
-    """Where the camera is once that is shown, from where a person had moved it."""
+    """Camera position after a view is shown, starting from where a person moved it."""
     camera = view.server.get_clients()[0].camera
     camera.position = MOVED
     view.show(wish)
@@ -58,10 +58,10 @@ def test_the_first_view_is_of_the_whole_scene_not_of_the_object_that_happens_to_
 
 
 def test_it_stands_where_a_photo_was_taken_or_where_a_comment_was_made(view: View) -> None:
-    assert after(view, mode="cloud", look="photo", frame=3) == (0.0, 0.0, 0.0)  # as the recording has it
+    assert after(view, mode="cloud", look="photo", frame=3) == (0.0, 0.0, 0.0)  # as in the recording
     camera = view.server.get_clients()[0].camera
     assert camera.look_at == (0.0, 0.0, 2.0)
-    assert camera.fov == pytest.approx(2 * np.arctan(80 / 150))  # held on its side: what is upright is the photo's width
+    assert camera.fov == pytest.approx(2 * np.arctan(80 / 150))  # filmed in portrait: the vertical extent is the photo's width
     kept = {"position": [1.0, 2.0, 3.0], "target": [0.0, 0.0, 1.0]}
     assert after(view, mode="cloud", camera=kept) == (1.0, 2.0, 3.0)
     assert view.lens.pose == ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0])
@@ -82,9 +82,9 @@ def test_a_page_that_opened_while_the_camera_was_turned_is_turned_too(view: View
     meet = server.on_client_connect.call_args.args[0]
     meet(SimpleNamespace(camera=late))
     assert late.position == server.initial_camera.position
-    late.position = (-5.0, 0.0, 0.0)  # it has drawn nothing: three.js's own place, with z upwards
+    late.position = (-5.0, 0.0, 0.0)  # three.js's initial position, before anything is drawn, with z up
     meet(SimpleNamespace(camera=late))
     assert late.position == server.initial_camera.position
-    late.position = MOVED  # a person's own place after a lost connection
+    late.position = MOVED  # a person's position after a lost connection
     meet(SimpleNamespace(camera=late))
     assert late.position == MOVED

@@ -1,4 +1,4 @@
-"""Webhooks: stored with the change, signed, tried again, never to an address inside unless that is allowed."""
+"""Webhooks: stored with the change, signed, retried, and sent to internal addresses only if allowed."""
 
 import hashlib
 import hmac
@@ -27,7 +27,7 @@ HERE = "127.0.0.0/8"
 
 
 class Listening(BaseHTTPRequestHandler):
-    """Keeps what is posted, and answers with the next status of the test."""
+    """HTTP handler that records posts and responds with the test's next status."""
 
     heard: list[tuple[dict[str, str], bytes]]
     statuses: list[int]
@@ -197,7 +197,7 @@ def test_who_answers_a_byte_at_a_time_has_no_more_time(monkeypatch: pytest.Monke
             try:
                 while not ended.wait(LOOK_S):
                     connection.sendall(b"H")
-            except OSError:  # the other end hung up, as it should
+            except OSError:  # the other end closed the connection, as expected
                 return
 
     with socket.create_server(("127.0.0.1", 0)) as listening:

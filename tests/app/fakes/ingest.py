@@ -1,4 +1,4 @@
-"""Reads any recording as three frames: `ingest.py WORKDIR PROJECTDIR --request FILE`."""
+"""Stand-in ingest that reads any recording as three frames: `ingest.py WORKDIR PROJECTDIR --request FILE`."""
 
 import json
 import shutil
@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-FRAMES = (0, 3, 7)  # numbers of a recording have gaps
+FRAMES = (0, 3, 7)  # numbered with gaps, as in recordings
 
 
 def write_recording(work: Path, folder: Path, source: str) -> None:
-    """What the real ingest leaves behind, for three small frames."""
+    """Files that the real ingest writes, for three small frames."""
     for index in FRAMES:
         for name, picture in (("rgb", "frame.jpg"), ("depth", "depth.png")):
             path = work / "capture" / name / f"{index:06d}{Path(picture).suffix}"
@@ -30,7 +30,7 @@ def frame(index: int) -> dict[str, object]:
 if __name__ == "__main__":
     workdir, project = Path(sys.argv[1]), Path(sys.argv[2])
     request = json.loads(Path(sys.argv[4]).read_text())
-    if "broken" in request["source"]:  # which shows late
+    if "broken" in request["source"]:  # fails late
         write_recording(workdir, project, request["source"])
         error = {"kind": "CaptureError", "message": "no depth in it", "hint": "record again"}
         sys.stdout.write(json.dumps({"error": error}) + "\n")

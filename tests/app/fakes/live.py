@@ -1,8 +1,8 @@
-"""A live segmenter whose masks are rectangles around the click: `live.py WORKDIR --width N --segmenter NAME`.
+"""Stand-in live segmenter whose masks are rectangles around the click: `live.py WORKDIR --width N --segmenter NAME`.
 
-A negative first click fails; a click at x >= 150 is computed slowly, so that it can be superseded; one at x >= 156 gets one
-frame and no further until it is superseded or stopped; one at y >= 114 finds no mask in its frame. Two drawers and a bottle
-are proposed, one plane is drawn.
+A negative first click fails; a click at x >= 150 is slow, so that it can be superseded; one at x >= 156 yields one frame and
+then blocks until it is superseded or stopped; one at y >= 114 finds no mask in its frame. It proposes two drawers and a bottle,
+and draws one plane.
 """
 
 import json
@@ -32,7 +32,7 @@ OPENED = {
         {"frame": 7, "value": 1.5, "sigma": 0.02},
     ],
 }
-FOUND = [[0.6, 2.0, 0.8], [1.2, 2.0, 0.8], [1.2, 2.0, 0.2], [0.6, 2.0, 0.2]]  # of a clicked cabinet: two edges hardly show
+FOUND = [[0.6, 2.0, 0.8], [1.2, 2.0, 0.8], [1.2, 2.0, 0.2], [0.6, 2.0, 0.2]]  # of a clicked cabinet, with two faint edges
 PROPOSED = (("front", "drawer", 0.95, 30.5), ("front", "drawer", 0.9, 60.5), ("thing", "bottle", 0.4, 100.5))
 
 
@@ -86,7 +86,7 @@ def elevation() -> Elevation:
 
 
 def superseded(commands: Queue, number: int, *, wait: bool) -> bool:
-    """Whether a later command ends this one; what it reads stays in the queue, in its order."""
+    """Whether a later command supersedes this one; commands read for the check stay in the queue, in order."""
     read, found = [], False
     while not found:
         try:

@@ -1,6 +1,6 @@
-"""An OpenID provider at a free port, which it prints: oidc-provider-mock, which has its callers keep to PKCE as well.
+"""OpenID provider on a free port, which it prints: oidc-provider-mock, extended to enforce PKCE.
 
-Its tokens are signed for whom `PUT /users/SUB` describes. What a token says can be bent: `PUT /bend` with {"claim": value}.
+Its tokens are issued for the subject described by `PUT /users/SUB`. `PUT /bend` with {"claim": value} falsifies claims.
 """
 
 import base64
@@ -15,7 +15,7 @@ import werkzeug.serving
 from oidc_provider_mock import _app
 
 BENT: dict[str, Any] = {}
-CHALLENGES: dict[str, str] = {}  # by code
+CHALLENGES: dict[str, str] = {}  # by authorisation code
 provider = _app.app(require_nonce=True)
 _jwt_config = _app.OpenIDCode.get_jwt_config
 
@@ -60,7 +60,7 @@ def check_verifier() -> tuple[dict[str, str], int] | None:
 
 
 server = werkzeug.serving.make_server("127.0.0.1", 0, provider, threaded=True)
-threading.Thread(target=lambda: (sys.stdin.read(), server.shutdown()), daemon=True).start()  # it ends with the tests
+threading.Thread(target=lambda: (sys.stdin.read(), server.shutdown()), daemon=True).start()  # ends with the tests
 sys.stdout.write(f"{server.server_port}\n")
 sys.stdout.flush()
 server.serve_forever()

@@ -1,6 +1,6 @@
-"""The live segmenter with a session that sees two panels, the left and the right half of every frame.
+"""Stand-in live segmenter with a session of two panels, the left and the right half of every frame.
 
-Two fronts clicked on one panel part it half way between their clicks.
+Two fronts clicked on one panel divide it half way between their clicks.
 """
 
 import sys
@@ -29,7 +29,7 @@ CAPTURE: Any = SimpleNamespace(
 
 
 class Panels:
-    """A pixel is a centimetre."""
+    """Session in which a pixel is a centimetre."""
 
     def glimpse(self, prompt: ObjectPrompt) -> tuple[int, PackedMask, float]:
         return prompt.points[-1].frame, _mask(prompt), 0.9

@@ -1,4 +1,4 @@
-"""Finds every file readable, except one that says otherwise: `probe.py recording|mesh FILE NAME`. "endless" never ends."""
+"""Stand-in probe that accepts every file, except by name: `probe.py recording|mesh FILE NAME`. "endless" never ends."""
 
 import json
 import signal

@@ -1,4 +1,4 @@
-"""A sample recording that is only a prompts file: `sample.py FOLDER --seed …`."""
+"""Stand-in for the sample's job, which writes only a prompts file: `sample.py FOLDER --seed …`."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""Variants that are only a picture and facts: `vary.py BUNDLE FOLDER --count N --seed S`, as PROJECT/behave.json says."""
+"""Stand-in for variants, only a picture and facts: `vary.py BUNDLE FOLDER --count N --seed S`, as PROJECT/behave.json says."""
 
 import json
 import signal

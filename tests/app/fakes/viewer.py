@@ -1,4 +1,4 @@
-"""A viewer whose upstream echoes; opacity 0.123 kills it, 0.321 keeps it busy for ever; a view that is not open says so."""
+"""Stand-in viewer with an echoing upstream; opacity 0.123 kills it, 0.321 blocks it for ever; views not open are an error."""
 
 import json
 import signal
@@ -36,7 +36,7 @@ def choose(_: ServerConnection, offered: Any) -> Any:
 server = serve(echo, "127.0.0.1", 0, process_request=page, select_subprotocol=choose, compression=None)
 threading.Thread(target=server.serve_forever, daemon=True).start()
 port = server.socket.getsockname()[1]
-shown: dict[str, int] = {}  # times, by view
+shown: dict[str, int] = {}  # number of times, by view
 opened: set[str] = set()
 for line in sys.stdin:
     command = json.loads(line)

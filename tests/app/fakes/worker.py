@@ -1,7 +1,7 @@
-"""A stage worker that does what WORKDIR/../behave.json says: `worker.py WORKDIR --until STAGE --request FILE [--only NAME …]`.
+"""Stand-in stage worker controlled by WORKDIR/../behave.json: `worker.py WORKDIR --until STAGE --request FILE [--only NAME …]`.
 
-A stage that goes by "objects" stores each of them; `hold-NAME` beside that file keeps whoever is at NAME, which
-`at-NAME.part` says, a name that no store keeps. An object whose name is in `bad.txt` fails.
+A stage that works by "objects" stores each of them; a file `hold-NAME` beside behave.json blocks the process that computes
+NAME, which it announces by `at-NAME.part`, a name that no store keeps. An object whose name is in `bad.txt` fails.
 """
 
 import json
@@ -26,7 +26,7 @@ def say(**message: object) -> None:
 
 
 def work_slowly(workdir: Path, stage: str, given: Path) -> None:
-    """Take a moment, unless the same was done before; what is stored tells two doings apart."""
+    """Take a moment unless the result exists; stored content differs between computations."""
     stored = workdir / "nouns" / stage / "stand-in.noun"
     key = (given / "prompts.json").read_text() + (given / "overrides.json").read_text()
     if stored.is_file() and json.loads(stored.read_text())["key"] == key:
@@ -39,7 +39,7 @@ def work_slowly(workdir: Path, stage: str, given: Path) -> None:
 
 
 def compute_objects(workdir: Path, stage: str, given: Path, only: list[str] | None) -> list[str]:
-    """Those that are not there, or some of them; what is left."""
+    """Compute the missing objects, or some of them; return those left."""
     names = [item["name"] for item in json.loads((given / "prompts.json").read_text())["objects"]]
     stored = {name: workdir / "nouns" / stage / f"{name}.noun" for name in names}
     missing = [name for name in names if not stored[name].exists()]
@@ -61,7 +61,7 @@ def compute_objects(workdir: Path, stage: str, given: Path, only: list[str] | No
 
 
 def hold(project: Path, name: str, stage: str) -> None:
-    """Stay at it while somebody wants that; then this process ends as it is told."""
+    """Block while the test holds the object; then end this process as told."""
     stopped: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
     if (project / f"hold-{name}").exists():
