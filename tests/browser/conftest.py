@@ -1,4 +1,4 @@
-"""A served app and a real Chromium."""
+"""Fixtures of browser tests: a served app and a real Chromium."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ CHROMIUM = next((path for name in NAMES if (path := shutil.which(name))), None)
 
 expect.set_options(timeout=PATIENCE_MS)
 
-QUIET = [  # without these Chromium looks for servers of its maker; a software GL draws the 3D view
+QUIET = [  # otherwise Chromium contacts its vendor's servers; a software GL draws the 3D view
     "--no-sandbox",
     "--disable-quic",
     "--no-first-run",
@@ -59,7 +59,7 @@ def address(tmp_path: Path) -> Iterator[str]:
         yield found
 
 
-@pytest.fixture(scope="package")  # its event loop must not outlive the browser tests: others start loops of their own
+@pytest.fixture(scope="package")  # its event loop must end with the browser tests: others start their own
 def browser() -> Iterator[Browser]:
     with (
         sync_playwright() as playwright,
@@ -70,7 +70,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def new_context(browser: Browser) -> Iterator[NewContext]:
-    """Makes contexts, of 1280 x 720 pixels where nothing else is asked for, that end with the test."""
+    """Factory of contexts that end with the test, by default of 1280 x 720 pixels."""
     with ExitStack() as opened:
 
         def make(**how: Any) -> BrowserContext:
@@ -85,7 +85,7 @@ def new_context(browser: Browser) -> Iterator[NewContext]:
 
 @pytest.fixture
 def page(address: str, new_context: NewContext) -> Iterator[Page]:
-    """A page that is signed in, and that fails the test when our code throws."""
+    """A signed-in page that fails the test if our code throws an error."""
     opened = new_context().new_page()
     thrown: list[str] = []
     opened.on("pageerror", lambda error: thrown.append(str(error)))
@@ -96,13 +96,13 @@ def page(address: str, new_context: NewContext) -> Iterator[Page]:
 
 @pytest.fixture
 def live() -> str:
-    """The live segmenter among tests/app/fakes that `server` runs; a module with another one says so."""
+    """Name of the stand-in live segmenter in tests/app/fakes that `server` runs; modules may override it."""
     return "live"
 
 
 @pytest.fixture
 def server(tmp_path: Path, live: str) -> Iterator[Server]:
-    """An app of one test's own, with stand-ins for its slow parts and accounts of Ann, Bea and Cleo."""
+    """A separate app for one test, with stand-ins for its slow parts and accounts of Ann, Bea and Cleo."""
     data = tmp_path / "data"
     data.mkdir()
     with Server(data, live=live) as running:

@@ -1,4 +1,4 @@
-"""How a page looks in the light and in the dark theme: its screenshots, and what axe-core says of it."""
+"""Appearance of pages in the light and the dark theme: screenshots, and findings of axe-core."""
 
 import os
 from collections.abc import Iterator
@@ -8,15 +8,15 @@ from playwright.sync_api import Page
 
 from tests.waiting import PATIENCE_MS, until
 
-LONG_MS = 4 * PATIENCE_MS  # a software GL draws when it can
-PICTURES = os.environ.get("R2C2R_PICTURES")  # a folder: tests leave screenshots of the pages there
+LONG_MS = 4 * PATIENCE_MS  # software GL is slow
+PICTURES = os.environ.get("R2C2R_PICTURES")  # a folder in which tests store screenshots of the pages
 AXE = Path(__file__).parents[2] / "static" / "node_modules" / "axe-core" / "axe.min.js"
 SETTLE = "document.getAnimations().forEach((one) => one.effect.getComputedTiming().endTime < Infinity && one.finish())"
-FINDINGS = "axe.run({ exclude: ['iframe'] }, { resultTypes: ['violations'] })"  # viser's own page is not ours to mend
+FINDINGS = "axe.run({ exclude: ['iframe'] }, { resultTypes: ['violations'] })"  # viser's page is third-party
 
 
 def each_theme(page: Page) -> Iterator[str]:
-    """Show the page in either theme, as when the system changes its own; afterwards in the one it had."""
+    """Show the page in either theme, as when the system changes its own, and then restore the former one."""
     for theme in ("light", "dark"):
         page.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
         page.evaluate(SETTLE)
@@ -25,7 +25,7 @@ def each_theme(page: Page) -> Iterator[str]:
 
 
 def picture(page: Page, name: str, *, still: bool = False) -> None:
-    """Leave a screenshot in either theme; a still one when two in a row are alike, as a software GL draws when it can."""
+    """Store a screenshot in either theme; with `still` once two in a row are equal, as software GL is slow."""
     if not PICTURES:
         return
     for theme in each_theme(page):
@@ -40,7 +40,7 @@ def picture(page: Page, name: str, *, still: bool = False) -> None:
 
 
 def serious(page: Page, where: str) -> list[str]:
-    """What axe calls serious or critical in either theme; its context needs `bypass_csp`."""
+    """Findings that axe rates serious or critical, in either theme; needs a context with `bypass_csp`."""
     page.add_script_tag(path=AXE) if page.evaluate("typeof axe") == "undefined" else None
     return [
         f"{where}, {theme}: {v['id']} {node['target']} {node.get('failureSummary', '')[:160]}"

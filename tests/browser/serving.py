@@ -1,4 +1,4 @@
-"""The app served on a free port over a data folder, its printed addresses, and how tests wait for its pages."""
+"""App served on a free port over a data folder, its printed addresses, and helpers that wait for its pages."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ from tests.waiting import until
 NewContext = Callable[..., BrowserContext]
 """Takes what `Browser.new_context` takes."""
 
-STEADY = 4  # looks in a row that see a thing in one place
+STEADY = 4  # number of equal positions in a row
 REMEMBER = """new MutationObserver((changes) => {
   const added = changes.flatMap(({ addedNodes }) => [...addedNodes]);
   const toasts = added.filter((node) => node instanceof Element && node.matches(".toast") && node.checkVisibility());
@@ -25,11 +25,11 @@ TAKE = """(text) => {
   return found >= 0 && window.toasted.splice(found, 1);
 }"""
 
-_folders: dict[str, Path] = {}  # of running servers, by their addresses
+_folders: dict[str, Path] = {}  # of running servers, by address
 
 
 def printed_again(address: str) -> str:
-    """Another printed address of the same server: each opens one browser."""
+    """A further printed address of the same server: each signs in one browser."""
     return new_address(_folders[address.split("?")[0]])
 
 
@@ -45,7 +45,7 @@ def served(data: Path) -> Iterator[str]:
 
 
 def box_of(locator: Locator) -> FloatRect:
-    """Where it is on the screen, once it stays there: pages are laid out while they are filled."""
+    """Bounding box on the screen once it is stable, as the layout changes while pages are filled."""
     seen: list[FloatRect | None] = []
 
     def stays() -> bool:
@@ -59,10 +59,10 @@ def box_of(locator: Locator) -> FloatRect:
 
 
 def wait_for_toast(page: Page, text: str) -> None:
-    """Wait until the page has said so in a message, which goes after a while or when others come; each counts once."""
+    """Wait until the page has shown this toast, even if it is gone by now; each counts once."""
     page.wait_for_function(TAKE, arg=text)
 
 
 def drawn(page: Page) -> None:
-    """Wait until the page has drawn what it knows by now."""
+    """Wait until the page has rendered its current state."""
     page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")

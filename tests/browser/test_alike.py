@@ -1,4 +1,4 @@
-"""Many of one kind: the others like an object, by keys alone, and one name for all in the order they stand."""
+"""Many similar objects: selection of similar ones by keyboard, and a common name in the order of their positions."""
 
 from collections.abc import Callable
 from functools import partial
@@ -10,7 +10,7 @@ from tests.browser.serving import NewContext
 from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, post, signed_in
 
-# half a metre wide and 20 cm high, as what is proposed
+# half a metre wide and 20 cm high, like the proposals
 CORNERS = [[0.6, 2.0, 0.8], [1.1, 2.0, 0.8], [1.1, 2.0, 0.6], [0.6, 2.0, 0.6]]
 
 
@@ -46,7 +46,7 @@ def test_the_ones_like_an_object_are_shown_and_confirmed(new_context: NewContext
     page.keyboard.press("Enter")
     expect(page.get_by_role("button", name="pull_out_2", exact=True)).to_be_visible()
     expect(proposals.get_by_role("heading")).to_have_text("Like pull_out_1 (1)")
-    page.keyboard.press("Control+z")  # of what is confirmed, though the answer is still on its way
+    page.keyboard.press("Control+z")  # of the confirmation, whose response is still pending
     answers.pop()()
     page.unroute("**/proposals/confirm")
     expect(rows(page)).to_have_count(3)
@@ -68,7 +68,7 @@ def test_several_are_numbered_from_left_to_right_and_from_the_top_down(new_conte
     project = sample(page)
     page.goto(f"{project}/annotate?frame=3")
     expect(page.get_by_label("Proposals", exact=True).get_by_role("listitem")).to_have_count(3)
-    for across, down in ((0.6, 0.0), (0.0, 0.3), (0.0, 0.0)):  # made from the last to the first
+    for across, down in ((0.6, 0.0), (0.0, 0.3), (0.0, 0.0)):  # made in reverse order
         corners = [[x + across, y, z - down] for x, y, z in CORNERS]
         front = {"corners_m": corners, "handle": None, "hinge": None}
         post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "flap", "front": front})  # type: ignore[dict-item]

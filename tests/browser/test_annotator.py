@@ -1,4 +1,4 @@
-"""Who may not decide sees no button that would be refused, and can comment."""
+"""People without the right to decide see no button that would be refused, and can comment."""
 
 from playwright.sync_api import expect
 

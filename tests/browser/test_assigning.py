@@ -1,4 +1,4 @@
-"""Objects are assigned to people: shown and found by it in the list, and waiting in their inbox."""
+"""Assignment of objects to people: shown and searchable in the list, and in their inbox."""
 
 import re
 
@@ -11,7 +11,7 @@ from tests.browser.together import Server, post, signed_in
 
 
 def test_objects_are_assigned_and_wait_for_their_person(new_context: NewContext, server: Server) -> None:
-    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # for axe
+    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     project = sample(ann)
     for _ in range(10):
@@ -19,7 +19,7 @@ def test_objects_are_assigned_and_wait_for_their_person(new_context: NewContext,
     ann.goto(f"{project}/annotate")
     inbox = bea.locator("r2c2r-who").get_by_role("link", name="Inbox")
 
-    # one, by keyboard, in the list; taken back and done again
+    # one object, by keyboard, in the list; undone and redone
     pick(ann, "drawer_1")
     whose = ann.get_by_label("drawer_1 is assigned to")
     whose.focus()
@@ -34,7 +34,7 @@ def test_objects_are_assigned_and_wait_for_their_person(new_context: NewContext,
     ann.get_by_role("button", name="Redo", exact=True).click()
     expect(inbox).to_have_text("Inbox 1")
 
-    # several, from the bar and from the palette
+    # several objects, from the bar and from the command palette
     ann.get_by_role("button", name="bottle_1", exact=True).click(modifiers=["Control"])
     ann.get_by_role("button", name="bottle_3", exact=True).click(modifiers=["Shift"])
     ann.get_by_label("Assign all to").select_option("bea")
@@ -49,14 +49,14 @@ def test_objects_are_assigned_and_wait_for_their_person(new_context: NewContext,
     ann.keyboard.press("Enter")
     expect(inbox).to_have_text("Inbox 3")
 
-    # found by it
+    # search by assignee
     ann.get_by_label("Which objects").select_option("nobodys")
     expect(rows(ann)).to_have_count(9)
     ann.get_by_label("Which objects").select_option("all")
     ann.get_by_label("Find objects").fill("@bea")
-    expect(rows(ann)).to_have_count(4)  # the chosen one stays
+    expect(rows(ann)).to_have_count(4)  # the selected one stays visible
 
-    # in the inbox: to the object, and done with it
+    # from the inbox to the object, and done
     inbox.click()
     mine = bea.get_by_role("region", name=re.compile("^Objects assigned to you"))
     expect(mine.get_by_role("link")).to_have_text(["drawer_1", "bottle_1", "bottle_2"])

@@ -1,4 +1,4 @@
-"""The Run page tells what would spoil a run before anybody starts it."""
+"""The Run page reports, before a run is started, problems that would spoil it."""
 
 from playwright.sync_api import expect
 
@@ -7,7 +7,7 @@ from tests.browser.serving import NewContext
 from tests.browser.test_together import click_frame, ready, rows, sample
 from tests.browser.together import Server, post, signed_in
 
-SAME = {"frame": 3, "x": 30.5, "y": 90.5, "label": 1}  # as the click on drawer_2
+SAME = {"frame": 3, "x": 30.5, "y": 90.5, "label": 1}  # at the same place as the click on drawer_2
 
 
 def test_objects_that_spoil_a_run_are_told_before_it(new_context: NewContext, server: Server) -> None:
@@ -18,7 +18,7 @@ def test_objects_that_spoil_a_run_are_told_before_it(new_context: NewContext, se
     page.goto(f"{project}/run")
     expect(page.get_by_text("2 objects.")).to_be_visible()
     before = page.get_by_role("region", name="Before the run")
-    expect(before).to_be_hidden()  # nothing is wrong
+    expect(before).to_be_hidden()  # no problem
     page.goto(f"{project}/annotate?frame=3")
     page.get_by_role("button", name="New object").click()
     click_frame(page, 30, 90)

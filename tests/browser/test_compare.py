@@ -1,4 +1,4 @@
-"""Candidates side by side in Review: they turn together, what differs is marked and said, the crops are there."""
+"""Side-by-side candidates in Review: synchronised rotation, marked differences, source crops."""
 
 import re
 

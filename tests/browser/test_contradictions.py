@@ -1,4 +1,4 @@
-"""Two clicks on one thing are said beside both objects as soon as their masks are there, and no more once that is mended."""
+"""Two clicks on one object are reported beside both once their masks exist, until the contradiction is resolved."""
 
 import re
 from pathlib import Path
@@ -85,7 +85,7 @@ def test_a_size_that_its_category_does_not_have_is_said_at_the_click_with_what_m
         page.get_by_role("button", name="New object").click()
         click_frame(page, 20, 60)
         expect(rows(page)).to_have_count(3)
-        said = rows(page).last.locator(".contradicted", has_text="m high")  # beside that it is on the stand-in's one panel
+        said = rows(page).last.locator(".contradicted", has_text="m high")  # in addition to being on the stand-in's one panel
         expect(said).to_contain_text("1.20 m high")
         expect(said).to_contain_text("click each separately; else correct its category")
         picture(page, "doubt")

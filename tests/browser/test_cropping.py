@@ -1,4 +1,4 @@
-"""A thing's crop box: begun around its points, a side dragged and one moved by keys, in prompts.json, undone, taken away."""
+"""Crop box of an object: initialised around its points, changed by drag and keys, stored in prompts.json, undone, removed."""
 
 from contextlib import AbstractContextManager
 from typing import Any
@@ -13,7 +13,7 @@ from tests.browser.together import Server, signed_in
 
 
 def crop(page: Page) -> dict[str, Any] | None:
-    """What prompts.json says of the mug's box, once all is saved."""
+    """The mug's crop box in prompts.json, once all is saved."""
     expect(page.locator(".transport .chip").nth(1)).to_contain_text("saved")
     project = page.url.split("/p/")[1].split("/")[0]
     file = page.evaluate(f"async () => (await fetch('/api/projects/{project}/prompts.json')).json()")
@@ -23,7 +23,7 @@ def crop(page: Page) -> dict[str, Any] | None:
 
 
 def changed(page: Page) -> AbstractContextManager[object]:
-    """Wait until the server has taken the change that is made meanwhile."""
+    """Wait until the server has accepted the change made within the block."""
     return page.expect_response(lambda answer: answer.request.method == "PATCH" and answer.ok)
 
 
@@ -32,7 +32,7 @@ def test_a_crop_box_is_dragged_typed_undone_and_taken_away(new_context: NewConte
     context.clock.install()
     page = signed_in(context, server, "ann")
     project = sample(page).split("/p/")[1]
-    finish(server.data / "projects" / project / "work")  # cameras and depth, as a reading leaves them
+    finish(server.data / "projects" / project / "work")  # cameras and depth, as after reading the recording
     page.get_by_role("link", name="Annotate").click()
     page.get_by_role("button", name="mug_1", exact=True).click()
     page.keyboard.press("g")
@@ -40,7 +40,7 @@ def test_a_crop_box_is_dragged_typed_undone_and_taken_away(new_context: NewConte
     page.keyboard.press("s")
     sides = page.locator(".crop-side")
     expect(sides).to_have_count(6)
-    assert crop(page) is None  # nothing is stored before something is set
+    assert crop(page) is None  # nothing is stored before a first change
     right = page.get_by_role("slider", name="Right side of the crop box")
     before = int(right.get_attribute("aria-valuenow") or 0)
     box = box_of(right)
@@ -61,7 +61,7 @@ def test_a_crop_box_is_dragged_typed_undone_and_taken_away(new_context: NewConte
     top.focus()
     context.clock.pause_at(page.evaluate("Date.now()") / 1000 + 60)
     page.keyboard.press("Shift+ArrowUp")
-    page.keyboard.press("ArrowUp")  # one after the other they are one change, however slow the machine is
+    page.keyboard.press("ArrowUp")  # presses in a row are one change, however slow the machine is
     expect(top).to_have_attribute("aria-valuenow", str(tall + 11))
     with changed(page):
         context.clock.resume()

@@ -1,4 +1,4 @@
-"""Two names clicked on one panel show a mask each, and the page says whose front gave way; taken back, it is whole again."""
+"""Two names on one panel get a mask each, and the page states whose front was cut; undo restores the whole front."""
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -9,7 +9,7 @@ from tests.browser.test_together import click_frame, on_canvas, sample
 from tests.browser.together import Server, signed_in
 from tests.waiting import until
 
-LEFT, RIGHT, BESIDE = (15, 30), (65, 30), (120, 30)  # on the panel's halves and off it
+LEFT, RIGHT, BESIDE = (15, 30), (65, 30), (120, 30)  # on the panel's halves and outside it
 PIXEL = """(canvas, at) => {
   const scale = canvas.width / canvas.getBoundingClientRect().width;
   return [...canvas.getContext("2d").getImageData(at.x * scale, at.y * scale, 1, 1).data];
@@ -22,7 +22,7 @@ def live() -> str:
 
 
 def alike(page: Page, one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Whether two pixels of the frame, of one colour in the picture, are drawn in the same colour."""
+    """Whether two pixels of the frame, of equal colour in the picture, are drawn in equal colours."""
     canvas = page.locator("r2c2r-frame-canvas canvas").first
     colours = [canvas.evaluate(PIXEL, on_canvas(page, *point)) for point in (one, other)]
     return max(abs(a - b) for a, b in zip(*colours, strict=True)) < 20

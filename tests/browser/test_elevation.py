@@ -1,4 +1,4 @@
-"""Fronts drawn, split, typed, merged and taken back on a plane of the scan, by mouse and by keyboard, and kept."""
+"""Fronts on a plane of the scan: drawn, split, typed, merged and undone by mouse and by keyboard, and stored."""
 
 from typing import Any
 
@@ -10,12 +10,12 @@ from tests.browser.serving import NewContext, box_of
 from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
-MARGIN_PX = 16  # around the plane where it is fitted
-SIZE_M = (2.4, 0.9)  # of the plane that the stand-in draws, with seams every 60 cm
+MARGIN_PX = 16  # margin around the fitted plane
+SIZE_M = (2.4, 0.9)  # of the stand-in's plane, with seams every 60 cm
 
 
 def at(page: Page, x: float, y: float) -> tuple[float, float]:
-    """Where a position of the plane, metres from its top left corner, is on the screen."""
+    """Screen position of a point of the plane, given in metres from its top left corner."""
     box = box_of(page.locator("r2c2r-elevation-canvas canvas"))
     room = box["width"] - 2 * MARGIN_PX, box["height"] - 2 * MARGIN_PX
     scale = min(room[0] / SIZE_M[0], room[1] / SIZE_M[1])
@@ -36,7 +36,7 @@ def fronts(page: Page) -> Locator:
 
 
 def stored(page: Page) -> list[dict[str, Any]]:
-    """What prompts.json says, once all is saved."""
+    """Objects in prompts.json, once all is saved."""
     expect(page.locator(".stage-tools .chip").nth(1)).to_contain_text("saved")
     project = page.url.split("/p/")[1].split("/")[0]
     file: dict[str, Any] = page.evaluate(f"async () => (await fetch('/api/projects/{project}/prompts.json')).json()")
@@ -68,7 +68,7 @@ def test_fronts_are_drawn_split_typed_merged_and_taken_back(new_context: NewCont
     page.get_by_label("Width mm").fill("450")
     page.keyboard.press("Enter")
     expect(fronts(page).filter(has_text="450 × ")).to_have_count(1)
-    page.keyboard.press("e")  # the left edge
+    page.keyboard.press("e")  # selects the left edge
     page.keyboard.press("Shift+ArrowRight")
     expect(fronts(page).filter(has_text="440 × ")).to_have_count(1)
     page.keyboard.press("Control+z")
@@ -92,7 +92,7 @@ def test_fronts_are_drawn_split_typed_merged_and_taken_back(new_context: NewCont
     page.keyboard.up("Shift")
     page.keyboard.press("m")
     expect(fronts(page)).to_have_count(2)
-    page.keyboard.press("Control+z")  # one gesture: both are there again
+    page.keyboard.press("Control+z")  # one gesture: both are restored
     expect(fronts(page)).to_have_count(3)
     page.keyboard.press("Control+Shift+z")
     expect(fronts(page)).to_have_count(2)
@@ -150,7 +150,7 @@ def test_a_run_is_divided_repeated_numbered_and_taken_back_by_keyboard(new_conte
     page.mouse.click(*at(page, 0.8, 0.4))
     page.keyboard.press("t")
     page.keyboard.type("pan_1")
-    page.keyboard.press("Control+Enter")  # and the next one's
+    page.keyboard.press("Control+Enter")  # and confirms the next one's
     page.keyboard.type("pan_2")
     page.keyboard.press("Enter")
     expect(fronts(page).nth(4)).to_contain_text("pan_2")
@@ -186,7 +186,7 @@ def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(ne
     expect(fronts(page)).to_have_count(2)
     page.mouse.click(*at(page, 0.8, 0.4))
     page.mouse.move(*at(page, 1.1, 0.4))
-    page.keyboard.press("k")  # it is there already
+    page.keyboard.press("k")  # already shown
     page.keyboard.press("Control+z")
     expect(fronts(page)).to_have_count(1)
     page.keyboard.press("Control+Shift+z")
@@ -196,7 +196,7 @@ def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(ne
     page.keyboard.down("Shift")
     page.mouse.click(*at(page, 1.5, 0.4))
     page.keyboard.up("Shift")
-    with page.expect_response(lambda response: response.request.method == "DELETE"):  # the last of it
+    with page.expect_response(lambda response: response.request.method == "DELETE"):  # the last one
         page.keyboard.press("m")
     expect(fronts(page)).to_have_count(1)
     (merged,) = (entry["front"] for entry in stored(page))

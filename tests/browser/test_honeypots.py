@@ -1,4 +1,4 @@
-"""An admin slips a sample kitchen into somebody's queue, and sees how it was done."""
+"""An admin puts a sample kitchen into somebody's queue, and sees the score."""
 
 import csv
 from pathlib import Path
@@ -13,7 +13,7 @@ from tests.browser.together import Server, signed_in
 
 
 def test_a_honeypot_is_slipped_in_done_and_scored(new_context: NewContext, server: Server) -> None:
-    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # for axe
+    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
     ann, cleo = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "cleo"), strict=True))
     project = sample(ann).split("/p/")[1]
     write_truth(server.data / "projects" / project / "source")
@@ -33,7 +33,7 @@ def test_a_honeypot_is_slipped_in_done_and_scored(new_context: NewContext, serve
     cleo.goto(f"{cleo.url.split('?')[0]}?frame=3")
     ready(cleo)
     cleo.get_by_label("Category of the next object").fill("cabinet")
-    click_frame(cleo, 140, 20)  # on nothing
+    click_frame(cleo, 140, 20)  # on no object
     expect(rows(cleo)).to_have_count(1)
     expect(rows(cleo).last).to_contain_text("3 frames")
     cleo.goto(f"{server.address}/people")

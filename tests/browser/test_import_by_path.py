@@ -1,4 +1,4 @@
-"""A recording on the server's machine: a refused path stays with its reason, one from a folder that was allowed comes in."""
+"""Import of a recording on the server's machine: a refused path stays with its reason, one in an allowed folder is imported."""
 
 from playwright.sync_api import expect
 

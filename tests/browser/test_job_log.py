@@ -1,4 +1,4 @@
-"""The log of a job says what it did, also before its processes wrote anything."""
+"""The log of a job, shown even before its processes have written anything."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The journey: project, import, click, run, review, accept, download; in a real Chromium."""
+"""The whole journey in a real Chromium: project, import, click, run, review, accept, download."""
 
 import json
 import re
@@ -23,7 +23,7 @@ def click_of(sample: Path, category: str) -> tuple[int, float, float]:
 
 
 def click_frame(page: Page, x: float, y: float, *, button: str = "left") -> None:
-    """Click a pixel of the stored frame (320 x 240), wherever it is drawn."""
+    """Click a pixel of the stored frame (320 x 240) on the canvas."""
     canvas = page.locator("r2c2r-frame-canvas canvas")
     box = box_of(canvas)
     scale = min(box["width"] / 320, box["height"] / 240)
@@ -66,10 +66,10 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     expect(page.locator("r2c2r-object-list")).to_contain_text("2 clicks")
     page.keyboard.press("Control+z")
     expect(page.locator("r2c2r-object-list")).to_contain_text("1 click ")
-    page.reload()  # nothing is lost
+    page.reload()  # everything is stored
     expect(page.get_by_role("button", name="drawer_1", exact=True)).to_be_visible()
     page.get_by_role("button", name="drawer_1", exact=True).click()
-    page.get_by_label("Name of drawer_1").select_text()  # text selected in a field keeps the object chosen
+    page.get_by_label("Name of drawer_1").select_text()  # selecting text in a field keeps the object selected
     drawn(page)
     page.get_by_label("Name of drawer_1").fill("top_drawer")
     page.get_by_label("Name of drawer_1").press("Enter")
@@ -83,7 +83,7 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
     page.get_by_role("heading", name="Result").wait_for(timeout=LONG_MS)
     expect(page.get_by_role("row", name=re.compile("top_drawer"))).to_contain_text("Slides out, opens")
     limit = page.get_by_role("row", name=re.compile("top_drawer")).locator(".chip").first
-    word = re.sub(r"^\W+", "", limit.inner_text())  # a sign stands before it
+    word = re.sub(r"^\W+", "", limit.inner_text())  # without the leading sign
     expect(limit).to_have_attribute("title", re.compile(f"limits: {word}"))
     expect(page.get_by_role("heading", name=re.compile("Certificate"))).to_contain_text("passed")
     picture(page, "5-result")
@@ -125,9 +125,9 @@ def test_the_sample_is_seen_while_it_is_made_and_opens_with_its_masks(page: Page
     expect(page.locator(".transport .chip").first).to_have_text("ready")
     rows = page.locator(".object-list > li")
     expect(rows.first).to_contain_text("frames")
-    seen = rows.all_text_contents()  # how many frames is in it, and shown of the chosen one
+    seen = rows.all_text_contents()  # includes the number of frames, shown for the selected one
     assert len(seen) > 5
-    assert all("frame" in row for row in seen), seen  # nobody clicked and nobody asked for them
+    assert all("frame" in row for row in seen), seen  # without any click or request
 
 
 def test_a_foreign_file_is_refused_in_one_line(page: Page, address: str, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Projects are tagged, archived, duplicated and deleted from their list, and each of these is undone there."""
+"""Tag, archive, duplicate and delete projects from their list, with undo for each."""
 
 from playwright.sync_api import expect
 
@@ -47,7 +47,7 @@ def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Serve
 
     page.get_by_role("button", name="Delete: Cellar", exact=True).click()
     deleted = page.locator(".toast", has_text="in the trash")
-    deleted.hover()  # from under the mouse it does not go
+    deleted.hover()  # a hovered toast does not disappear
     expect(names).to_have_count(2)
     page.get_by_label("Which projects").select_option("Trash")
     expect(page.locator(".trash-list > li")).to_contain_text(["deleted by ann"])

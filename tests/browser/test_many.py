@@ -1,4 +1,4 @@
-"""Lists of many objects and projects are searched, ordered, and keep their heads in sight."""
+"""Long lists of objects and projects: search, order, and sticky headings."""
 
 import re
 
@@ -25,7 +25,7 @@ def test_many_objects_are_searched_and_new_object_stays_in_sight(new_context: Ne
     expect(rows(page)).to_have_count(7)
     expect(rows(page).first).to_be_in_viewport()
     expect(page.locator(".find")).to_contain_text("7 of 16")
-    expect(rows(page).first.locator(".badge")).to_have_text("4")  # the number it has on the picture
+    expect(rows(page).first.locator(".badge")).to_have_text("4")  # its number on the picture
     picture(page, "many-objects")
     page.get_by_label("Find objects").fill("")
     expect(rows(page)).to_have_count(16)
@@ -41,14 +41,14 @@ def test_sixty_objects_are_grouped_locked_and_changed_together(new_context: NewC
     page.goto(f"{project}/annotate")
     expect(rows(page)).to_have_count(60)
     painted = "rows => rows.filter(row => row.querySelector('.head').checkVisibility({ contentVisibilityAuto: true })).length"
-    assert rows(page).evaluate_all(painted) < 30  # those in sight
+    assert rows(page).evaluate_all(painted) < 30  # only the visible ones
 
     first = page.locator(".object-list .pick").first
     first.evaluate("button => button.stays = true")
     page.get_by_role("button", name="Hide mug_1", exact=True).focus()
     page.keyboard.press("Enter")
     expect(page.get_by_role("button", name="Show mug_1", exact=True)).to_be_focused()
-    assert first.evaluate("button => button.stays")  # no other line was made anew
+    assert first.evaluate("button => button.stays")  # no other row was rebuilt
     stops = "rows => rows.filter(row => row.querySelector('.pick').tabIndex === 0).length"
     assert rows(page).evaluate_all(stops) == 1
     page.keyboard.press("ArrowDown")
@@ -57,7 +57,7 @@ def test_sixty_objects_are_grouped_locked_and_changed_together(new_context: NewC
     page.get_by_label("Order of the objects").select_option("category")
     expect(page.locator(".object-list h2").first).to_have_text(re.compile(r"^bottle \d+"))
     page.locator(".objects-pane .scrolled").evaluate("pane => pane.scrollTo(0, 300)")
-    expect(page.get_by_role("heading", name=re.compile("^bottle "))).to_be_in_viewport()  # the group that is looked at
+    expect(page.get_by_role("heading", name=re.compile("^bottle "))).to_be_in_viewport()  # the current group
     expect(page.get_by_role("heading", name="Objects", exact=True)).to_be_in_viewport()
 
     page.get_by_role("button", name=re.compile(", bottle_2$")).click()
@@ -76,7 +76,7 @@ def test_sixty_objects_are_grouped_locked_and_changed_together(new_context: NewC
     wait_for_toast(page, "jar_1 is locked")
     page.get_by_label("Which objects").select_option("locked")
     expect(page.locator(".object-list .pick")).to_have_count(3)
-    page.reload()  # a lock is kept
+    page.reload()  # a lock is stored
     page.get_by_label("Which objects").select_option("locked")
     expect(page.locator(".object-list .pick")).to_have_count(3)
     page.get_by_role("button", name="jar_1", exact=True).click()

@@ -1,4 +1,4 @@
-"""A mesh of one's own in Review: shown before it is used."""
+"""Upload of a person's own mesh in Review: previewed before it is used."""
 
 import trimesh
 from playwright.sync_api import Page, expect

@@ -1,4 +1,4 @@
-"""Naming objects: any words are joined to a name, categories are offered, and what is to know of one is said once."""
+"""Names of objects: words are joined to a valid name, categories are suggested, and hints are shown once."""
 
 from playwright.sync_api import expect
 
@@ -23,7 +23,7 @@ def test_names_are_joined_and_an_unknown_category_is_said_once(new_context: NewC
     expect(notices).to_have_count(1)
     expect(notices).to_contain_text("'gizmo' is not a known category")
     page.get_by_role("button", name="gizmo_3", exact=True).click()
-    expect(notices).to_have_count(2)  # of the first, and of the one that is worked at
+    expect(notices).to_have_count(2)  # for the first, and for the current object
 
     page.get_by_label("Name of gizmo_3").fill("mom's cook books")
     page.get_by_label("Name of gizmo_3").press("Enter")
@@ -31,7 +31,7 @@ def test_names_are_joined_and_an_unknown_category_is_said_once(new_context: NewC
     page.get_by_label("Category of mom_s_cook_books").fill("book")
     page.get_by_label("Category of mom_s_cook_books").press("Enter")
     expect(notices).to_have_count(1)
-    expect(page.get_by_label("Category of the next object")).to_have_value("drawer")  # it follows nothing
+    expect(page.get_by_label("Category of the next object")).to_have_value("drawer")  # unaffected by the other object
 
     proposals = page.get_by_label("Proposals", exact=True)
     expect(proposals.get_by_role("button", name="Confirm 2", exact=True)).to_be_enabled()

@@ -1,4 +1,4 @@
-"""A front that was filmed open has a lane of its own above its object's: states in words, angle over time, scrubbed too."""
+"""Lane of a front that was filmed open, above its object's: states in words, angle over time, scrubbing."""
 
 from playwright.sync_api import expect
 
@@ -15,7 +15,7 @@ def test_the_lane_of_an_opening_says_what_the_front_does_in_the_frame_shown(new_
     page.get_by_role("link", name="Annotate").click()
     page.get_by_label("Category of the next object").fill("cabinet")
     page.get_by_role("button", name="New object").click()
-    click_frame(page, 100, 40)  # tests/app/fakes/live.py says that it is closed, opened and open
+    click_frame(page, 100, 40)  # tests/app/fakes/live.py reports it as closed, opened and open
     lane = page.get_by_role("img", name="Opening of cabinet_1: seen up to 86°, at least")
     expect(lane).to_have_count(1)
     state = page.locator(".opening .state")

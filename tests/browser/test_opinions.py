@@ -1,4 +1,4 @@
-"""Two people click one recording apart, and see how far they agree."""
+"""Two people annotate one recording independently, and see their agreement."""
 
 import csv
 import re
@@ -13,7 +13,7 @@ from tests.browser.together import Server, post, signed_in
 
 
 def test_a_second_opinion_is_asked_given_and_compared(new_context: NewContext, server: Server) -> None:
-    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # for axe
+    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     project = sample(ann)
     ann.goto(f"{project}/annotate?frame=3")
@@ -23,7 +23,7 @@ def test_a_second_opinion_is_asked_given_and_compared(new_context: NewContext, s
         click_frame(ann, x, y)
     expect(rows(ann)).to_have_count(4)
     expect(rows(ann).last).to_contain_text("3 frames")
-    post(ann, f"/api/projects/{project.rsplit('/', 1)[-1]}/objects", {"category": "bottle"})  # which has no mask
+    post(ann, f"/api/projects/{project.rsplit('/', 1)[-1]}/objects", {"category": "bottle"})  # has no mask
 
     ann.goto(project)
     section = ann.get_by_role("region", name="Second opinions")
@@ -67,5 +67,5 @@ def test_a_second_opinion_is_asked_given_and_compared(new_context: NewContext, s
         ann.get_by_role("link", name="Download as a table").press("Enter")
     told = list(csv.DictReader(Path(waiting.value.path()).read_text().splitlines()))
     assert (told[-1]["first object"], told[-1]["second category"], told[-1]["same category"]) == ("drawer_2", "oven", "no")
-    ann.get_by_role("link", name="oven_1").press("Enter")  # into the other's project
+    ann.get_by_role("link", name="oven_1").press("Enter")  # opens the other project
     expect(ann.get_by_label("Name of oven_1")).to_be_visible()

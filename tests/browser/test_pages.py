@@ -1,4 +1,4 @@
-"""Our pages on a finished project: nothing serious for axe-core, a small first load, and nothing lost without a connection."""
+"""Pages of a finished project: no serious finding of axe-core, a small first load, and no loss of changes while offline."""
 
 import json
 import re
@@ -50,7 +50,7 @@ PROMPTS = {
     "version": 1,
     "objects": [{"name": "drawer_1", "category": "drawer", "points": [{"frame": 3, "x": 80, "y": 60, "label": 1}]}],
 }
-SIZES = (1280, 720), (1024, 768)  # pixels of a laptop, of a tablet
+SIZES = (1280, 720), (1024, 768)  # pixels of a laptop and of a tablet
 PAGES = ("", "/annotate", "/run", "/review", "/download")
 FIRST_LOAD_BYTES = 200_000
 
@@ -79,20 +79,20 @@ def served_with_finished(data: Path) -> Iterator[tuple[str, str]]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, str]]:
-    """For tests that only look at it."""
+    """A finished project shared by tests that only read it."""
     with served_with_finished(tmp_path_factory.mktemp("finished")) as found:
         yield found
 
 
 @pytest.fixture
 def changed(tmp_path: Path) -> Iterator[tuple[str, str]]:
-    """For a test that changes it."""
+    """A finished project for one test, which may change it."""
     with served_with_finished(tmp_path) as found:
         yield found
 
 
 def signed_in(new_context: NewContext, address: str, **looks: Any) -> Page:
-    """A page of a browser of its own, which opened the printed address."""
+    """A page of a separate browser that opened the printed address."""
     page = new_context(**looks).new_page()
     page.goto(printed_again(address))
     return page
@@ -124,7 +124,7 @@ def test_no_page_has_a_serious_finding(new_context: NewContext, finished: tuple[
                 page.keyboard.press(key)
                 found += of_every_size(shown)
     page.evaluate("document.body.append(document.createElement('button'))")
-    assert any("button-name" in line for line in serious(page, "spoilt"))  # axe does look
+    assert any("button-name" in line for line in serious(page, "spoilt"))  # axe does check the page
     assert found == []
 
 
@@ -147,11 +147,11 @@ def test_lines_for_a_simulator_are_copied_by_keyboard_and_robots_are_seen(
     page.locator("summary", has_text="PyBullet").focus()
     page.keyboard.press("Enter")
     expect(page.get_by_text("pip install pybullet")).to_be_visible()
-    expect(page.get_by_text("pip install mujoco", exact=True)).to_be_hidden()  # one is open at a time
+    expect(page.get_by_text("pip install mujoco", exact=True)).to_be_hidden()  # only one is open at a time
     summary = page.locator("summary", has_text="PyBullet")
     drawn = summary.element_handle()
     page.evaluate("import('/static/js/live.js').then(({ live }) => live.dispatchEvent(new Event('project')))")
-    page.wait_for_function("summary => !summary.isConnected", arg=drawn)  # a word of the project draws the page anew
+    page.wait_for_function("summary => !summary.isConnected", arg=drawn)  # an event of the project rebuilds the page
     expect(page.get_by_text("pip install pybullet")).to_be_visible()
     expect(summary).to_be_focused()
     page.get_by_role("button", name="Copy the lines for PyBullet").focus()
@@ -226,7 +226,7 @@ def test_a_second_tab_leaves_what_waits_to_the_first_until_that_is_gone(
     sent: list[str] = []
     second.on("request", lambda asked: sent.append(asked.url) if asked.method == "PATCH" else None)
     second.goto(first.url)
-    second.wait_for_function("async () => (await navigator.locks.query()).pending.length > 0")  # it waits for the first tab
+    second.wait_for_function("async () => (await navigator.locks.query()).pending.length > 0")  # waits for the first tab
     assert sent == []
     first.close()
     second.locator(".object-list .pick").first.click()
@@ -250,11 +250,11 @@ def test_a_control_reached_by_keyboard_is_used_by_it(new_context: NewContext, fi
     page = signed_in(new_context, address)
     page.goto(f"{address.split('/?')[0]}/p/{project}/annotate?frame=3")
     expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
-    for key, name in (("Enter", "Take away"), ("Space", "Add")):  # not: finish the object, play
+    for key, name in (("Enter", "Take away"), ("Space", "Add")):  # does not: finish the object, play
         page.get_by_role("button", name=name).focus()
         page.keyboard.press(key)
         expect(page.get_by_role("button", name=name)).to_have_attribute("aria-pressed", "true")
     page.get_by_label("Mask opacity").focus()
-    page.keyboard.press("ArrowRight")  # not: the next frame
+    page.keyboard.press("ArrowRight")  # does not: step to the next frame
     expect(page.get_by_label("Mask opacity")).to_have_value("43")
     expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")

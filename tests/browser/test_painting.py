@@ -1,4 +1,4 @@
-"""A mask painted, kept and said not to be there in one frame, taken back, and in prompts.json."""
+"""A mask painted, confirmed, and marked as absent in one frame; undone, and in prompts.json."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +11,7 @@ from tests.browser.together import Server, signed_in
 
 
 def said(page: Page) -> list[dict[str, Any]]:
-    """What prompts.json says of the first object's frames."""
+    """Corrections of the first object's frames in prompts.json."""
     project = page.url.split("/p/")[1].split("/")[0]
     file = page.evaluate(f"async () => (await fetch('/api/projects/{project}/prompts.json')).json()")
     frames: list[dict[str, Any]] = file["objects"][0].get("frames", [])
@@ -42,7 +42,7 @@ def test_a_mask_is_painted_kept_and_said_not_to_be_there(new_context: NewContext
     assert sum(painted["mask"]["runs"][1::2]) > 0
     page.keyboard.press("Escape")
     page.keyboard.press("a")
-    wait_for_toast(page, "not visible")  # beside what the 3D view says of a stand-in
+    wait_for_toast(page, "not visible")  # in addition to the 3D view's message about a stand-in
     assert said(page) == [{"frame": painted["frame"], "mask": None}]
     page.keyboard.press("Control+z")
     wait_for_toast(page, "Undone")
@@ -93,7 +93,7 @@ def test_eraser_lasso_polygon_and_keep_each_set_the_frame_right(new_context: New
     assert area() == erased
     page.keyboard.press("ArrowRight")
     with page.expect_response(lambda answer: answer.request.method == "PUT"):
-        page.keyboard.press("w")  # what is found in the next frame stands
+        page.keyboard.press("w")  # the mask found in the next frame stays
     expect(saved).to_contain_text("saved")
     kept = said(page)
     assert len(kept) == 2

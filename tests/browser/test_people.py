@@ -1,4 +1,4 @@
-"""Accounts, from the admin's page to the one they are about."""
+"""Accounts, from the admin's page to the person's own."""
 
 import json
 import re
@@ -44,7 +44,7 @@ def test_who_is_added_may_work_and_who_is_removed_is_shown_out(new_context: NewC
 
     ann.get_by_label("Role of carl").select_option("reviewer")
     wait_for_toast(ann, "carl is reviewer now")
-    expect(me).to_have_attribute("title", "reviewer: accounts and your password")  # by itself
+    expect(me).to_have_attribute("title", "reviewer: accounts and your password")  # updated without reload
     ann.reload()
     record = ann.locator("r2c2r-audit-record")
     expect(record.get_by_role("row", name="role annotator → reviewer carl ann")).to_be_visible()
@@ -54,7 +54,7 @@ def test_who_is_added_may_work_and_who_is_removed_is_shown_out(new_context: NewC
     ann.once("dialog", lambda dialog: dialog.accept())
     ann.get_by_role("button", name="Remove carl").click()
     expect(ann.get_by_label("Role of carl")).to_have_count(0)
-    expect(carl.get_by_role("button", name="Sign in")).to_be_visible()  # his open page is shown out
+    expect(carl.get_by_role("button", name="Sign in")).to_be_visible()  # his open page is signed out
     carl.goto(server.address)
     expect(carl.get_by_role("button", name="Sign in")).to_be_visible()
 
@@ -96,7 +96,7 @@ def test_webhooks_are_added_tried_and_removed_by_keyboard(new_context: NewContex
             self.end_headers()
 
         def log_message(self, *_: object) -> None:
-            """Nothing."""
+            """Silence the log."""
 
     with ThreadingHTTPServer(("127.0.0.1", 0), Listening) as listening:
         threading.Thread(target=listening.serve_forever, daemon=True).start()
@@ -125,7 +125,7 @@ def test_webhooks_are_added_tried_and_removed_by_keyboard(new_context: NewContex
             test.focus()
             ann.keyboard.press("Enter")
             expect(answers.get_by_role("row", name=f"test {answer}")).to_be_visible()
-        expect(test).to_be_focused()  # the list was drawn anew meanwhile
+        expect(test).to_be_focused()  # the list was rebuilt meanwhile
         expect(ann.get_by_role("row", name=url)).to_contain_text("204, delivered just now")
         picture(ann, "25-webhooks")
         ann.get_by_role("button", name=f"Answers of {url}").press("Enter")
@@ -151,7 +151,7 @@ def test_a_project_is_kept_to_the_people_its_owner_names(new_context: NewContext
     panel.get_by_label("Everybody who may sign in").press("ArrowDown")
     expect(nobody).to_be_visible()
     expect(panel.get_by_label("Only these people")).to_be_focused()
-    expect(card).to_have_count(0)  # by itself
+    expect(card).to_have_count(0)  # removed without reload
 
     name = panel.get_by_label("Name")
     name.fill("zoe")
@@ -160,7 +160,7 @@ def test_a_project_is_kept_to_the_people_its_owner_names(new_context: NewContext
     name.press("Control+a")
     panel.get_by_role("group").evaluate("choices => (choices.dataset.before = '')")
     ask(ann, "PATCH", f"/api/projects/{ann.url.split('/p/')[1]}", {"tags": ["north"]})
-    expect(panel.locator("[data-before]")).to_have_count(0)  # drawn anew by what others did
+    expect(panel.locator("[data-before]")).to_have_count(0)  # rebuilt after changes by others
     ann.keyboard.insert_text("al")
     expect(name).to_have_value("al")
     name.fill("bea")
@@ -172,12 +172,12 @@ def test_a_project_is_kept_to_the_people_its_owner_names(new_context: NewContext
     ann.wait_for_function(f"({below})(document.activeElement.closest('section')) >= 12")  # px between the card and what follows
     picture(ann, "23-members")
 
-    card.click()  # it is there again
+    card.click()  # it is shown again
     told = bea.get_by_role("region", name="Who sees this project")
     expect(told).to_contain_text("Only ann, bea and admins see it")
     expect(told.get_by_role("radio")).to_have_count(0)
 
-    panel.get_by_role("button", name="Remove bea").press("Enter")  # while she looks at it
+    panel.get_by_role("button", name="Remove bea").press("Enter")  # while she has it open
     expect(name).to_be_focused()
     wait_for_toast(bea, "Sample kitchen is kept to its members now")
     expect(bea.get_by_role("heading", name="Projects")).to_be_visible()
@@ -193,7 +193,7 @@ def test_an_admin_leaves_or_adopts_what_was_set_aside(new_context: NewContext, s
     ann.get_by_role("link", name="Run on 2 objects").wait_for()
     project = ann.url.rsplit("/", 1)[1]
     files = project_files(server.data, project)
-    until(lambda: files.description.exists() and "mug_1" in files.description.read_text())  # written a little after it is so
+    until(lambda: files.description.exists() and "mug_1" in files.description.read_text())  # written with a short delay
     shutil.copytree(files.root, server.data / "unknown" / project)
     for place in ("projects", "trash"):
         address = f"{server.address}/api/{place}/{project}"

@@ -1,4 +1,4 @@
-"""The object over its photos in Review: outlined, filling the picture, with the comments that were pinned on it."""
+"""Objects overlaid on their photos in Review: outlined, zoomed to fit, with the comments pinned to them."""
 
 import re
 
@@ -41,7 +41,7 @@ def test_the_object_fills_the_picture_and_its_comments_are_pins(new_context: New
     page.keyboard.press("c")
     say(page, "Comment", "and a dent")
     expect(page.get_by_role("button", name="and a dent", exact=True)).to_be_visible()
-    assert drawn.evaluate("pin => pin.isConnected")  # whoever points at it goes on reading it
+    assert drawn.evaluate("pin => pin.isConnected")  # the hovered pin is not rebuilt
     shown = box_of(pin)
     assert shown["x"] + shown["width"] / 2 == pytest.approx(at[0], abs=2)
     assert shown["y"] + shown["height"] / 2 == pytest.approx(at[1], abs=2)
@@ -58,7 +58,7 @@ def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(new_
     number = segmented(page, project)
     page.goto(f"{project}/review?object={number}")
 
-    # what was measured, and what is not known
+    # measured values, and unknown ones
     said = page.locator(".opening-marks output")
     plot = page.get_by_role("img", name="Opening over the frames: up to 25 cm, at least; marked in 0")
     expect(plot).to_be_visible()
@@ -81,7 +81,7 @@ def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(new_
     expect(said).to_have_text("opening, 3 cm")
     expect(page.locator(".opening-marks .chip.person")).to_be_visible()
     expect(page.get_by_role("img", name="marked in 1")).to_be_visible()
-    assert drawn.get_attribute("src") != before  # the leaf over the photo is drawn anew
+    assert drawn.get_attribute("src") != before  # the leaf over the photo is redrawn
     picture(page, "opening-marks")
     assert serious(page, "a marked leaf") == []
     page.keyboard.press("Control+z")
@@ -90,7 +90,7 @@ def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(new_
     page.keyboard.press("Control+Shift+z")
     expect(said).to_have_text("opening, 3 cm")
 
-    # dragged by its edge: a drawer comes out towards the top of this picture
+    # dragged by its edge: in this picture a drawer opens upwards
     hold = box_of(page.locator("r2c2r-photo-check .hold"))
     x, y = hold["x"] + hold["width"] / 2, hold["y"] + hold["height"] / 2
     page.mouse.move(x, y)
@@ -112,7 +112,7 @@ def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(new_
     stored = page.request.get(f"{server.address}/api/projects/{project.split('/p/')[1]}/objects/{number}/override").json()
     assert stored["states"] == {"front": [{"frame": 0, "state": 0.0}, {"frame": 3, "state": 0.0}]}
 
-    # the lane of the annotate page says so too
+    # the lane of the annotate page shows the same
     page.goto(f"{project}/annotate?frame=3&object={number}")
     ready(page)
     expect(page.locator(".opening .state")).to_have_text("closed, set by a person")
@@ -138,7 +138,7 @@ def test_who_annotates_sees_marks_and_makes_none(new_context: NewContext, server
 
 
 def segmented(page: Page, project: str) -> str:
-    """The number of the drawer, once its masks are there."""
+    """Id of the drawer, once its masks exist."""
     page.goto(f"{project}/annotate?frame=3")
     ready(page)
     pick(page, "drawer_1")

@@ -1,4 +1,4 @@
-"""A click on a mask chooses its object instead of making a second one there; Space held moves the picture."""
+"""A click on a mask selects its object instead of creating another; dragging with Space pans the picture."""
 
 from playwright.sync_api import Locator, expect
 
@@ -15,7 +15,7 @@ PIXELS = """(canvas) => {
 
 
 def pixels(canvas: Locator) -> int:
-    """A sum of what is drawn, once it stays so: a picture and its masks come one after the other."""
+    """Checksum of the canvas once it is stable: a picture and its masks are drawn one after the other."""
     seen: list[int] = []
 
     def stays() -> bool:
@@ -47,7 +47,7 @@ def test_a_click_on_a_mask_chooses_its_object_and_a_second_one_there_is_asked_fo
     expect(row).to_contain_text("drawer_2")
     expect(rows(page)).to_have_count(3)
     picture(page, "picking")
-    click_frame(page, 103, 42)  # on the chosen one it is a click more
+    click_frame(page, 103, 42)  # on the selected object it adds a click
     expect(row).to_contain_text("2 clicks")
 
     page.keyboard.press("Enter")
@@ -79,7 +79,7 @@ def test_space_held_moves_the_picture_and_tapped_plays(new_context: NewContext, 
     page.keyboard.up("Space")
     until(lambda: pixels(canvas) != before, "the picture did not move")
     expect(page.get_by_role("button", name="Play or pause")).not_to_have_attribute("aria-pressed", "true")
-    expect(counter).to_have_text(first)  # nothing plays
+    expect(counter).to_have_text(first)  # playback does not start
     expect(rows(page)).to_have_count(2)  # and no box was drawn
     page.keyboard.press("Space")
     expect(counter).not_to_have_text(first)

@@ -1,4 +1,4 @@
-"""Stages, models and roles are called what they are, on every page."""
+"""Plain names of stages, models and roles on every page."""
 
 import json
 

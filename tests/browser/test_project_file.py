@@ -1,4 +1,4 @@
-"""A project is downloaded as one file and imported where it is not, with its recording or with the recording given later."""
+"""Download of a project as one file and its import elsewhere, with its recording or with the recording added later."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
 
 
 def import_file(page: Page, name: str, content: bytes) -> str:
-    """Choose a file to import; the id of the project it became."""
+    """Choose a file to import; return the id of the resulting project."""
     page.get_by_label("Recording", exact=True).set_input_files({"name": name, "mimeType": "application/zip", "buffer": content})
     page.wait_for_url("**/p/*")
     return page.url.rsplit("/", 1)[-1]

@@ -1,4 +1,4 @@
-"""Confirming what was found without a click, in a real Chromium."""
+"""Confirmation of proposals in a real Chromium."""
 
 import re
 
@@ -43,7 +43,7 @@ def test_a_key_confirms_the_next_proposal_undo_takes_it_back_and_another_dismiss
     expect(rows).to_have_count(2)
     restore = page.get_by_role("button", name="Bring back 1 dismissed")
     expect(restore).to_be_visible()
-    page.reload()  # remembered
+    page.reload()  # stored
     expect(restore).to_be_visible()
     restore.click()
     expect(rows).to_have_count(3)
@@ -64,7 +64,7 @@ def test_what_is_doubted_is_not_confirmed_with_the_others(new_context: NewContex
     proposals = page.get_by_label("Proposals", exact=True)
     expect(proposals.get_by_role("button", name="Confirm 2")).to_be_visible()  # of at least 80 %
     page.get_by_role("button", name="New object").click()
-    click_frame(page, 38, 60)  # its mask takes a part of the first drawer's
+    click_frame(page, 38, 60)  # its mask covers a part of the first drawer's
     expect(rows(page)).to_have_count(3)
     page.keyboard.press("Escape")
     expect(proposals.get_by_role("button", name="Confirm 1")).to_be_visible()

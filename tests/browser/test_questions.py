@@ -1,4 +1,4 @@
-"""Edges that hardly show are asked about in the elevation, and one key answers each."""
+"""Questions about faint edges in the elevation, each answered by one key."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from tests.browser.together import Server, signed_in
 
 
 def clicked_cabinet(page: Page) -> None:
-    """A front whose right and lower edges hardly show, as tests/app/fakes/live.py finds it, in the elevation."""
+    """The elevation of a front whose right and lower edges are faint, as tests/app/fakes/live.py finds it."""
     sample(page)
     page.get_by_role("link", name="Annotate").click()
     page.get_by_label("Category of the next object").fill("cabinet")
@@ -38,7 +38,7 @@ def test_a_key_says_whether_there_is_a_seam_at_an_edge_that_hardly_shows(new_con
     page.keyboard.press("q")
     expect(tip).to_contain_text("Is there a seam at the right edge of cabinet_1 (10 % sure)?")
     picture(page, "question")
-    page.keyboard.press("x")  # the front goes on to the next line of the plane
+    page.keyboard.press("x")  # the front is extended to the next line of the plane
     expect(tip).to_contain_text("Is there a seam at the bottom edge of cabinet_1 (20 % sure)?")
     page.keyboard.press("y")
     expect(tip).to_be_hidden()

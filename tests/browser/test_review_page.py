@@ -1,4 +1,4 @@
-"""review.html of a bundle, opened as a file: the scene is drawn, and a joint moves what is seen."""
+"""review.html of a bundle, opened as a file: the scene is drawn, and joints move it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +22,7 @@ def shot(page: Page) -> np.ndarray:
 
 
 def shot_when(page: Page, shows: Callable[[np.ndarray], bool]) -> np.ndarray:
-    """The view, once it shows that and two looks in a row are alike: a software GL draws when it can."""
+    """Screenshot of the view once the condition holds and two in a row are equal, as software GL is slow."""
     seen = [shot(page)]
 
     def still() -> bool:

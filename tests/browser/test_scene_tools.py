@@ -1,4 +1,4 @@
-"""The 3D view as an instrument: a click chooses, eyes hide, geometry shows at once what it can, nobody clicked the worktop."""
+"""Tools of the 3D view: selection by click, visibility, immediate preview of corrections, unclicked worktops."""
 
 import json
 import re
@@ -27,7 +27,7 @@ ASK = """async ([method, path, body]) => {
   const answer = await fetch(path, body === null ? options : { ...options, body: JSON.stringify(body) });
   return await answer.json();
 }"""
-HEARD_MS = 6000  # the page asks so long what a click was on
+HEARD_MS = 6000  # the page polls that long for the clicked object
 CLICK = {"frame": 3, "x": 80, "y": 60, "label": 1}
 
 
@@ -36,7 +36,7 @@ def ask(page: Page, method: str, path: str, body: Any = None) -> Any:
 
 
 def finished(page: Page, server: Server) -> str:
-    """A project with the small kitchen in its workspace, one bundle, and a next run that hangs; the address of its overview."""
+    """A project with the small kitchen, one bundle, and a next run that hangs; the address of its overview."""
     project = sample(page)
     name = project.split("/p/")[1]
     for category, number in (("cabinet", 1), ("double_door_cabinet", 1), ("bottle", 1)):
@@ -59,7 +59,7 @@ def finished(page: Page, server: Server) -> str:
 
 
 def front_camera() -> tuple[np.ndarray, np.ndarray]:
-    """Where the camera stands that looks from the front, and what it looks at."""
+    """Position and target of a camera that looks from the front."""
     plan = plan_bundle(kitchen())
     shown = Assembly(None, plan, {body.name: list(shapes_of(body.link, "meshes")) for body in plan.bodies})
     ahead = facing(plan)
@@ -73,7 +73,7 @@ def stands_in_front(page: Page) -> bool:
 
 
 def from_front(page: Page, name: str) -> tuple[float, float]:
-    """Where the middle of an object's front face is on the screen, looked at from the front."""
+    """Screen position of the centre of an object's front face, seen from the front."""
     place, target = front_camera()
     depth = (target - place) / np.linalg.norm(target - place)
     right = np.cross(depth, [0.0, 0.0, 1.0])
@@ -107,7 +107,7 @@ def test_a_click_in_the_scene_chooses_and_the_scene_stays(new_context: NewContex
 
 
 def clicked(page: Page, name: str) -> Any:
-    """Click the object until the list says that it is chosen: the view hears clicks once it has drawn itself."""
+    """Click the object until the list shows it as selected: the view handles clicks only once it is drawn."""
     chosen = page.locator(".review nav button[aria-pressed=true]", has_text=name)
 
     def heard() -> bool:
@@ -136,7 +136,7 @@ def test_what_geometry_can_show_is_shown_before_the_run_and_older_results_are_ma
     expect(page.get_by_role("heading", name="Certificate")).to_contain_text("stale")
     expect(page.get_by_text("still overlap by 12 mm")).to_be_visible()
     picture(page, "warnings")
-    assert Path(server.data / "projects" / project.split("/p/")[1] / "work" / "bundle.zip").is_file()  # nothing was made anew
+    assert Path(server.data / "projects" / project.split("/p/")[1] / "work" / "bundle.zip").is_file()  # nothing was recomputed
 
 
 def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(new_context: NewContext, server: Server) -> None:
@@ -156,7 +156,7 @@ def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(new_con
     made.get_by_role("button", name="Bring back counter_1").click()
     expect(made.get_by_role("button", name="counter_1", exact=True)).to_be_visible()
 
-    finish(server.data / "projects" / project.split("/p/")[1] / "work")  # a run that finds no worktop
+    finish(server.data / "projects" / project.split("/p/")[1] / "work")  # a run without a worktop
     page.reload()
     expect(made).to_contain_text("counter_1: corrected, but the last run did not make it. Click on it, or delete it.")
     picture(page, "not-made")
@@ -223,7 +223,7 @@ def test_a_section_looks_inside_colours_say_what_was_seen_and_a_comment_keeps_th
     left = section.get_by_label("Width from the left")
     left.press("ArrowRight")
     expect(section.locator("output").nth(0)).not_to_have_text(narrow)
-    expect(left).to_be_focused()  # the next key moves it on, though the view has answered
+    expect(left).to_be_focused()  # the next key continues, although the view has responded
     page.get_by_label("Layers of the scene").select_option("unobserved")
     expect(page.locator(".heat-legend")).to_contain_text("50 cm from any observation")
     picture(page, "section")

@@ -1,4 +1,4 @@
-"""What each seat does, on the page People."""
+"""Activity of each seat, on the page People."""
 
 from playwright.sync_api import expect
 

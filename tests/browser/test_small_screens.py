@@ -1,4 +1,4 @@
-"""A phone, a page zoomed to 200 %, and a keyboard alone reach the picture; messages leave the lanes free."""
+"""Access on a phone, at 200 % zoom, and by keyboard alone; toasts do not cover the lanes."""
 
 from playwright.sync_api import expect
 
@@ -27,7 +27,7 @@ def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(new_conte
         assert header["height"] <= 90  # two lines
         for button in page.locator(".topbar button").all():
             expect(button).to_be_in_viewport(ratio=1)
-        rows(page).first.locator(".pick").click()  # the list is below, and can be reached
+        rows(page).first.locator(".pick").click()  # the list is below, and reachable
         expect(page.get_by_label("Name of drawer_1")).to_be_visible()
         page.locator("main").evaluate("main => main.scrollTo(0, 0)")
         picture(page, name)
@@ -47,7 +47,7 @@ def test_one_key_skips_to_the_picture(new_context: NewContext, server: Server) -
     expect(page.locator("r2c2r-frame-canvas canvas")).to_be_focused()
     page.goto(project)
     expect(page.get_by_role("heading", name="The recording")).to_be_visible()
-    expect(skip).to_have_count(0)  # there is no picture here
+    expect(skip).to_have_count(0)  # there is no picture on this page
 
 
 def test_messages_leave_the_lanes_free(new_context: NewContext, server: Server) -> None:
@@ -59,7 +59,7 @@ def test_messages_leave_the_lanes_free(new_context: NewContext, server: Server) 
     page.clock.install()
     page.goto(f"{project}/annotate?frame=3")
     expect(rows(page)).to_have_count(11)
-    page.clock.pause_at(page.evaluate("Date.now()") / 1000 + 60)  # on a busy machine the first message is gone before the last
+    page.clock.pause_at(page.evaluate("Date.now()") / 1000 + 60)  # else the first toast may be gone before the last
     for name in ("mug_1", "mug_2", "mug_3", "mug_4"):
         page.get_by_role("button", name=name, exact=True).click()
         page.get_by_role("button", name=f"Delete {name}", exact=True).click()

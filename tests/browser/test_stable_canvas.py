@@ -1,4 +1,4 @@
-"""The picture on Annotate is large, and nothing that appears moves it; bars between the panels are a person's own."""
+"""Layout of Annotate: a large picture that does not move, and panels resized by the person."""
 
 from playwright.sync_api import Page, expect
 
@@ -9,7 +9,7 @@ from tests.browser.together import Server, signed_in
 
 
 def share_of_window(page: Page) -> float:
-    """Of the window's pixels that show the frame."""
+    """Fraction of the window's pixels that show the frame."""
     box = box_of(page.locator("r2c2r-frame-canvas canvas"))
     scale = min(box["width"] / FRAME[0], box["height"] / FRAME[1])
     return scale**2 * FRAME[0] * FRAME[1] / page.evaluate("innerWidth * innerHeight")
@@ -29,7 +29,7 @@ def test_nothing_that_appears_moves_the_picture(new_context: NewContext, server:
         click_frame(page, 20 + 8 * k, 100)
         expect(rows(page)).to_have_count(3 + k)
     expect(page.locator(".transport .chip").nth(1)).to_contain_text("saved")
-    page.keyboard.press("b")  # a tool, of the object that is chosen
+    page.keyboard.press("b")  # a tool of the selected object
     assert box_of(canvas) == first
     picture(page, "canvas-1280")
     server.kill()

@@ -1,4 +1,4 @@
-"""A project's names and categories are kept as a template, and taken over as what is still to be clicked."""
+"""A project's names and categories are stored as a template, and adopted as a list of objects to click."""
 
 from playwright.sync_api import expect
 
@@ -9,9 +9,9 @@ from tests.browser.together import Server, signed_in
 
 
 def test_a_template_is_kept_changed_taken_over_and_clicked(new_context: NewContext, server: Server) -> None:
-    context = new_context(bypass_csp=True)  # for axe
+    context = new_context(bypass_csp=True)  # bypass_csp for axe
     page = signed_in(context, server, "ann")
-    expect(page.get_by_label("Objects to click")).to_be_hidden()  # nobody made a template
+    expect(page.get_by_label("Objects to click")).to_be_hidden()  # there is no template yet
     sample(page)
     viewed(page)
     page.get_by_role("button", name="Keep this project's objects as a template…").press("Enter")
@@ -35,7 +35,7 @@ def test_a_template_is_kept_changed_taken_over_and_clicked(new_context: NewConte
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     page.set_viewport_size({"width": 1280, "height": 720})
 
-    page.goto(server.address)  # when a project is made
+    page.goto(server.address)  # when creating a project
     page.get_by_label("Objects to click").select_option("Flat 3")
     picture(page, "templates-projects")
     project = sample(page)

@@ -1,4 +1,4 @@
-"""Two people on one project, from the first click to the approval, with everything in between that goes wrong."""
+"""Two people on one project, from the first click to the approval, including failures and conflicts."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from tests.browser.serving import NewContext, box_of, wait_for_toast
 from tests.browser.together import Server, post, signed_in
 
 FRAME = (160, 120)
-STUCK_X = 158  # the stand-in segmenter draws one frame there and waits
+STUCK_X = 158  # the stand-in segmenter draws one frame there and blocks
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def people(new_context: NewContext, server: Server) -> tuple[Page, Page]:
 
 
 def sample(page: Page) -> str:
-    """A new sample project; the address of its overview."""
+    """Create a sample project; return the address of its overview."""
     page.get_by_role("button", name="Sample kitchen", exact=True).click()
     page.get_by_role("link", name="Run on 2 objects").wait_for()
     return page.url
@@ -42,7 +42,7 @@ def tap_frame(page: Page, x: float, y: float) -> None:
 
 
 def on_canvas(page: Page, x: float, y: float) -> dict[str, float]:
-    """Where a pixel of the stored frame is drawn."""
+    """Canvas position of a pixel of the stored frame."""
     box = box_of(page.locator("r2c2r-frame-canvas canvas"))
     scale = min(box["width"] / FRAME[0], box["height"] / FRAME[1])
     left, top = (box["width"] - FRAME[0] * scale) / 2, (box["height"] - FRAME[1] * scale) / 2
@@ -64,7 +64,7 @@ def rename(page: Page, name: str, to: str) -> None:
 
 
 def stored(page: Page) -> None:
-    """Wait until the server has answered every change of this page's person: its outbox is empty."""
+    """Wait until the server has accepted every change of this page: its outbox is empty."""
     page.wait_for_function("Object.keys(localStorage).every((name) => !name.startsWith('r2c2r-change'))")
 
 
@@ -80,7 +80,7 @@ def test_clicks_survive_wrong_ones_another_person_a_lost_connection_and_a_dead_s
     ann.goto(f"{project}/annotate?frame=3")
     ready(ann)
 
-    # a wrong click, taken back; a propagation, stopped
+    # a wrong click, undone; a propagation, stopped
     click_frame(ann, 30, 60)
     expect(rows(ann)).to_have_count(3)
     click_frame(ann, 100, 100, button="right")
@@ -98,7 +98,7 @@ def test_clicks_survive_wrong_ones_another_person_a_lost_connection_and_a_dead_s
     expect(rows(ann)).to_have_count(4)
     expect(rows(ann).nth(2)).to_contain_text("1 click ")
 
-    # somebody else is there; both rename the same thing, one of them without a connection
+    # presence of others; concurrent renames, one of them offline
     bea.goto(f"{project}/annotate?frame=3")
     expect(ann.locator("r2c2r-presence")).to_contain_text("bea · annotate")
     expect(bea.locator("r2c2r-presence")).to_contain_text("ann · annotate")
@@ -115,7 +115,7 @@ def test_clicks_survive_wrong_ones_another_person_a_lost_connection_and_a_dead_s
     for page in people:
         expect(page.get_by_role("button", name="cup_of_ann", exact=True)).to_be_visible()
 
-    # the server dies; what is clicked meanwhile is sent when it is back, even from a page that was closed
+    # the server dies; later clicks are sent once it is back, even from a page that was closed
     stored(ann)
     server.kill()
     pick(ann, "drawer_1")
@@ -137,7 +137,7 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     project = sample(ann)
     folder = server.data / "projects" / project.rsplit("/", 1)[-1]
 
-    # a run that is cancelled, one that fails, and one that gets through
+    # a cancelled run, a failed one, and a successful one
     told = folder / "behave.json"
     told.write_text(json.dumps({"align": "hang"}))
     ann.goto(f"{project}/run")
@@ -156,7 +156,7 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     ann.get_by_role("button", name="Try again").click()
     expect(ann.get_by_role("heading", name=re.compile("Certificate"))).to_contain_text("passed")
 
-    # a comment on a spot of a frame
+    # a comment on a point of a frame
     ann.goto(f"{project}/annotate?frame=3")
     ready(ann)
     ann.keyboard.press("i")
@@ -164,19 +164,19 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     say(ann, "Comment", "is this one drawer or two?")
     expect(ann.locator("r2c2r-comments")).to_contain_text("1 open comment")
 
-    # to review, back, and to review again: reasons are asked for where something is unmet or refused
+    # to review, back, and again: reasons are required for unmet requirements and refusals
     ann.goto(f"{project}/review")
     viewed(ann)
-    post(ann, f"/api/projects/{folder.name}/objects", {"category": "bottle"})  # which nobody has clicked
+    post(ann, f"/api/projects/{folder.name}/objects", {"category": "bottle"})  # which has no clicks
     move(ann, "Send to review", "the bottle is not there")
-    expect(bea.get_by_text("ready", exact=True)).to_be_visible()  # on the list of projects, by itself
+    expect(bea.get_by_text("ready", exact=True)).to_be_visible()  # the list of projects updates itself
     bea.goto(f"{project}/review")
     viewed(bea)
     move(bea, "Start the review")
     move(bea, "Request changes", "answer the comment")
     expect(ann.locator("r2c2r-review-state")).to_contain_text("answer the comment")
     ann.get_by_role("button", name=re.compile("^Resolve")).click()
-    expect(ann.locator("r2c2r-comments")).to_contain_text("No open comments.")  # the steps are drawn anew with it
+    expect(ann.locator("r2c2r-comments")).to_contain_text("No open comments.")  # rebuilt together with the steps
     expect(ann.locator("r2c2r-review-state")).not_to_contain_text("open comment")
     move(ann, "Send to review again", "one drawer")
     move(bea, "Start the review")
@@ -188,12 +188,12 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     expect(bea.get_by_label("Turn (°)")).to_have_value("0")
     expect(bea.get_by_role("button", name="Use this place and size")).to_be_disabled()
     bea.keyboard.press("l")
-    expect(bea.get_by_label("Right (mm)")).to_have_value("5")  # by a key, shown over the photo and not stored yet
+    expect(bea.get_by_label("Right (mm)")).to_have_value("5")  # changed by a key: shown over the photo, not stored yet
     bea.keyboard.press("Enter")
     wait_for_toast(bea, "drawer_1: place (0.005, 0.000, 0.000) m")
     bea.keyboard.press("Control+z")
     wait_for_toast(bea, "Undone: drawer_1: place")
-    bea.context.set_offline(True)  # both judge one candidate, one of them without a connection
+    bea.context.set_offline(True)  # concurrent verdicts on one candidate, one of them offline
     bea.keyboard.press("y")
     expect(bea.locator(".banner")).to_contain_text("1 change not stored yet")
     ann.get_by_role("button", name="Reject", exact=True).first.click()
@@ -211,7 +211,7 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     bea.keyboard.press("Control+y")
     expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
     expect(ann.get_by_text("1 of 1 object accepted")).to_be_visible()
-    bea.context.set_offline(True)  # what she takes back is not what was said last any more
+    bea.context.set_offline(True)  # her undo refers to a verdict that is no longer the latest
     bea.keyboard.press("Control+z")
     expect(bea.locator(".banner")).to_contain_text("1 change not stored yet")
     ann.get_by_role("button", name="Reject", exact=True).first.click()
@@ -222,7 +222,7 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
     expect(reject_c0(bea)).to_have_attribute("aria-pressed", "true")
     bea.keyboard.press("Control+z")  # now that she has seen it
     expect(bea.get_by_text("1 of 1 object accepted")).to_be_visible()
-    bea.keyboard.press("y")  # once more than needed takes nothing back
+    bea.keyboard.press("y")  # accepting once more changes nothing
     move(bea, "Approve", "the mug is not part of it")
     for page in people:
         expect(page.locator("r2c2r-review-state")).to_contain_text("approved")
@@ -231,7 +231,7 @@ def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server
 
 
 def reject_c0(page: Page) -> Locator:
-    """Its button, wherever its card stands: the candidate that is used comes first."""
+    """The reject button of c0, wherever its card is: the used candidate comes first."""
     return page.locator('[data-at="rejected:c0"]')
 
 
@@ -267,7 +267,7 @@ def say(page: Page, button: str, text: str) -> None:
 
 
 def viewed(page: Page) -> None:
-    """Wait until the 3D view is in its frame: a click just as that is attached reaches nothing."""
+    """Wait until the 3D view is in its iframe: a click while it is attached is lost."""
     page.frame_locator("r2c2r-viewer iframe").locator("canvas").first.wait_for(state="attached")
 
 
@@ -280,19 +280,19 @@ def move(page: Page, step: str, reason: str = "") -> None:
 def test_what_waits_for_a_person_is_in_their_inbox_and_what_happened_meanwhile_on_the_overview(
     new_context: NewContext, server: Server
 ) -> None:
-    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # for axe
+    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     address = sample(ann)
     inbox = bea.locator("r2c2r-who").get_by_role("link", name="Inbox")
-    with bea.expect_response(lambda answer: answer.request.method == "PUT" and answer.ok):  # what comes later is news
+    with bea.expect_response(lambda answer: answer.request.method == "PUT" and answer.ok):  # later changes count as news
         bea.goto(address)
     expect(bea.get_by_label("Assigned to")).to_have_value("")
     ann.get_by_label("Assigned to").select_option("bea")
     wait_for_toast(ann, "Assigned to bea")
-    expect(bea.get_by_label("Assigned to")).to_have_value("bea")  # by itself
+    expect(bea.get_by_label("Assigned to")).to_have_value("bea")  # updated without reload
     expect(inbox).to_have_text("Inbox 1")
 
-    # a comment names Bea: by keyboard, from the list that the sign opens
+    # a comment mentions Bea: by keyboard, from the list that @ opens
     ann.goto(f"{address}/annotate?frame=3")
     ann.get_by_role("button", name="Pin a comment").click()
     click_frame(ann, 40, 40)
@@ -303,7 +303,7 @@ def test_what_waits_for_a_person_is_in_their_inbox_and_what_happened_meanwhile_o
     ann.keyboard.press("Control+Enter")
     expect(ann.locator("r2c2r-comments")).to_contain_text("one drawer or two, @bea")
 
-    # Bea was at the overview: she is told there, until she says that she read it
+    # Bea was at the overview: news are shown there until she marks them as read
     news = bea.get_by_role("region", name="Since you were last here")
     expect(news).to_contain_text("ann 2 changes")
     bea.reload()

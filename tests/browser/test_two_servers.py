@@ -1,4 +1,4 @@
-"""Two people on one project, each at a server of their own, with the rows in one Postgres and the files in one store."""
+"""Two people on one project, each at a different server, with rows in one Postgres and files in one store."""
 
 import re
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from tests.browser.together import PASSWORD, PEOPLE, Server, free_port, signed_i
 
 
 class Beside(Server):
-    """One of several servers on a database that the environment names, with accounts there already."""
+    """One of several servers on the environment's database, whose accounts exist already."""
 
     def __init__(self, data: Path) -> None:
         data.mkdir()
@@ -57,5 +57,5 @@ def test_two_people_at_two_servers_work_on_one_project(new_context: NewContext, 
     expect(ann.get_by_text("done").first).to_be_visible()
     picture(ann, "27-a-run-of-another-server")
     two[0].kill()
-    expect(bea.locator("r2c2r-presence .chip")).to_have_count(0)  # she is there no more
+    expect(bea.locator("r2c2r-presence .chip")).to_have_count(0)  # she has left
     two[0].start()

@@ -1,4 +1,4 @@
-"""Variants are asked for on the download page, followed, stopped, taken and deleted; by keyboard alone."""
+"""Variants on the download page: requested, followed, cancelled, downloaded and deleted by keyboard alone."""
 
 import json
 
@@ -26,21 +26,21 @@ def test_variants_are_made_by_keyboard_and_what_they_take_is_said_before(new_con
     expect(make).to_be_disabled()
     count.fill("2")
     page.keyboard.press("Tab")
-    page.keyboard.type("7")  # after the 0 that is selected
+    page.keyboard.type("7")  # replaces the 0 before it
     page.keyboard.press("Enter")
     stop = page.get_by_role("button", name="Cancel")
     stop.focus()
     expect(page.get_by_role("progressbar", name="Progress")).to_have_js_property("value", 0.5)
-    expect(stop).to_be_focused()  # though what is around it is drawn anew
+    expect(stop).to_be_focused()  # though the surrounding page is rebuilt
     page.keyboard.press("Enter")
     expect(page.locator("r2c2r-job")).to_contain_text("cancelled")
-    expect(count).to_have_value("2")  # the page was drawn anew around it
+    expect(count).to_have_value("2")  # the page around it was rebuilt
     (folder / "behave.json").unlink()
     page.get_by_role("button", name="Try again").press("Enter")
     made = page.get_by_role("list", name="Variants that were made").get_by_role("listitem")
     expect(made).to_contain_text("2 variants of bundle 1, seed 7")
     expect(made).to_contain_text("2 of 2 checked are certified")
-    expect(make).to_be_disabled()  # they are there
+    expect(make).to_be_disabled()  # they exist already
     with page.expect_download() as taken:
         made.get_by_role("link", name="Download").press("Enter")
     assert taken.value.suggested_filename == "sample-kitchen-v1-n2-s7-variants.zip"

@@ -1,4 +1,4 @@
-"""An app with accounts and stand-ins for its slow parts, to be stopped and started again, and people who sign in to it."""
+"""Restartable app with accounts and stand-ins for its slow parts, and helpers to sign people in."""
 
 import random
 import shutil
@@ -19,13 +19,13 @@ from tests.forked import Forked
 
 PASSWORD = "correct horse battery"
 PEOPLE = {"ann": "admin", "bea": "reviewer", "cleo": "annotator"}
-LENT = Path("/proc/sys/net/ipv4/ip_local_port_range")  # the ports that whoever asks for any gets
-LOWEST_PORT = 20_000  # below are some that Chromium refuses
+LENT = Path("/proc/sys/net/ipv4/ip_local_port_range")  # the range of ephemeral ports
+LOWEST_PORT = 20_000  # Chromium refuses some below
 TRIES = 100
 
 
 class Server:
-    """The app on a port of its own, to be stopped and started again on the same data; Ann, Bea and Cleo have accounts."""
+    """The app on its own port, restartable on the same data; Ann, Bea and Cleo have accounts."""
 
     def __init__(self, data: Path, live: str = "live") -> None:
         self.data, self.port, self.live = data, free_port(), live
@@ -38,7 +38,7 @@ class Server:
 
     def __exit__(self, *_: object) -> None:
         assert self.process is not None
-        self.process.end()  # it ends its workers: those of a killed server would go on
+        self.process.end()  # it ends its workers; those of a killed server would go on
 
     @property
     def address(self) -> str:
@@ -58,7 +58,7 @@ class Server:
 
 @cache
 def _with_people() -> Path:
-    """A database with the accounts, made once a process: to hash passwords takes its time."""
+    """A database with the accounts, made once per process, as hashing passwords takes time."""
     path = migrated().with_name("people.db")
     shutil.copy(migrated(), path)
     engine = open_engine(path)
@@ -69,9 +69,9 @@ def _with_people() -> Path:
 
 
 def free_port() -> int:
-    """A port that nobody else gets while the server is down; any free one where the system does not say which it lends."""
+    """A port outside the ephemeral range, so that it stays free while the server is down; any free one if that is unknown."""
     kept = range(LOWEST_PORT, int(LENT.read_text().split()[0]) if LENT.is_file() else 0)
-    tried = random.SystemRandom().sample(kept, min(len(kept), TRIES))  # two workers do not try the same
+    tried = random.SystemRandom().sample(kept, min(len(kept), TRIES))  # random, so that two test workers differ
     for port in (*tried, 0):
         with socket.socket() as probe, suppress(OSError):
             probe.bind(("127.0.0.1", port))
@@ -80,7 +80,7 @@ def free_port() -> int:
 
 
 def signed_in(context: BrowserContext, server: Server, name: str, password: str = PASSWORD) -> Page:
-    """A page of theirs, at the projects."""
+    """A page of the person, at the projects."""
     page = context.new_page()
     page.goto(f"{server.address}/login")
     page.get_by_label("Name").fill(name)
@@ -91,7 +91,7 @@ def signed_in(context: BrowserContext, server: Server, name: str, password: str 
 
 
 def post(page: Page, path: str, body: dict[str, str]) -> None:
-    """Ask the API from the page, as who is signed in."""
+    """POST to the API from the page, with its session."""
     script = """async ([path, body]) => {
       const headers = { "content-type": "application/json", "x-requested-with": "r2c2r" };
       return (await fetch(path, { method: "POST", headers, body: JSON.stringify(body) })).status;
