@@ -1,4 +1,4 @@
-"""Motions of leaves as a segmenter would find them."""
+"""Joint motions of leaves as a segmenter would estimate them."""
 
 from collections.abc import Mapping
 
@@ -20,7 +20,7 @@ def motion(
     size_m: tuple[float, float] = (0.5, 0.7),
     part: str = "",
 ) -> JointMotion:
-    """Of a front of that size (width, height): the states by frame, and the joint they are of."""
+    """Motion of a front of that size (width, height): states by frame, and their joint."""
     place = world_from_front or Rigid3()
     edges = {"left": (-0.5, 0.0, 0.0), "right": (0.5, 0.0, 0.0), "top": (0.0, 0.0, 0.5), "bottom": (0.0, 0.0, -0.5)}
     pivot = np.array(edges.get(way, (0.0, 0.0, 0.0))) * [size_m[0], 0.0, size_m[1]]

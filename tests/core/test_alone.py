@@ -1,4 +1,4 @@
-"""Programs that read other people's files: what they find around them."""
+"""Isolation of programs that read untrusted files."""
 
 import os
 import socket
@@ -25,7 +25,7 @@ except OSError as error:
 
 
 def alone(folder: Path, *arguments: object) -> list[str]:
-    """What the program says that runs from the folder by the side of other files."""
+    """Output of the program, run from a folder with other files."""
     (folder / "looks_around.py").write_text(PROGRAM)
     command = [sys.executable, "-m", "r2c2r_core.alone", "looks_around", *map(str, arguments)]
     known = {**os.environ, "PYTHONPATH": f"{Path(__file__).parents[2]}{os.pathsep}{folder}"}
@@ -47,5 +47,5 @@ def test_it_reaches_no_server_of_this_machine(tmp_path: Path) -> None:
         pytest.skip("this system lets no process leave its network")
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-        socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S).close()  # it can be heard from here
+        socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S).close()  # reachable from this process
         assert alone(tmp_path, tmp_path / "made", port)[1].startswith("refused")

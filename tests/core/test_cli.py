@@ -1,4 +1,4 @@
-"""The command line as a person meets it: exit codes, one-line errors."""
+"""Command line from a user's view: exit codes, one-line errors."""
 
 import argparse
 import io
@@ -23,7 +23,7 @@ from .ingest.tiny import TinyRoom, write_r3d
 
 
 def r2c2r(*arguments: object, code: int) -> tuple[str, str]:
-    """What the command says when it is called here, which spares the start of a process."""
+    """Output of the command called in this process, which saves the start of another."""
     out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
         try:
@@ -35,7 +35,7 @@ def r2c2r(*arguments: object, code: int) -> tuple[str, str]:
 
 
 def started(*arguments: object, code: int) -> tuple[str, str]:
-    """What the command says when it is started as a person does."""
+    """Output of the command started as a process."""
     done = subprocess.run(
         [sys.executable, "-m", "r2c2r_core.cli", *map(str, arguments)], capture_output=True, text=True, check=False
     )
@@ -135,7 +135,7 @@ def test_what_nothing_can_come_of_is_refused_with_its_mend_before_anything_is_co
     last = said.strip().splitlines()[-1]
     assert "--depth-scale 0.001" in last
     assert not list((work / "nouns").glob("segment/*"))
-    _, said = r2c2r(*command, "--depth-scale", "0.001", code=1)  # read; the click on nothing then ends it
+    _, said = r2c2r(*command, "--depth-scale", "0.001", code=1)  # it is read; then the click on nothing fails
     assert "not in the unit" not in said
     assert "unusable" not in said
     _, said = r2c2r(*command, "--depth-scale", "none", code=2)

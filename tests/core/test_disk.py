@@ -1,4 +1,4 @@
-"""Paths that no file can have."""
+"""Invalid file paths."""
 
 import os
 from pathlib import Path

@@ -59,7 +59,7 @@ def test_recordings_may_hold_what_apps_write() -> None:
 
 def test_text_that_never_ends_costs_no_more_than_its_length() -> None:
     with pytest.raises(InputError):
-        parse(b"[" * 65 + b'"' + rb"\"" * 300_000)  # quadratic matching would take minutes
+        parse(b"[" * 65 + b'"' + rb"\"" * 300_000)  # a pattern with quadratic time would take minutes
 
 
 def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:

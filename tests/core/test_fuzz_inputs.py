@@ -1,4 +1,4 @@
-"""Inputs that are almost right, to every command; `benchmarks/fuzz_inputs.py --minutes 60` tries many more."""
+"""Mutated inputs to every command; `benchmarks/fuzz_inputs.py --minutes 60` tries many more."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What the accuracy guard (`benchmarks/guard.py`) calls worse."""
+"""Regressions as defined by the accuracy guard (`benchmarks/guard.py`)."""
 
 from collections.abc import Callable
 from pathlib import Path

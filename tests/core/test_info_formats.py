@@ -1,4 +1,4 @@
-"""`r2c2r info` on a recording of every format that is read, in today's layout."""
+"""`r2c2r info` on a recording of every supported format, in its current layout."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a learned segmenter hands on is enough for every later stage: masks of a model in, a scene with a drawer out."""
+"""Tracks of a learned segmenter suffice for every later stage: a model's masks in, a scene with a drawer out."""
 
 from dataclasses import replace
 from pathlib import Path

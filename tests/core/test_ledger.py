@@ -1,4 +1,4 @@
-"""Resuming: what is computed again, and what is not."""
+"""Resumption of runs: recomputed and reused results."""
 
 import errno
 import subprocess
@@ -53,7 +53,7 @@ def test_a_prompt_with_a_painted_mask_is_computed_again_once_a_pixel_of_it_chang
     painted = np.zeros((8, 8), dtype=bool)
     painted[[1, 6], [1, 6]] = True
     other = painted.copy()
-    other[3, 3] = True  # in the same box: the bits alone tell
+    other[3, 3] = True  # in the same box: only the bits differ
     assert computed(painted) == ["segment/a"]
     assert computed(painted) == []
     assert computed(other) == ["segment/a"]
@@ -165,7 +165,7 @@ for parts in sys.argv[2:]:
 
 
 def at_once(root: Path, *wanted: str) -> list[bool]:
-    """Whether another process may take parts, or the whole (""), and give them back; one after the other."""
+    """Whether another process may take parts, or the whole (""), and release them; one after the other."""
     command = [sys.executable, "-c", HOLDS, str(root), *wanted]
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
     assert len(told) == len(wanted)

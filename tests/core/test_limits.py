@@ -1,4 +1,4 @@
-"""What a worker may use: a process that wants more says so in one line."""
+"""Resource limits of a worker: a process that exceeds them reports so in one line."""
 
 import json
 import resource

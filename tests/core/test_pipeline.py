@@ -1,4 +1,4 @@
-"""What the pipeline does when a backend fails on one object."""
+"""Failure of a backend on one object in the pipeline."""
 
 import json
 import zipfile
@@ -67,7 +67,7 @@ def test_where_a_generator_fails_the_weight_free_one_stands_in_and_every_candida
             assert "remote made no mesh, completion was used instead" in asset.warnings[0]
             assert "CUDA out of memory" in asset.warnings[0]
 
-        # the failure is not kept: the next run asks the server for that object again, and only for that one
+        # the failure is not stored: the next run requests that object again, and no other
         asked.clear()
         refusing_the_second.count = 0
         again = generate_objects(request_for(address), Ledger(Workspace(tmp_path), SILENT), Kept(capture, "c"), tracks)
@@ -134,7 +134,7 @@ def test_further_candidates_join_those_that_are_there_and_repeat_none(two_bottle
     assert further.key != first.key
     old, new = further.value.candidates
     assert np.array_equal(old.mesh.vertices, first.value.chosen.mesh.vertices)
-    assert new.parameters != old.parameters  # another draw
+    assert new.parameters != old.parameters  # another variation
     assert anew.key == further.key
     for one_way, other_way in zip(further.value.candidates, anew.value.candidates, strict=True):
         assert np.array_equal(one_way.mesh.vertices, other_way.mesh.vertices)
@@ -184,7 +184,7 @@ def test_a_licence_that_forbids_some_uses_is_said_where_it_is_chosen_and_never_t
 
 
 def contents(path):
-    """What a noun file holds, the seconds it took aside."""
+    """A noun file's contents except for its seconds."""
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     structure = json.loads(members.pop("noun.json"))
@@ -193,7 +193,7 @@ def contents(path):
 
 
 def run_by(workers, folder, two_bottles):
-    """A run of both bottles into a folder by so many processes."""
+    """A run of both bottles into a folder by that many processes."""
     capture, tracks = two_bottles
     recording = Kept(capture, "c")
     request = replace(request_for("http://nowhere"), tools=Tools())

@@ -1,4 +1,4 @@
-"""Tasks in worker processes: what they give, how they fail, and that none outlives its pool."""
+"""Tasks in worker processes: results, failures, and no process that outlives its pool."""
 
 import os
 import signal
@@ -32,7 +32,7 @@ def fall(progress: Progress) -> None:
 
 
 def work_on(progress: Progress) -> None:
-    """Until it is told to stop."""
+    """Work until told to stop."""
     progress.at(0.0, str(os.getpid()))
     until(progress.check)
 
@@ -81,7 +81,7 @@ def test_a_person_who_cancels_is_heard_and_no_process_is_left() -> None:
 
 def test_a_worker_ends_when_whoever_holds_it_is_gone() -> None:
     class Gone(Exception):
-        """Stands for the end of the process that holds the pool."""
+        """Stand-in for the end of the process that owns the pool."""
 
     def heard(stage: str, share: float, text: str) -> None:
         raise Gone

@@ -1,4 +1,4 @@
-"""A real cabinet (TUM fr3 cabinet) from two clicks to its size, against the box its recording gives."""
+"""Size of a real cabinet (TUM fr3 cabinet) from two clicks, compared with the box in its recording."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -29,14 +29,14 @@ QUICK = ReconstructConfig(
 
 
 pytestmark = pytest.mark.skipif(not CABINET.exists(), reason="the TUM cabinet is not beside the checkout")
-# As a "cabinet" it would be taken for one of a row, whose depth no frame shows; this one stands free.
+# A "cabinet" would be treated as one of a row, whose depth no frame shows; this one is free-standing.
 PROMPTS = Prompts(objects=(ObjectPrompt(name="cabinet", category="bench", points=CLICKS),))
 
 
 def test_two_clicks_find_a_real_cabinet_whole(tmp_path: Path) -> None:
     """Its box, before a mesh of it is made."""
     work = Workspace(tmp_path)
-    config = replace(QUICK, ingest=replace(QUICK.ingest, most_frames=29))  # every other one
+    config = replace(QUICK, ingest=replace(QUICK.ingest, most_frames=29))  # every other frame
     reconstruct(Request(source=CABINET, prompts=PROMPTS, config=config), work, until="segment", workers=1)
     box = work.load_latest("segment", "cabinet").box
     np.testing.assert_allclose(np.sort(box.dimensions_m), TRUE_M, atol=0.02)
@@ -51,5 +51,5 @@ def test_a_real_cabinet_has_its_size_within_two_centimetres(tmp_path: Path) -> N
     vertices = placement.world_from_mesh.apply(mesh.vertices)
     surface, _ = sample_surface(vertices, mesh.faces, 6000, np.random.default_rng(0))
     np.testing.assert_allclose(np.sort(upright_box(surface, trim=0.003).size_m), TRUE_M, atol=0.02)
-    assert volume(vertices, mesh.faces) > 0.85 * np.prod(TRUE_M)  # closed all round: no slab on legs, and no shell
+    assert volume(vertices, mesh.faces) > 0.85 * np.prod(TRUE_M)  # closed all round: neither a slab on legs nor a shell
     np.testing.assert_allclose(np.sort(scene.objects[0].dimensions_m), TRUE_M, atol=0.02)

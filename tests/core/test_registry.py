@@ -34,7 +34,7 @@ TABLE = Registry(
 
 @pytest.fixture(autouse=True)
 def empty_hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A hub cache of this test's own."""
+    """An empty hub cache for this test."""
     for name in ("TEST_DREAMS_WEIGHTS", "TEST_GATED_WEIGHTS"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path / "hub"))

@@ -1,4 +1,4 @@
-"""A recording that is read again: what is stored is whole, and poses never meet another reading's pixels."""
+"""Re-reading of a recording: the stored capture is complete, and poses are never mixed with another reading's pixels."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The digest of a package's source."""
+"""Digest of a package's source."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What others wrote is shown, never obeyed: by a terminal, by a page."""
+"""Control characters in foreign texts are escaped, in a terminal and on a page."""
 
 import pytest
 

@@ -20,7 +20,7 @@ def test_results_come_in_order_whatever_ends_first() -> None:
 
 def test_work_is_begun_only_so_far_ahead_of_who_takes_its_results() -> None:
     begun: list[int] = []
-    results = in_threads(lambda number: begun.append(number) or number, count())  # as many as anybody asks for
+    results = in_threads(lambda number: begun.append(number) or number, count())  # an endless iterator
     assert [next(results), next(results)] == [0, 1]
     results.close()
     assert len(begun) <= 12

@@ -1,4 +1,4 @@
-"""Tuned numbers: where they are set, who sees them, what they make run again."""
+"""Tuned parameters: setting, visibility in workers, and recomputation."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
@@ -24,7 +24,7 @@ WALLS: Changes = {"kitchen.walls": {"parallel_rad": 0.5}}
 
 
 def noun_of_number(*_: Any, progress: Progress) -> PackedMask:
-    """The number that holds where this runs, in thousandths."""
+    """The current value of the parameter, in thousandths."""
     area = round(1000 * tuned(Params).parallel_rad)
     return PackedMask(height=1, width=1, left=0, top=0, box_width=0, box_height=0, bits=b"", area_px=area)
 
@@ -34,7 +34,7 @@ def opened(*_: Any, progress: Progress) -> float:
 
 
 def areas(root: Path, numbers: Changes, workers: int = 1) -> tuple[list[int], list[str]]:
-    """What two objects were given, and what was computed for it."""
+    """Results for two objects, and the steps computed for them."""
     work, items = Workspace(root), {"a": Kept(1, "a"), "b": Kept(2, "b")}
     with tuning(changed(numbers)), Pool(workers) as pool:
         ledger = Ledger(work, SILENT, "export", pool)

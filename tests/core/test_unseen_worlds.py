@@ -1,4 +1,4 @@
-"""Worlds drawn for measuring, and how their figures are counted; `benchmarks/unseen.py` measures on them."""
+"""Simulated worlds for measurements, and the computation of their figures; `benchmarks/unseen.py` uses them."""
 
 import json
 from pathlib import Path
@@ -59,7 +59,7 @@ def test_depth_and_truth_are_of_one_frame(drawn: Path) -> None:
         ]
         assert len(points) > 1000
         local = thing.world_from_object.inverse.apply(frame.capture_from_camera.apply(points))
-        outside = (np.abs(local) - thing.dimensions_m / 2).max(axis=1)  # of a box's own surface: 0
+        outside = (np.abs(local) - thing.dimensions_m / 2).max(axis=1)  # on the surface of its box: 0
         assert np.median(np.abs(outside)) < 0.01
 
 
@@ -113,11 +113,11 @@ def test_what_is_missing_is_wrong_in_every_mean(monkeypatch: pytest.MonkeyPatch)
     row = row_of(outcome, truth, {"cabinet_0": 0.9, "bottle_0": 0.8, "cabinet_1": 0.0})
     assert (row["objects"], row["usable"]) == (3, 1)
     assert (row["median_percent"], row["worst_percent"]) == (7.0, 100.0)
-    assert row["joints_right"] == "1 of 2"  # over what has one
+    assert row["joints_right"] == "1 of 2"  # over objects with joints
     assert row["mask_iou"] == {"front": 0.45, "thing": 0.8}
     assert row["worst_height_percent"] == {"bottle": 7.0}
     assert row["far_off"] == ["cabinet_1"]
-    assert (row["wrong_flagged"], row["right_flagged"]) == ("2 of 2", "0 of 1")  # what is missing is said too
+    assert (row["wrong_flagged"], row["right_flagged"]) == ("2 of 2", "0 of 1")  # missing objects count as flagged
     assert json.dumps(row)
 
 

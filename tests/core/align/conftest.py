@@ -1,6 +1,6 @@
-"""Posed RGB-D frames of one object in a plain room, with known truth: the alignment's test bench.
+"""Test bench of the alignment: posed RGB-D frames of one object in a plain room, with ground truth.
 
-Each scene is filmed once a process; tests only read it.
+Each scene is filmed once per process; tests only read it.
 """
 
 from dataclasses import dataclass, field
@@ -71,7 +71,7 @@ def blotches(rng: np.random.Generator, height: int = 256, width: int = 384) -> n
 
 
 def join(*meshes: TexturedMesh) -> TexturedMesh:
-    """Several meshes as one; textures side by side."""
+    """Several meshes as one, with their textures side by side."""
     height = max(m.texture.shape[0] for m in meshes)
     width = sum(m.texture.shape[1] for m in meshes)
     texture = np.zeros((height, width, 3), np.uint8)
@@ -87,12 +87,12 @@ def join(*meshes: TexturedMesh) -> TexturedMesh:
 
 
 def moved(mesh: TexturedMesh, pose: Similarity3) -> TexturedMesh:
-    """The mesh in another frame."""
+    """The mesh transformed into another frame."""
     return TexturedMesh(vertices=pose.apply(mesh.vertices), faces=mesh.faces, uv=mesh.uv, texture=mesh.texture)
 
 
 def as_candidate(mesh_world: TexturedMesh, seed: int) -> tuple[MeshAsset, Similarity3]:
-    """The mesh as a generator returns it: turned at random and shrunk into a unit cube; and the true world_from_mesh."""
+    """The mesh as a generator returns it, rotated at random and scaled into a unit cube; and the true world_from_mesh."""
     rotation = Rotation.random(random_state=seed).as_matrix()
     turned = mesh_world.vertices @ rotation.T
     low, high = turned.min(axis=0), turned.max(axis=0)
@@ -114,7 +114,7 @@ def as_candidate(mesh_world: TexturedMesh, seed: int) -> tuple[MeshAsset, Simila
 
 
 def camera_at(eye: Any, target: Any) -> Rigid3:
-    """world_from_camera looking at a point, upright."""
+    """world_from_camera of an upright camera that looks at a point."""
     forward = np.asarray(target, dtype=np.float64) - np.asarray(eye)
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
@@ -135,9 +135,9 @@ def film(
     kind: Any = "thing",
     mask_behind: float | None = None,
 ) -> tuple[Capture, MaskTrack]:
-    """Frames of a thing among other surfaces, from the given places; masks are the thing's visible pixels.
+    """Frames of an object among other surfaces, from the given positions; masks are the object's visible pixels.
 
-    With `mask_behind` only what lies less than that behind the front panel is masked.
+    With `mask_behind` only surface less than that behind the front panel is masked.
     """
     rng = np.random.default_rng(seed)
     images, frames, masks = Images(), [], {}
@@ -188,7 +188,7 @@ def film(
 
 
 def _behind(depth: np.ndarray, pose: Rigid3, front: FrontPanel) -> np.ndarray:
-    """How far behind the panel each pixel's surface lies."""
+    """Distance of each pixel's surface behind the panel."""
     v, u = np.indices(depth.shape)
     rays = np.stack([(u + 0.5 - RGB.cx) / RGB.fx, (v + 0.5 - RGB.cy) / RGB.fy, np.ones(depth.shape)], axis=-1)
     points = pose.apply((rays * depth[..., None]).reshape(-1, 3))
@@ -198,7 +198,7 @@ def _behind(depth: np.ndarray, pose: Rigid3, front: FrontPanel) -> np.ndarray:
 def _shoot(
     thing: TexturedMesh, around: TexturedMesh | None, camera: Intrinsics, pose: Rigid3
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Photo, depth and the thing's visible pixels."""
+    """Photo, depth and the object's visible pixels."""
     image = np.full((camera.height, camera.width, 3), 90, np.uint8)
     depth = np.zeros((camera.height, camera.width), np.float32)
     mask = np.zeros(depth.shape, dtype=bool)
@@ -225,7 +225,7 @@ def painted(mesh: TexturedMesh, texture: np.ndarray) -> TexturedMesh:
 
 
 def ring(count: int, radius: float, height: float) -> list[tuple[float, float, float]]:
-    """Places on an arc of 140 degrees around the origin, at varying height."""
+    """Positions on an arc of 140 degrees around the origin, at varying height."""
     return [
         (radius * np.cos(a), radius * np.sin(a), height * (1 + 0.25 * np.sin(3 * a)))
         for a in np.radians(np.linspace(-100, 40, count))
@@ -244,7 +244,7 @@ def free_box(*, textured: bool) -> tuple[TexturedMesh, Capture, MaskTrack]:
 
 @cache
 def blank_cabinet(*, handle: bool = True) -> tuple[TexturedMesh, Capture, MaskTrack]:
-    """A grey cabinet with a grey handle between grey neighbours below a grey worktop: only depth shows the handle."""
+    """A grey cabinet with a grey handle between grey neighbours below a grey worktop: only depth reveals the handle."""
     parts = [box_mesh((0.6, 0.55, 0.7), (0, 0.275, 0.45))]
     if handle:
         parts.append(box_mesh((0.03, 0.04, 0.25), (0.22, -0.02, 0.6), cells=4))
@@ -272,7 +272,7 @@ def blank_cabinet(*, handle: bool = True) -> tuple[TexturedMesh, Capture, MaskTr
 
 @cache
 def bottle(*, label: bool = False) -> tuple[TexturedMesh, Capture, MaskTrack]:
-    """A bottle, 25 cm high: plain, or blotched all around, which alone tells its yaw."""
+    """A bottle, 25 cm high: plain, or with blotches all around, the only cue for its yaw."""
     radius, height = np.array([0.001, 0.035, 0.035, 0.014, 0.014, 0.001]), np.array([0, 0, 0.17, 0.2, 0.25, 0.25])
     angle = np.linspace(0, 2 * np.pi, 32, endpoint=False)
     vertices = np.stack(
@@ -290,7 +290,7 @@ def bottle(*, label: bool = False) -> tuple[TexturedMesh, Capture, MaskTrack]:
 
 @cache
 def chair() -> tuple[TexturedMesh, Capture, MaskTrack]:
-    """Seat, four legs and a back."""
+    """A chair of a seat, four legs and a back."""
     legs = [box_mesh((0.04, 0.04, 0.44), (x, y, 0.22), cells=3) for x in (-0.19, 0.19) for y in (-0.19, 0.19)]
     parts = [box_mesh((0.42, 0.42, 0.03), (0, 0, 0.45)), *legs, box_mesh((0.42, 0.03, 0.45), (0, 0.2, 0.69))]
     thing = moved(join(*parts), Similarity3(1.0, rotation_about_z(0.8), np.zeros(3)))
@@ -314,7 +314,7 @@ def film_mug(folder: Path) -> tuple[TexturedMesh, Capture, MaskTrack]:
 
 
 class Bench:
-    """The functions above, for tests."""
+    """The functions above, as a fixture for tests."""
 
     box_mesh = staticmethod(box_mesh)
     blotches = staticmethod(blotches)

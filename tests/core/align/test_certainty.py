@@ -1,4 +1,4 @@
-"""What holds a pose and what does not, in figures and in words."""
+"""Uncertainty of a pose: well and poorly constrained directions, in figures and in words."""
 
 import re
 from dataclasses import replace
@@ -16,7 +16,7 @@ from r2c2r_core.model.placement import Spread
 from r2c2r_core.model.track import FrontPanel
 
 NOTHING = Anchors(up_mesh=None, up_weight=0.0, front=None, support_z_m=None)
-IN_PLACE = Similarity3(1.0, np.eye(3), np.zeros(3))  # the mesh frames here are the world's
+IN_PLACE = Similarity3(1.0, np.eye(3), np.zeros(3))  # the mesh frames here are the world frame
 SURE = Spread(
     turn_deg=0.2,
     turn_axis_world=np.array([0.0, 0.0, 1.0]),
@@ -65,7 +65,7 @@ def test_two_frames_that_agree_say_less_than_six(box: tuple[Shape, Observation])
         frame_index=observation.frame_index[own],
     )
     whole, pair = (spread_of(IN_PLACE, shape, o, NOTHING, []) for o in (observation, part))
-    assert pair.shift_m > 1.9 * whole.shift_m  # a third as many readings alone would make it 1.7
+    assert pair.shift_m > 1.9 * whole.shift_m  # a third as many measurements alone would give 1.7
     assert pair.turn_deg > 1.9 * whole.turn_deg
 
 
@@ -91,7 +91,7 @@ def test_the_yaw_of_a_bottle_counts_for_nothing(bench: Any) -> None:
     assert spins_alike(shape, np.array([0.0, 0.0, 2.0]))
     assert not spins_alike(shape, np.array([1.0, 0.0, 0.0]))
     spread = spread_of(IN_PLACE, shape, observation, NOTHING, [])
-    assert abs(spread.turn_axis_world[2]) < 0.3  # it is the lean that is told
+    assert abs(spread.turn_axis_world[2]) < 0.3  # the tilt is reported
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_what_is_loose_is_named(change: dict[str, Any], words: str) -> None:
 
 
 def test_a_front_tells_along_the_wall_from_into_it() -> None:
-    facing_x = Rigid3(rotation_about_z(np.pi / 2), np.zeros(3))  # its width runs along world y
+    facing_x = Rigid3(rotation_about_z(np.pi / 2), np.zeros(3))  # its width is along world y
     front = FrontPanel(world_from_front=facing_x, width_m=0.6, height_m=0.7, handle=None, confidence=1.0)
     (slides,) = loose_ends(replace(SURE, shift_m=0.02, shift_axis_world=np.array([0.0, 1.0, 0.0])), front)
     assert slides == "its place along the wall is poorly constrained by the scan: it may be off by 40 mm"

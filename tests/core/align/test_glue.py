@@ -1,4 +1,4 @@
-"""SuperGlue and LightGlue through transformers' own classes, with tiny random weights written to a folder."""
+"""SuperGlue and LightGlue through the classes of transformers, with tiny random weights written to a folder."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ MATCHERS = {"superglue": SuperGlueMatcher, "lightglue": LightGlueMatcher}
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
-    """Weights of both kinds, as `from_pretrained` finds them."""
+    """Folders with weights of both kinds, as `from_pretrained` expects them."""
     torch.manual_seed(1)
     superglue = transformers.SuperGlueConfig(
         keypoint_detector_config=DETECTOR,
@@ -40,7 +40,7 @@ def folders(tmp_path_factory):
         num_hidden_layers=2,
         num_attention_heads=2,
         filter_threshold=0.0,
-        initializer_range=0.5,  # at 0.02 all keypoints look the same to it
+        initializer_range=0.5,  # at 0.02 all keypoints have nearly the same descriptor
     )
     found = {}
     for name, model in {
@@ -54,13 +54,13 @@ def folders(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def lenient(monkeypatch):
-    """Random weights are sure of nothing: every mutual best counts."""
+    """Accept every mutual nearest match, as random weights give no confident ones."""
     monkeypatch.setattr(SuperGlueMatcher, "settings", {})
 
 
 @pytest.fixture(scope="module")
 def pictures():
-    """Two photos of one textured patch, the second moved by (24, 16) pixels."""
+    """Two photos of one textured patch, the second shifted by (24, 16) pixels."""
     rng = np.random.default_rng(0)
     patch = rng.integers(0, 255, (40, 40, 3)).astype(np.uint8).repeat(4, axis=0).repeat(4, axis=1)
     images, masks = [], []
@@ -80,7 +80,7 @@ def test_keypoints_lie_on_the_object_are_capped_and_keep_their_place(folders, pi
     assert 100 < len(features.uv_px) <= glue.Params().keypoints
     column, row = features.uv_px.astype(int).T
     assert masks[0][row, column].all()
-    # the same patch elsewhere in the picture gives the same keypoints, moved: crop and scale are undone exactly
+    # the same patch elsewhere in the picture gives the same keypoints, shifted: crop and scale are inverted exactly
     moved = matcher.describe(second, masks[1])
     assert np.allclose(moved.uv_px - features.uv_px, [24, 16], atol=1e-3)
     assert np.allclose(moved.descriptors, features.descriptors, atol=1e-4)
@@ -96,7 +96,7 @@ def test_kept_keypoints_match_as_the_model_s_own_call_does(folders, name):
     images = [image, (image.astype(int) + rng.integers(-20, 20, image.shape)).clip(0, 255).astype(np.uint8)]
     whole = np.ones((side, side), bool)
     model = matcher._model
-    model.keypoint_detector.keypoint_decoder.max_keypoints = 300  # below our cap: nothing is dropped on our side
+    model.keypoint_detector.keypoint_decoder.max_keypoints = 300  # below our limit: nothing is dropped on our side
     features = [matcher.describe(np.repeat(image[..., None], 3, axis=2), whole) for image in images]
     ours = matcher.match(*features)
     assert len(ours.first) > 0
@@ -170,6 +170,6 @@ def test_a_photo_is_matched_against_rendered_views_and_lifted_to_points(folders,
     assert len(lifted) == 2
     points = np.concatenate([photo.points_mesh for photo in lifted])
     assert len(points) > 0
-    assert distances_to_mesh(points, asset.mesh.vertices, asset.mesh.faces).max() < 0.02  # of a unit mesh
+    assert distances_to_mesh(points, asset.mesh.vertices, asset.mesh.faces).max() < 0.02  # in units of the mesh
     world = np.concatenate([photo.points_world for photo in lifted])
     assert np.linalg.norm(world - observation.centre_world, axis=1).max() < 1.5 * observation.size_m

@@ -1,4 +1,4 @@
-"""How well a placed mesh explains the views: what of a front is its face."""
+"""Agreement of a placed mesh with the views: which part of a front counts as its face."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from tests.core.align.conftest import Bench
 
 
 def unit(bench: type[Bench], recess_m: float) -> Any:
-    """A unit of 60 x 55 x 70 cm whose front, but for rails of 6 cm, is sunk."""
+    """A unit of 60 x 55 x 70 cm whose front is recessed except for rails of 6 cm."""
     thing = bench.box_mesh((0.6, 0.55, 0.7), (0, 0.275, 0.45))
     vertices = thing.vertices.copy()
     sunk = (vertices[:, 1] == 0.0) & (np.abs(vertices[:, 0]) < 0.25) & (np.abs(vertices[:, 2] - 0.45) < 0.29)

@@ -1,4 +1,4 @@
-"""The pieces of the alignment, each by a fact of its own."""
+"""Single components of the alignment."""
 
 from dataclasses import replace
 from typing import Any
@@ -108,7 +108,7 @@ def test_keypoints_beside_the_mask_take_no_ones_place(bench: Any) -> None:
     image = bench.blotches(np.random.default_rng(4), 200, 200)
     mask = np.zeros((200, 200), dtype=bool)
     mask[60:140, 60:140] = True
-    image[mask] = 128 + (image[mask].astype(int) - 128) // 2  # fainter than what lies around it
+    image[mask] = 128 + (image[mask].astype(int) - 128) // 2  # fainter than its surroundings
     found = SiftMatcher(keypoints=20).describe(image, mask)
     assert len(found.uv_px) == 20
     assert mask[found.uv_px[:, 1].astype(int), found.uv_px[:, 0].astype(int)].all()

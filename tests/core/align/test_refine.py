@@ -1,4 +1,4 @@
-"""Fine registration: what holds a pose where the surface does not."""
+"""Fine registration: factors that constrain a pose where the surface does not."""
 
 from typing import Any
 
@@ -15,19 +15,19 @@ from r2c2r_core.align.sweep import sweep_loosest
 from r2c2r_core.geometry.transforms import Similarity3
 
 NOTHING = Anchors(up_mesh=None, up_weight=0.0, front=None, support_z_m=None)
-UPRIGHT = Similarity3(1.0, np.eye(3), np.zeros(3))  # the bottle's mesh frame is its place in the world
+UPRIGHT = Similarity3(1.0, np.eye(3), np.zeros(3))  # the bottle's mesh frame is its true world pose
 
 
 @pytest.fixture(scope="module")
 def bottle(bench: Any) -> Any:
-    """A blotched bottle: its shape as a candidate, and what the frames show of it."""
+    """A bottle with blotches: its candidate shape, and the observation of it."""
     thing, capture, track = bench.bottle(label=True)
     shape = prepare_shape(thing, point_count=6000, face_limit=6000, rng=np.random.default_rng(0))
     return shape, observe(capture, track, view_count=6, size_px=128, point_count=800)
 
 
 def turned(angle_deg: float) -> Similarity3:
-    """The bottle's pose with a wrong yaw."""
+    """The bottle's pose with a yaw error."""
     return Similarity3(1.0, Rotation.from_euler("z", angle_deg, degrees=True).as_matrix(), np.zeros(3))
 
 
@@ -36,7 +36,7 @@ def yaw_deg(pose: Similarity3) -> float:
 
 
 def keypoints(shape: Any, observation: Any, *, wrong: int) -> list[Lifted]:
-    """Spots of the bottle seen in every view, some of them taken for others."""
+    """Points of the bottle seen in every view, some of them mismatched."""
     rng = np.random.default_rng(1)
     found = []
     for view in observation.views:
@@ -72,7 +72,7 @@ def test_keypoints_turn_a_bottle_that_its_surface_lets_turn(bottle: Any) -> None
 def test_colours_find_the_yaw_of_a_labelled_bottle(bottle: Any, angle_deg: float) -> None:
     shape, observation = bottle
     found = sweep_loosest(turned(angle_deg), shape, observation, NOTHING, [])
-    assert abs(yaw_deg(found)) < 2.0  # 1.2 mm at a radius of 35 mm, in views of 3 mm a pixel
+    assert abs(yaw_deg(found)) < 2.0  # 1.2 mm at a radius of 35 mm, in views of 3 mm per pixel
 
 
 def test_what_is_held_is_not_swept(bench: Any) -> None:

@@ -1,4 +1,4 @@
-"""The contest of poses: what stands is preferred to what would topple, and rivals are compared finished."""
+"""Selection among candidate poses: stable poses are preferred to toppling ones, and rivals are compared after refinement."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ from r2c2r_core.geometry.transforms import Similarity3
 
 @pytest.fixture(scope="module")
 def bottle(bench: Any) -> Case:
-    """A plain bottle in its place, seen in few coarse views: its lean is loosely held."""
+    """A plain bottle in its place, seen in few coarse views, which hardly constrain its tilt."""
     thing, capture, track = bench.bottle()
     shape = prepare_shape(thing, point_count=4000, face_limit=6000, rng=np.random.default_rng(0))
     observation = observe(capture, track, view_count=2, size_px=64, point_count=60)
@@ -24,7 +24,7 @@ def bottle(bench: Any) -> Case:
 
 
 def trial(case: Case, *, lean: float = 0.0, scale: float = 1.0) -> Trial:
-    """The bottle leaning by so many degrees about its foot, as features without an upright axis propose it."""
+    """The bottle tilted about its base by `lean` degrees, as a feature match without an upright axis may propose it."""
     pose = Similarity3(scale, Rotation.from_euler("x", lean, degrees=True).as_matrix(), np.zeros(3))
     return Trial(
         hypothesis=Hypothesis(pose, None, "features"), judgement=judge(pose, case.shape, case.observation.views, case.front)
@@ -56,4 +56,4 @@ def test_a_rival_is_finished_before_it_is_compared(bottle: Case) -> None:
     rough = trial(bottle, scale=1.08)
     finished = finish_contenders([trial(bottle), rough], bottle)
     assert len(finished) == 2
-    assert not any(resized(t, finished[0]) for t in finished[1:])  # both come to the same size: no doubt about it
+    assert not any(resized(t, finished[0]) for t in finished[1:])  # both converge to the same size: no ambiguity

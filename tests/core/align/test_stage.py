@@ -1,4 +1,4 @@
-"""A candidate in a random frame and unit comes back to where it stands."""
+"""Placement of a candidate given in a random frame and scale."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,14 +20,14 @@ SAME = AlignConfig(views=3, match_photos=2, match_views=12, settled=6, refined=2
 
 
 def error(found: Similarity3, truth: Similarity3, middle_mesh: np.ndarray) -> tuple[float, float, float]:
-    """Turn in degrees, relative scale, metres at the middle of the mesh."""
+    """Rotation error in degrees, relative scale error, and distance in metres at the centre of the mesh."""
     turn = float(np.degrees(Rotation.from_matrix(found.rotation @ truth.rotation.T).magnitude()))
     apart = np.linalg.norm(found.apply(middle_mesh[None]) - truth.apply(middle_mesh[None]))
     return turn, abs(found.scale / truth.scale - 1.0), float(apart)
 
 
 def assert_placed(placement: Any, truth: Similarity3, asset: Any) -> None:
-    """Within 1.5 degrees, 2 % and 15 mm: the accuracy asked of the stage."""
+    """Check errors against 1.5 degrees, 2 % and 15 mm: the accuracy required of the stage."""
     turn, scale, apart = error(placement.world_from_mesh, truth, asset.mesh.vertices.mean(axis=0))
     assert turn < 1.5
     assert scale < 0.02
@@ -52,7 +52,7 @@ def test_a_textured_box_returns_from_any_frame(bench: Any, seed: int, config: Al
 
 
 def nudged(truth: Similarity3, shift_m: float, turn_deg: float) -> Similarity3:
-    """The pose, off by so much."""
+    """The pose with an error of that size."""
     turn = Rotation.from_rotvec(np.radians(turn_deg) * np.array([0.3, 0.2, 0.93])).as_matrix()
     return Similarity3(1.01 * truth.scale, turn @ truth.rotation, truth.translation + shift_m * np.array([0.6, -0.5, 0.6]))
 
@@ -112,7 +112,7 @@ def test_a_blank_box_is_reported_unsure_but_stands_right(bench: Any) -> None:
     assert any("orientation" in w for w in placement.warnings)
     assert placement.runner_up_turn_deg == pytest.approx(180.0, abs=5.0)
     assert placement.spread is not None
-    assert placement.spread.shift_m < 0.005  # its edges hold it, whichever way it is turned
+    assert placement.spread.shift_m < 0.005  # its edges constrain it, whatever its yaw
     placed = np.sort(np.ptp(placement.world_from_mesh.apply(asset.mesh.vertices), axis=0))
     np.testing.assert_allclose(placed, np.sort(np.ptp(thing.vertices, axis=0)), atol=0.008)
 

@@ -1,4 +1,4 @@
-"""Which ways up a thing can stand."""
+"""Stable upright poses of an object."""
 
 import numpy as np
 import pytest
@@ -64,6 +64,6 @@ def test_four_legs_carry_and_three_on_one_side_do_not() -> None:
     }
     settled = settled_on_base(np.concatenate([seat, *legs.values()]), UP)
     assert settled is not None
-    assert off_deg(settled, UP) < 1.0  # some 40 points a leg touch the floor
+    assert off_deg(settled, UP) < 1.0  # some 40 points per leg touch the floor
     pair = [leg for (x, _), leg in legs.items() if x > 0]
     assert settled_on_base(np.concatenate([seat, *pair]), UP) is None

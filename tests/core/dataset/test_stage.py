@@ -1,4 +1,4 @@
-"""A small dataset written, read as another program would read it, and evaluated."""
+"""A small dataset, written, read as by another program, and evaluated."""
 
 import json
 from dataclasses import replace
@@ -115,7 +115,7 @@ def written(scene, stored, folder, *, pose=POSE, placed="c0"):
 
 @pytest.fixture
 def truth(scene, tmp_path):
-    """truth.json in the capture frame (here the world), and the true masks beside it."""
+    """truth.json in the capture frame (here the world), with the true masks in the same folder."""
     _, track = scene
     pose = np.eye(4)
     pose[:3, 3] = CENTRE
@@ -200,7 +200,7 @@ def test_run_lengths_of_extreme_masks(mask):
 
 
 def decoded(counts, size):
-    """COCO's definition: runs of 0, 1, 0 … down the columns."""
+    """Run lengths decoded by COCO's definition: runs of 0, 1, 0 … in column order."""
     flat = np.concatenate([np.full(n, k % 2, bool) for k, n in enumerate(counts)])
     return flat.reshape(size[1], size[0]).T
 
@@ -228,7 +228,7 @@ def test_a_wrong_place_is_measured_and_a_quarter_turn_is_not(scene, stored, tmp_
         assert found["yaw"] == pytest.approx(4.0, abs=0.3)
         assert found["extents"] == pytest.approx(0.0, abs=1.5)
     else:
-        assert found["extents"] > 10  # its long side lies where the short one should
+        assert found["extents"] > 10  # its long side is along the wrong axis
 
 
 def test_a_damaged_file_is_named(scene, stored, tmp_path, truth):

@@ -1,4 +1,4 @@
-"""Bundles against the axes of Arti4D, from a tiny sequence in its own layout."""
+"""Evaluation against the axes of Arti4D, with a tiny sequence in its own layout."""
 
 import json
 from pathlib import Path

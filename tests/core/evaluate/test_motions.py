@@ -1,4 +1,4 @@
-"""Of what was filmed while it opened: what is right is right, and what is unknown is wrong."""
+"""Scores of joint motion filmed while fronts open: unknown states count as wrong."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -10,12 +10,12 @@ import pytest
 from r2c2r_core.evaluate.stage import evaluate_bundle
 from tests.core.evaluate.test_stage import bundle_of, row, truth_of, write
 
-FRAMES, OPEN, UNSEEN = 20, range(8, 18), (2, 12)  # one closed frame and one open one do not show it
+FRAMES, OPEN, UNSEEN = 20, range(8, 18), (2, 12)  # UNSEEN: a closed and an open frame that do not show it
 NAMES = ("cabinet_1", "drawer_1")
 
 
 def opened_truth() -> dict[str, Any]:
-    """A truth in which a door and a drawer are opened, and nothing else."""
+    """Ground truth in which only a door and a drawer are opened."""
     truth = truth_of(0)
     for thing in truth["objects"]:
         for joint in thing["joints"]:
@@ -30,7 +30,7 @@ def opened_truth() -> dict[str, Any]:
 
 
 def filmed_bundle(truth: dict[str, Any]) -> dict[str, Any]:
-    """The manifest of a bundle that found all of it."""
+    """Manifest of a bundle that reproduces the truth."""
     manifest = bundle_of(deepcopy(truth))
     for thing in manifest["objects"]:
         for joint in thing["joints"]:
@@ -60,7 +60,7 @@ def test_a_bundle_that_found_everything_is_all_right(tmp_path: Path) -> None:
         assert (metrics["state"], metrics["state_open"], metrics["limit_source"]) == (1.0, 1.0, 1.0)
         assert metrics["inner_depth"] == pytest.approx(0.0)
         assert metrics["false_motion"] == 0.0
-    assert (door["stop"], drawer["stop"]) == (None, 1.0)  # of the door no stop was seen, and none is claimed
+    assert (door["stop"], drawer["stop"]) == (None, 1.0)  # no stop of the door was seen, and none is claimed
 
 
 def test_an_unknown_state_is_a_miss_like_a_frame_that_is_not_listed(tmp_path: Path) -> None:

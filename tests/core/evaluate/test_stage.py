@@ -23,7 +23,7 @@ def truth_of(seed: int) -> dict:
 
 
 def bundle_of(truth: dict) -> dict:
-    """The manifest of a bundle that got everything right."""
+    """Manifest of a bundle that is right in everything."""
     turn, entries = WORLD_FROM_CAPTURE, []
     for thing in truth["objects"]:
         pose = turn @ Rigid3.from_matrix(np.array(thing["capture_from_object"]))
@@ -79,7 +79,7 @@ def test_each_metric_returns_the_size_of_a_known_perturbation(tmp_path: Path) ->
     width, depth, height = fridge["dimensions_m"]
     fridge["dimensions_m"] = [width * 1.1, depth, height * 0.8]
     joint = fridge["joints"][0]
-    joint["origin"] = (np.array(joint["origin"]) + np.array([0.0, 0.02, 0.5])).tolist()  # along the axis means nothing
+    joint["origin"] = (np.array(joint["origin"]) + np.array([0.0, 0.02, 0.5])).tolist()  # a shift along the axis has no effect
     joint["upper"] += np.radians(10.0)
     values = row(evaluate_bundle(*write(tmp_path, truth, manifest)), "refrigerator")
     assert values["width_error"] == pytest.approx(10.0)
@@ -211,7 +211,7 @@ def test_the_fit_to_the_scan_is_what_the_bundle_says(tmp_path: Path) -> None:
     assert first["scan_to_mesh_median"] == pytest.approx(4.2)
     assert first["scan_to_mesh_p95"] == pytest.approx(11.0)
     assert (first["f_score_1cm"], first["f_score_2cm"]) == (0.93, 0.99)
-    assert row(evaluation, truth["objects"][1]["name"])["f_score_1cm"] is None  # not said, so not scored
+    assert row(evaluation, truth["objects"][1]["name"])["f_score_1cm"] is None  # without a value, so not scored
     assert scene(evaluation)["f_score_1cm"] == 0.93
 
 

@@ -1,4 +1,4 @@
-"""The good kitchen as a bundle's folder, without what takes seconds (preview, reports)."""
+"""The valid kitchen as a bundle's folder, without the slow parts (preview, reports)."""
 
 import json
 import shutil
@@ -18,7 +18,7 @@ from tests.core.export.kitchen import kitchen, reconstruction
 
 @pytest.fixture(scope="session")
 def written_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Written once; tests copy it."""
+    """The bundle's folder, written once; tests copy it."""
     return write_folder(kitchen(), tmp_path_factory.mktemp("bundle") / "good")
 
 

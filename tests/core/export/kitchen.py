@@ -1,4 +1,4 @@
-"""A small kitchen by hand: a cabinet door, a drawer, a double door, a counter, and a bottle on it."""
+"""A small hand-made kitchen: a cabinet door, a drawer, a double door, a counter, and a bottle on it."""
 
 from dataclasses import replace
 
@@ -22,9 +22,9 @@ INFERRED = {"axis": "inferred", "origin": "inferred", "limits": "default"}
 
 
 def reconstruction(scene: ArticulatedScene | None = None) -> Reconstruction:
-    """Everything the exporter needs, around `scene`."""
+    """Complete input of the exporter for `scene`."""
     scene = scene or kitchen()
-    clicked = [item for item in scene.objects if item.category != "counter"]  # nobody clicks what is made from the scan
+    clicked = [item for item in scene.objects if item.category != "counter"]  # the counter is made from the scan, unclicked
     return Reconstruction(
         capture=capture(),
         prompts=Prompts(objects=tuple(_prompt(item) for item in clicked)),
@@ -39,7 +39,7 @@ def reconstruction(scene: ArticulatedScene | None = None) -> Reconstruction:
 
 
 def kitchen() -> ArticulatedScene:
-    """The good kitchen: all gaps are 3 mm or more."""
+    """The valid kitchen: all gaps are 3 mm or more."""
     return ArticulatedScene(
         name="hand_made",
         objects=(
@@ -202,14 +202,14 @@ def counter(name: str) -> SceneObject:
 
 
 def bottle(name: str, *, x: float = 0.2, bottom_z: float = 0.8651) -> SceneObject:
-    """A free-standing thing with one convex collider and a texture of its own."""
+    """A free-standing object with one convex collider and its own texture."""
     size = np.array([0.08, 0.08, 0.26])
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     ring = np.column_stack([0.04 * np.cos(angles), 0.04 * np.sin(angles)])
     points = np.concatenate([np.column_stack([ring, np.full(16, z)]) for z in (-0.13, 0.13)])
     body = Link(
         name=f"{name}_body",
-        object_from_link=_at([0.0, 0.0, -0.13]),  # a free-standing thing's frame lies at the centre of its foot
+        object_from_link=_at([0.0, 0.0, -0.13]),  # the frame of a free-standing object is at the centre of its base
         boxes=(),
         pieces=(ConvexPiece(name="hull", vertices_link=points + np.array([0.0, 0.0, 0.13])),),
         visual=panel_mesh(np.array([0.056, 0.056, 0.26]), np.array([0.0, 0.0, 0.13]), seed=3),
@@ -294,7 +294,7 @@ def capture(*, images: object | None = None) -> Capture:
 
 
 class GreyImages:
-    """A capture whose every picture is grey."""
+    """Images of a capture with uniformly grey pictures."""
 
     def rgb(self, frame_index: int) -> np.ndarray:
         return np.full((240, 320, 3), 128, np.uint8)

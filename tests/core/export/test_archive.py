@@ -58,7 +58,7 @@ def test_a_truncated_zip_is_refused(packed: Path, share: float) -> None:
 def test_a_tampered_member_is_refused(packed: Path) -> None:
     content = bytearray(packed.read_bytes())
     with zipfile.ZipFile(packed) as z:
-        member = z.getinfo("preview.png")  # stored, so one byte stays one byte
+        member = z.getinfo("preview.png")  # stored uncompressed, so one byte stays one byte
     name_length, extra_length = struct.unpack("<HH", content[member.header_offset + 26 : member.header_offset + 30])
     content[member.header_offset + 30 + name_length + extra_length] ^= 0xFF
     packed.write_bytes(bytes(content))

@@ -1,4 +1,4 @@
-"""Each object as an asset: it stands alone, and wherever it is put, with its textures."""
+"""Objects as separate assets: each is complete, with textures, wherever it is placed."""
 
 import shutil
 import xml.etree.ElementTree as ET
@@ -94,7 +94,7 @@ def test_a_usd_asset_has_no_physics_scene_and_finds_its_textures_through_a_refer
     for picture in pictures:
         assert Path(picture.Get().resolvedPath).is_file()
     cache = UsdGeom.XformCache()
-    for number in range(2):  # its base is held where the asset stands, not where it was filmed
+    for number in range(2):  # its base is fixed where the asset is placed, not where it was filmed
         joint = UsdPhysics.FixedJoint(stage.GetPrimAtPath(f"/World/cabinet_{number}/joints/cabinet_1_base_to_world"))
         holder = cache.GetLocalToWorldTransform(stage.GetPrimAtPath(joint.GetBody0Rel().GetTargets()[0]))
         base = cache.GetLocalToWorldTransform(stage.GetPrimAtPath(joint.GetBody1Rel().GetTargets()[0]))
@@ -122,7 +122,7 @@ def test_a_urdf_asset_loads_alone_and_has_the_scenes_joints(moved_away: Path, na
     path = moved_away / f"assets/{name}/{name}.urdf"
     robot = yourdfpy.URDF.load(str(path), load_meshes=True)
     assert len(robot.scene.geometry) == sum(len(link.visuals) for link in robot.robot.links)
-    assert robot.base_link == ("bottle_1_body" if name == "bottle_1" else name)  # a thing can fall
+    assert robot.base_link == ("bottle_1_body" if name == "bottle_1" else name)  # a free-standing object can fall
     scene = {joint.name: joint.limit for joint in read_urdf(moved_away / "scene.urdf").joints}
     assert all(joint.limit == scene[joint.name] for joint in read_urdf(path).joints if joint.type != "fixed")
 
@@ -163,9 +163,9 @@ def test_sdf_has_a_model_for_each_object_and_files_that_are_there(good_folder: P
     assert world is not None
     assert {model.get("name") for model in world.findall("model")} == {"floor", *OBJECTS}
     assert all((good_folder / str(uri.text)).is_file() for uri in world.iter("uri"))
-    assert not list(world.iter("plane"))  # Drake dies of one that comes before meshes
+    assert not list(world.iter("plane"))  # Drake crashes if one comes before meshes
     bottle = next(model for model in world.findall("model") if model.get("name") == "bottle_1")
-    assert bottle.find("joint") is None  # it falls when it is pushed
+    assert bottle.find("joint") is None  # it falls when pushed
 
 
 def test_sdf_gives_every_joint_the_dynamics_that_the_format_requires(good_folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""A link whose collider is known to stand off what is drawn of it."""
+"""Distance between a link's collider and its visual mesh, for known offsets."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The gripper beside what else judges a bundle: the same certificate whatever the number of processes."""
+"""Gripper tests within the certificate: equal results for any number of processes."""
 
 import shutil
 from pathlib import Path

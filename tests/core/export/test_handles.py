@@ -1,4 +1,4 @@
-"""Handles as things: where each stands, how it opens, and what room a gripper has round it."""
+"""Handles as objects: position, opening direction, and clearance for a gripper."""
 
 import json
 import xml.etree.ElementTree as ET
@@ -46,7 +46,7 @@ def test_a_drawers_bar_has_the_frame_of_a_gripper_that_holds_it() -> None:
     np.testing.assert_allclose(handle.opening_world, [0, -1, 0], atol=1e-9)
     np.testing.assert_allclose(handle.size_m, [0.18, 0.012, 0.03], atol=1e-9)
     assert handle.protrusion_m == pytest.approx(0.03)
-    assert handle.kind == "knob"  # solid down to the front
+    assert handle.kind == "knob"  # solid back to the front
 
 
 def test_a_handle_turns_with_its_cabinet_and_opens_across_its_hinge() -> None:
@@ -56,7 +56,7 @@ def test_a_handle_turns_with_its_cabinet_and_opens_across_its_hinge() -> None:
     body = next(b for b in planned(cabinet("a", yaw=0.7)).bodies if b.joint is not None)
     arm = turned.world_from_handle.translation - body.world_from_body.translation
     axis = body.world_from_body.turn(body.axis_body)
-    assert float(turned.opening_world @ arm) == pytest.approx(0.0, abs=0.03)  # the handle stands before the hinge's plane
+    assert float(turned.opening_world @ arm) == pytest.approx(0.0, abs=0.03)  # the handle is in front of the hinge's plane
     assert float(turned.opening_world @ np.cross(axis, arm)) > 0
 
 

@@ -1,4 +1,4 @@
-"""What each part means, the same in every format."""
+"""Semantic labels of parts, equal in every format."""
 
 import json
 import xml.etree.ElementTree as ET

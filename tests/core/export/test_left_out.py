@@ -1,4 +1,4 @@
-"""What fails for one object while the bundle is written leaves that one out, and the rest is certified."""
+"""Objects that fail while the bundle is written are left out, and the rest is certified."""
 
 import zipfile
 from dataclasses import replace
@@ -22,7 +22,7 @@ QUICK = ExportConfig(pictures=False, gripper=False, texture_max_px=64)
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is judged here is what is in the bundle, not how it moves."""
+    """Skip the dynamics, as only the bundle's contents are checked here."""
     judged = Certificate(
         passed=True,
         likeness=ALIKE,

@@ -1,4 +1,4 @@
-"""The certificate judges whether the scene can be what was filmed, from the manifest alone."""
+"""Plausibility check of the scene against the film, from the manifest alone."""
 
 import json
 from dataclasses import replace

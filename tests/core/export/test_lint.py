@@ -1,4 +1,4 @@
-"""Every rule fires on its planted defect, and nothing else fires with it beyond what the defect implies."""
+"""Every lint rule fires on its planted defect, with no other findings than the defect implies."""
 
 import json
 import xml.etree.ElementTree as ET
@@ -83,7 +83,7 @@ def write(name: str, text: str) -> Plant:
 
 
 def renamed_mesh(new: str) -> Plant:
-    """The door's mesh moved to another path, in URDF and manifest."""
+    """Move the door's mesh to another path, in URDF and manifest."""
 
     def plant(folder: Path) -> None:
         (folder / new).parent.mkdir(parents=True, exist_ok=True)
@@ -100,7 +100,7 @@ def renamed_mesh(new: str) -> Plant:
 
 
 def referring_to(path: str) -> Plant:
-    """The URDF and the manifest name another path; nothing is moved."""
+    """Make the URDF and the manifest refer to another path; nothing is moved."""
     return both(
         urdf(lambda root: door(root).find("visual/geometry/mesh").set("filename", path)),
         manifest(lambda d: d["objects"][0]["meshes"].update(visual=[path])),
@@ -125,7 +125,7 @@ def obj_of_hull(points: np.ndarray) -> str:
 
 
 def obj_of_boxes(*offsets: float) -> str:
-    """Unit-decimetre cubes side by side, one `o` group in all."""
+    """Cubes with sides of 10 cm side by side, all in one `o` group."""
     corners = [(x, y, z) for x in (0, 0.1) for y in (0, 0.1) for z in (0, 0.1)]
     quads = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4)]
     lines = []

@@ -1,7 +1,7 @@
-"""The loader torture test by number: 27 ways a URDF of a cabinet breaks in some loader, each planted and each named.
+"""The loader torture test by number: 27 ways in which a cabinet's URDF breaks some loader, each planted and detected.
 
-Rows of the measured table that hold several variants (limits without effort, without velocity; inertias that are impossible,
-zero, the stock identity) are a case each; cases 14-17 and 25-27 are the conventions measured beside it.
+Rows of the measured table with several variants (limits without effort, without velocity; inertias that are impossible, zero,
+the default identity) are one case each; cases 14-17 and 25-27 are the conventions measured with it.
 """
 
 from pathlib import Path

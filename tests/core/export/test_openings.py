@@ -1,4 +1,4 @@
-"""A mug of 8 cm whose inside is known: what its colliders leave of it."""
+"""Free interior of an 8 cm mug with known cavity, after its colliders."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def _quads(k: np.ndarray, n: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, n
 
 
 def staves() -> list[np.ndarray]:
-    """The wall as one convex piece a side, and the floor."""
+    """The wall as one convex piece per side, and the floor."""
     pieces = [np.concatenate([ring(OUTER_M, 0.0), ring(OUTER_M, FLOOR_M)])]
     for side in range(SIDES):
         pair = [side, (side + 1) % SIDES]

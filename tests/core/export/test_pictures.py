@@ -11,13 +11,13 @@ from tests.core.export.kitchen import reconstruction
 def test_each_clicked_object_is_shown_in_the_photo_and_as_a_model(tmp_path: Path) -> None:
     item = reconstruction()
     files = write_pictures(item, plan_bundle(item.scene), tmp_path)
-    assert set(files) == {track.name for track in item.tracks}  # what nobody clicked has no mask to show
+    assert set(files) == {track.name for track in item.tracks}  # objects without clicks have no mask
     drawer = cv2.imread(str(tmp_path / files["drawer_1"])).astype(float)
     half = (drawer.shape[1] - 4) // 2
     photo, model = drawer[:, : half - 4], drawer[:, half + 8 :]
     np.testing.assert_allclose(photo.mean(axis=(0, 1)), 128, atol=3)  # the grey frame
     blue, red = model[..., 0], model[..., 2]
-    assert (red > blue + 30).mean() > 0.2  # the wooden front stands where its mask is
+    assert (red > blue + 30).mean() > 0.2  # the wooden front is where its mask is
 
 
 def test_an_object_without_masks_has_no_picture(tmp_path: Path) -> None:

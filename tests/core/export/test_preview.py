@@ -19,7 +19,7 @@ def test_closed_and_open_stand_side_by_side_and_differ() -> None:
     assert image.shape == (192, 480, 3)
     closed, opened = image[:, :240], image[:, 240:]
     assert np.abs(closed - opened).mean() > 3.0  # grey levels: doors swing, shadows move
-    assert closed.std() > 15.0  # there is something to see
+    assert closed.std() > 15.0  # not an empty picture
 
 
 def test_the_picture_shows_the_wood_and_the_green_doors() -> None:
@@ -44,7 +44,7 @@ def test_the_frame_holds_every_corner() -> None:
         assert (uv > 0).all()
         assert (uv < [400, 300]).all()
         spread = np.ptp(uv, axis=0) / [400, 300]
-        assert spread.max() > 0.7  # and fills it
+        assert spread.max() > 0.7  # and it fills the picture
 
 
 def test_fronts_are_seen_from_their_front_even_when_filmed_from_nowhere() -> None:

@@ -1,4 +1,4 @@
-"""Every value a loader holds is compared: a file that says one thing otherwise is caught, in every loader that keeps it."""
+"""Comparison of every value that a loader reads: a deviating file is detected in every loader that keeps the value."""
 
 import json
 import os
@@ -54,7 +54,7 @@ def less_solid(root: ET.Element) -> None:
     link.remove(element(link, "collision"))
 
 
-# what is said otherwise, how, what the comparison answers
+# deviating value, deviation, finding
 URDF_EDITS: dict[str, tuple[Callable[[ET.Element], None], str]] = {
     "type": (lambda r: named(r, "joint", JOINT).set("type", "revolute"), f"{JOINT} is revolute, not prismatic"),
     "axis": (urdf_joint("axis", xyz="0 -0.8 0.6"), f"{JOINT} has the axis (0, -0.8, 0.6), not (0, -1, 0)"),
@@ -87,7 +87,7 @@ def test_a_urdf_that_says_one_thing_otherwise_is_caught(bundle: Path, expected: 
     edit, says = URDF_EDITS[what]
     lines = differences(expected, readback_of(URDF_PROBES[loader](edited_urdf(bundle, what, edit))))
     if (loader, what) == ("mujoco", "velocity"):
-        assert lines == []  # MuJoCo has no such limit: it stands in the loss list of scene.xml
+        assert lines == []  # MuJoCo has no such limit: it is in the loss list of scene.xml
     else:
         assert any(line.startswith(says) for line in lines), lines
         assert all(line.split()[0] in (JOINT, LINK) for line in lines), lines
@@ -105,7 +105,7 @@ def edited_urdf(bundle: Path, what: str, edit: Callable[[ET.Element], None]) -> 
 def test_sapien_holds_all_but_friction_effort_and_velocity(bundle: Path, expected: Readback) -> None:
     def all_of_them(root: ET.Element) -> None:
         for what, (edit, _) in URDF_EDITS.items():
-            if what not in ("type", "inertia axes"):  # one hides what follows it, the other what stands before it
+            if what not in ("type", "inertia axes"):  # a type hides later values, inertia axes hide earlier ones
                 edit(root)
 
     answer = bundle / "sapien.json"
@@ -177,7 +177,7 @@ def test_a_usd_that_says_one_thing_otherwise_is_caught(bundle: Path, expected: R
     from pxr import Usd
 
     prim, attribute, value, says = USD_EDITS[what]
-    stage = Usd.Stage.Open(Usd.Stage.Open(str(bundle / "scene.usda")).Flatten())  # nothing is edited under a reference
+    stage = Usd.Stage.Open(Usd.Stage.Open(str(bundle / "scene.usda")).Flatten())  # prims under a reference cannot be edited
     found = stage.GetPrimAtPath(prim).GetAttribute(attribute)
     assert found, attribute
     if value is None:

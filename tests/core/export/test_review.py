@@ -1,4 +1,4 @@
-"""review.html holds the whole scene, and nothing of the outside."""
+"""review.html contains the whole scene and no external resources."""
 
 import base64
 import json

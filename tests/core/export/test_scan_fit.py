@@ -19,7 +19,7 @@ from tests.core.motions import motion
 
 
 class Filmed(GreyImages):
-    """Depth images of the kitchen itself, everything `behind_m` further away than it is."""
+    """Depth images of the kitchen itself, with everything `behind_m` further away."""
 
     def __init__(self, item: Reconstruction, behind_m: float, hidden_columns: int) -> None:
         soup = scene_soup(plan_bundle(item.scene), 0.0)
@@ -38,7 +38,7 @@ class Filmed(GreyImages):
 
 
 def filmed(behind_m: float, hidden_columns: int = 0) -> Reconstruction:
-    """The kitchen filmed; something that is no part of it stands before the left `hidden_columns` of the picture."""
+    """The kitchen as filmed; a foreign surface occludes the left `hidden_columns` of the picture."""
     item = reconstruction(kitchen())
     images = Filmed(item, behind_m, hidden_columns)
     plan = plan_bundle(item.scene)

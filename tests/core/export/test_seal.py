@@ -1,4 +1,4 @@
-"""A bundle that was damaged or changed is known by the checksums in its manifest."""
+"""Damaged or changed bundles are detected by the checksums in their manifest."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What the frames saw of each side of an object, and how it is said."""
+"""Observed fraction of each side of an object, and its description in words."""
 
 from dataclasses import replace
 

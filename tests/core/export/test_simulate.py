@@ -1,4 +1,4 @@
-"""MuJoCo as the oracle, against kitchens whose defects are known."""
+"""MuJoCo simulation as the oracle, with kitchens of known defects."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +31,7 @@ def moved(item: SceneObject, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> 
 
 def test_the_good_kitchen_opens_fully_and_touches_nothing(tmp_path: Path) -> None:
     result = simulate(write_folder(kitchen(), tmp_path / "b") / "scene.xml")
-    assert [(f.rule, f.where) for f in result.findings] == [("together", "drawer_1_slide")]  # beside a door at 92 degrees
+    assert [(f.rule, f.where) for f in result.findings] == [("together", "drawer_1_slide")]  # beside a door open by 92 degrees
     assert {joint.joint for joint in result.joints} == {
         "cabinet_1_hinge",
         "drawer_1_slide",
@@ -80,7 +80,7 @@ def test_a_door_without_a_gap_to_its_neighbours_jams(tmp_path: Path) -> None:
 def test_a_drawer_that_runs_into_a_cabinet_is_found_with_its_depth(tmp_path: Path, depth_m: float) -> None:
     """A post stands `depth_m` inside the open drawer's last stretch of travel."""
     item = drawer("d")
-    front_y = -0.56 / 2 - 0.03  # the handle's outer face, closed
+    front_y = -0.56 / 2 - 0.03  # y of the handle's outer face, closed
     post = counter("post")
     size = np.array([0.1, 0.1, 0.4])
     link = replace(post.links[0], boxes=(Box(name="post", role="carcass", size_m=size, link_from_box=Rigid3()),))
@@ -124,17 +124,17 @@ def test_a_chair_before_a_door_is_named_and_does_not_fail_the_door(tmp_path: Pat
     assert {(f.rule, f.severity, f.where) for f in result.findings} == {("blocked-by", "warning", "c_hinge")}
     (blocker,) = result.joints[0].blocked_by
     assert (blocker.name, blocker.kind) == ("b_body", "thing")
-    assert 0.0 < blocker.position < 1.0  # it stands 1 cm before the closed door's path, near its free edge
+    assert 0.0 < blocker.position < 1.0  # it is 1 cm before the closed door's path, near its free edge
     assert result.joints[0].travel_reached >= 0.98
 
 
 def test_a_thing_that_falls_is_reported_as_drift(tmp_path: Path) -> None:
     """Over the counter's edge: its centre is not carried, a third of its foot is."""
     result = simulated(tmp_path, counter("k"), bottle("b", bottom_z=0.9))
-    assert "drift" not in {f.rule for f in result.findings}  # a plate carries it
+    assert "drift" not in {f.rule for f in result.findings}  # a support plate carries it
     scene = ArticulatedScene(
         name="t",
-        objects=(counter("k"), moved(bottle("b"), y=-0.235)),  # 5 mm of its foot still inside the edge, in plan
+        objects=(counter("k"), moved(bottle("b"), y=-0.235)),  # 5 mm of its base still inside the edge, in plan
         layout_moves_m={},
         warnings=(),
     )

@@ -1,4 +1,4 @@
-"""The lines that take a bundle into a simulator: each file they name is in the bundle, and they run where it is installed."""
+"""Code snippets that load a bundle into simulators: the files exist, and the snippets run where the simulator is installed."""
 
 import os
 import re
@@ -19,8 +19,8 @@ RECIPES = {recipe.simulator: recipe for recipe in recipes("hand made", "cabinet_
 HERE = {"MuJoCo": "mujoco", "PyBullet": "pybullet"}
 ELSEWHERE = {"MJX": "MJX", "MuJoCo Warp": "MuJoCo Warp", "Newton": "Newton", "Drake": "Drake"}
 WITHOUT_A_DEVICE = {"SAPIEN, ManiSkill"}
-NOT_FROM_PYPI = {"Isaac Sim", "Isaac Lab", "ROS 2", "Gazebo"}  # their files are looked at alone: they need a GPU or a system
-READERS = {"yourdfpy", "MuJoCo (URDF)", "USD"}  # loaders of the certificate that are no simulators of their own
+NOT_FROM_PYPI = {"Isaac Sim", "Isaac Lab", "ROS 2", "Gazebo"}  # only files are checked: they need a GPU or a system
+READERS = {"yourdfpy", "MuJoCo (URDF)", "USD"}  # loaders of the certificate that are not separate simulators
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The whole export: one bundle written and judged, with everything product.md asks for."""
+"""The whole export: one bundle written and certified, with everything that product.md requires."""
 
 import errno
 import json
@@ -23,20 +23,20 @@ from tests.core.export.kitchen import CREATED, cabinet, drawer, kitchen, reconst
 
 
 def one_drawer() -> Reconstruction:
-    """For tests that are not about what is in the bundle."""
+    """A scene with one drawer, for tests that do not depend on the bundle's contents."""
     return reconstruction(replace(kitchen(), objects=(drawer("drawer_1"),)))
 
 
 @pytest.fixture
 def small_preview(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests that are not about the picture, which takes most of an export's time."""
+    """Small preview picture, as rendering takes most of an export's time."""
     monkeypatch.setattr(stage, "preview_png", lambda plan, seen_from: preview_png(plan, seen_from, 64))
 
 
 def test_the_good_kitchen_is_certified(kitchen_bundle: tuple[Path, Certificate]) -> None:
     certificate = kitchen_bundle[1]
     assert certificate.passed
-    assert {f.rule for f in certificate.findings} == {"together"}  # a drawer beside a door at 92 degrees
+    assert {f.rule for f in certificate.findings} == {"together"}  # a drawer collides with a door at 92 degrees
     states = {r.loader: r.state for r in certificate.loaders}
     assert {states[name] for name in ("yourdfpy", "MuJoCo (URDF)", "MuJoCo (MJCF)", "PyBullet")} == {"passed"}
     assert states["SAPIEN"] in ("not tried", "passed")

@@ -1,4 +1,4 @@
-"""States to reset to, and how far each number may be varied."""
+"""Reset states, and ranges for the randomisation of each parameter."""
 
 import json
 from dataclasses import replace

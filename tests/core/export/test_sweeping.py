@@ -1,4 +1,4 @@
-"""Sweeping beside MuJoCo, with MuJoCo's own steps in the place of an engine's."""
+"""Joint sweeps compared with MuJoCo's, with MuJoCo's own steps in place of another engine's."""
 
 import sys
 from pathlib import Path
@@ -13,7 +13,7 @@ import r2c2r_core.export.probes as probes
 
 @pytest.fixture
 def sweeping(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The probes import it as the file beside them."""
+    """The module, imported as the probes import it: from the same folder."""
     monkeypatch.syspath_prepend(str(Path(probes.__file__).parent))
     import sweeping
 
@@ -42,7 +42,7 @@ def test_a_door_that_an_engine_lets_meet_its_carcass_is_named(good_folder: Path,
     other = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
     other.dof_damping[:] = 0
     other.dof_frictionloss[:] = 0
-    other.opt.gravity[:] = (0, 40, 0)  # a pull that opens what nothing holds
+    other.opt.gravity[:] = (0, 40, 0)  # gravity that opens every unconstrained joint
     assert "from where MuJoCo has it after 10 steps" in sweeping.sweep_beside_mujoco(model, stepped_in(other))
 
 

@@ -1,4 +1,4 @@
-"""Small rendered scans with known truth: coloured solids before a wall, seen by a phone's LiDAR."""
+"""Small rendered scans with ground truth: coloured solids before a wall, recorded by a simulated phone LiDAR."""
 
 from dataclasses import dataclass
 
@@ -27,7 +27,7 @@ HANDLE = FrontHandle(left_m=-0.08, right_m=0.08, bottom_m=0.20, top_m=0.215, pro
 
 @dataclass
 class Solid:
-    """A coloured mesh; `part` 1 is what the track's mask covers."""
+    """A coloured mesh; the track's mask covers meshes with `part` 1."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -166,7 +166,7 @@ def table_scene(seed=0):
 
 
 def _on_floor(parts, category, size, seed):
-    """A thing whose front is at y = 0, filmed from before it at some two metres."""
+    """An object whose front is at y = 0, filmed from the front at some two metres."""
     centre = np.array([0.0, size[1] / 2, size[2] / 2])
     capture, masks = scan(parts, target=centre, distance=2.0, seed=seed, wall_y=1.6)
     thing = ThingBox(world_from_object=Rigid3(np.eye(3), centre), dimensions_m=size, support_z_m=0.0)
@@ -174,7 +174,7 @@ def _on_floor(parts, category, size, seed):
 
 
 def carton_scene(size, *, arc_deg, elevation_deg, yaw_rad, wall_gap_m=0.05, seed=0):
-    """A carton on a counter before a wall, filmed along an arc; the segmenter's box is square to the room and too deep."""
+    """A carton on a counter before a wall, filmed along an arc; the segmenter's box is aligned with the room and too deep."""
     turn = rotation_about_z(yaw_rad)
     vertices, faces = box_mesh(-size / 2, size / 2)
     carton = Solid(vertices @ turn.T + [0.0, size[1] / 2, 0.9 + size[2] / 2], faces, (220, 150, 40), 1)
@@ -197,7 +197,7 @@ def box_shape(evidence, variation):
 
 
 def best_thing(evidence, variation=None):
-    """The shape of the likeliest hypothesis about a thing, by all frames or those of a draw."""
+    """Shape of an object's likeliest hypothesis, from all frames or from those of a variation."""
     everything = whole_pool(evidence)
     return thing_hypotheses(evidence, everything)[0].shape(variation or everything)
 

@@ -1,4 +1,4 @@
-"""A server on a thread that answers as a test tells it, and remembers what it was asked."""
+"""HTTP server on a thread with responses given by the test; it records the requests."""
 
 import contextlib
 import json
@@ -17,7 +17,7 @@ QUICK = Patience(connect_s=PATIENCE_S, answer_s=PATIENCE_S, leave_s=PATIENCE_S, 
 
 @contextlib.contextmanager
 def serving(server):
-    """The server at work; yields its base address."""
+    """Run the server; yields its base address."""
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
     thread.start()
     try:
@@ -30,7 +30,7 @@ def serving(server):
 
 @contextlib.contextmanager
 def answering(answer):
-    """A server whose `answer(method, path, headers, body)` gives (status, headers, body); yields its address and requests."""
+    """Server whose `answer(method, path, headers, body)` gives (status, headers, body); yields its address and requests."""
     asked = []
 
     class Handler(BaseHTTPRequestHandler):
@@ -59,7 +59,7 @@ def said(status, document, **headers):
 
 
 def box_glb(sides=(0.4, 0.3, 0.2)):
-    """What TRELLIS's post-processing gives: one textured geometry, seams cut open, +Y up."""
+    """GLB as TRELLIS's post-processing returns it: one textured geometry, seams cut open, +Y up."""
     return textured_box(sides).export(file_type="glb")
 
 

@@ -94,7 +94,7 @@ def test_photos_of_an_object_are_taken_at_the_common_exposure(front_scene):
     darker = replace(capture, frames=tuple(replace(f, gain=(0.5, 0.6, 0.7)) for f in capture.frames))
     for view in gather_evidence(darker, track, 4).pool:
         expected = plain[view.frame_index] * np.array((0.5, 0.6, 0.7))
-        filmed = plain[view.frame_index].max(axis=-1) < 200  # towards white the gain fades out
+        filmed = plain[view.frame_index].max(axis=-1) < 200  # towards white the gain is reduced
         assert np.abs(view.rgb - expected)[filmed].max() <= 0.51
 
 
@@ -104,9 +104,9 @@ def test_a_picture_is_as_fine_as_the_nearest_photo_shows_it(name, make, most, re
     shape = make(evidence, draw_variation(evidence, np.random.default_rng(0)))
 
     def texels(times: int) -> int:
-        """Of photos so many times as large."""
+        """Number of texels for photos `times` as large."""
         views = [replace(v, rgb_camera=replace(v.rgb_camera, fx=times * v.rgb_camera.fx)) for v in evidence.pool]
         return len(cut_open(shape, views).points)
 
     assert texels(6) > 1.5 * texels(1)
-    assert texels(60) < 3 * most**2  # what memory allows, whatever the photos
+    assert texels(60) < 3 * most**2  # bounded by memory, whatever the photos' size

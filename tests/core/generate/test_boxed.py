@@ -1,4 +1,4 @@
-"""Fronts and appliances against rendered truth."""
+"""Completed fronts and appliances compared with rendered truth."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def test_a_front_lies_exactly_on_its_plane_and_rectangle_and_reaches_the_wall(fr
     body = shape.vertices_local[shape.vertices_local[:, 1] >= -1e-9]
     assert body.min(axis=0) == pytest.approx([-0.25, 0.0, -0.30], abs=1e-6)
     assert body.max(axis=0)[[0, 2]] == pytest.approx([0.25, 0.30], abs=1e-6)
-    assert body[:, 1].max() == pytest.approx(0.60, abs=0.012)  # the wall less its gap, varied by 1 %
+    assert body[:, 1].max() == pytest.approx(0.60, abs=0.012)  # the wall minus its gap, varied by 1 %
 
 
 def test_the_front_face_is_flat(front_scene):
@@ -64,7 +64,7 @@ def test_a_front_without_a_wall_gets_its_categorys_depth(front_scene):
     open_room = replace(capture, room=replace(capture.room, walls=()))
     depths = {round(float(np.ptp(shape_of((open_room, track), k).vertices_local[:, 1])), 4) for k in range(5)}
     assert all(0.58 * 0.95 <= depth - 0.035 <= 0.58 * 1.05 for depth in depths)
-    assert len(depths) > 2  # nobody saw it, so it is varied
+    assert len(depths) > 2  # not observed, so it is varied
 
 
 @pytest.mark.parametrize("seed", [0, 3])

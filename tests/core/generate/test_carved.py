@@ -1,4 +1,4 @@
-"""Free-standing things against rendered truth."""
+"""Completed free-standing objects compared with rendered truth."""
 
 from dataclasses import replace
 

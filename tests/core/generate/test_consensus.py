@@ -34,7 +34,7 @@ FIVE = [
     candidate("c0", 0.60, 0.50, 0.80),
     candidate("c1", 0.62, 0.52, 0.78),  # in the middle of the three that agree
     candidate("c2", 0.64, 0.54, 0.76),
-    candidate("c3", 1.00, 0.99, 0.10),  # two wild ones, of which this one pulls the mean away
+    candidate("c3", 1.00, 0.99, 0.10),  # two outliers, of which this one shifts the mean
     candidate("c4", 0.50, 0.40, 0.82),
 ]
 
@@ -137,7 +137,7 @@ def test_being_odd_on_purpose_is_no_fault_and_is_said():
 
 
 def guesses(*changes):
-    """Candidates alike in all but these metrics, each with something that it assumes."""
+    """Candidates that differ only in these metrics, each with its own assumption."""
     alike = [replace(candidate(f"c{k}", 0.6, 0.5, 0.8), assumes="a guess") for k in range(len(changes))]
     return [replace(c, metrics={**c.metrics, **change}) for c, change in zip(alike, changes, strict=True)]
 

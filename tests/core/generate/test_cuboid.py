@@ -1,4 +1,4 @@
-"""The depth of a small carton, by how much of it the cameras went round."""
+"""Depth estimate of a small carton, by the angle that the cameras cover."""
 
 from dataclasses import replace
 
@@ -66,7 +66,7 @@ def test_candidates_of_an_open_depth_stay_believable_and_before_the_wall():
         shape = best_thing(evidence, replace(whole_pool(evidence), depth_draw=draw))
         assert shape.parameters["boxed"] == 1.0
         assert np.ptp(shape.vertices_local[:, 1]) < SIZE[0]
-        assert shape.vertices_world[:, 1].max() < SIZE[1] + 0.05 + 0.01  # the wall is 5 cm behind, found within 1 cm
+        assert shape.vertices_world[:, 1].max() < SIZE[1] + 0.05 + 0.01  # the wall is 5 cm behind, estimated within 1 cm
 
 
 def test_a_depth_that_only_the_wall_ends_is_not_called_seen():

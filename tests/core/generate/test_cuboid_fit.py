@@ -1,4 +1,4 @@
-"""The box that fits outlines and depth: from any start, in any frame."""
+"""Box fit to outlines and depth, from any initial guess and in any frame."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def carton() -> Evidence:
 
 
 def fitted(evidence: Evidence, frame: Rigid3, size: np.ndarray) -> Cuboid | None:
-    """The box from a start of that size, in a frame whose origin is at the carton's middle."""
+    """The box fitted from an initial guess of that size, in a frame whose origin is at the carton's centre."""
     points = np.concatenate([masked_points(view) for view in evidence.pool])
     low, high = -size / 2, size / 2
     low[2] = 0.9 - MIDDLE[2]
@@ -62,11 +62,11 @@ def test_distances_are_signed_and_turn_with_the_box(yaw: float) -> None:
 
 def test_the_room_behind_ends_at_the_nearest_wall_behind() -> None:
     def wall(normal: tuple[float, float, float], distance_m: float) -> Wall:
-        """At that distance from the box's middle."""
+        """A wall at that distance from the box's centre."""
         n = np.array(normal)
         return Wall(normal=n, offset_m=float(n @ [1.0, 2.0, 0.5]) - distance_m, area_m2=4.0)
 
-    slack = 0.003  # a box may stand this far in a wall
+    slack = 0.003  # a box may overlap a wall by this much
     behind, farther, beside = wall((0, -1, 0), 0.15), wall((0, -1, 0), 0.4), wall((1, 0, 0), 0.25)
     assert room_behind(box(), [behind]) == pytest.approx(0.05 + slack)
     assert room_behind(box(), [farther, behind, beside]) == pytest.approx(0.05 + slack)

@@ -1,4 +1,4 @@
-"""A chair's seat and legs, those that depth shows and those that something hid."""
+"""Seat and legs of a chair, both legs shown by depth and occluded ones."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import category_of
 from tests.core.generate import scenes
 
-LEGS = {(x, y) for x in (-0.1875, 0.1875) for y in (-0.1875, 0.1875)}  # middles, in the frame of the chair's box
+LEGS = {(x, y) for x in (-0.1875, 0.1875) for y in (-0.1875, 0.1875)}  # centres, in the frame of the chair's box
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_the_bars_that_depth_saw_are_the_legs_and_there_is_air_between_them(carv
     assert found.field.shape == grid.shape
     for height in (-0.35, -0.2, -0.1):
         assert distance((0.0, 0.0, height)) > 0.01
-        for x, y in LEGS:  # a leg's outer sides are seen, not its middle
+        for x, y in LEGS:  # a leg's outer sides are seen, not its centre
             sides = [(x + dx, y + dy, height) for dx, dy in ((half, 0), (-half, 0), (0, half), (0, -half))]
             assert min(distance(side) for side in sides) < 0
 
@@ -204,7 +204,7 @@ def test_a_slab_on_one_leg_at_its_corner_falls_over():
 
 
 def legless(view, below_m):
-    """The view, its mask ending at a height (world)."""
+    """The view with its mask cut off at a height (world)."""
     kept = without(view, Rigid3(), lambda points: points[:, 2] < below_m) > 0
     at_mask = cv2.resize(kept.astype(np.uint8), view.mask.shape[1::-1], interpolation=cv2.INTER_NEAREST)
     return replace(view, mask=view.mask & at_mask.astype(bool))

@@ -6,7 +6,7 @@ from r2c2r_core.model.track import FrontHandle
 
 
 def views_of(depth_of, rng, noise_m, count=8):
-    """Points of a 0.5 x 0.7 m front whose face lies at y = depth_of(x, z), each view off by millimetres."""
+    """Points of a 0.5 x 0.7 m front whose face is at y = depth_of(x, z), with a millimetre offset per view."""
     found = []
     for _ in range(count):
         x, z = rng.uniform(-0.25, 0.25, 6000), rng.uniform(-0.35, 0.35, 6000)

@@ -1,4 +1,4 @@
-"""The remote generator against servers of both protocols, and against servers that misbehave."""
+"""Remote generator with servers of both protocols, and with misbehaving servers."""
 
 import base64
 import http.client
@@ -46,7 +46,7 @@ def test_a_nim_gets_masked_pictures_and_its_glb_becomes_a_closed_candidate(evide
     assert request["multiimage_algo"] in ("stochastic", "multidiffusion")
     assert 10 <= request["ss_sampling_steps"] <= 50
     assert request["ss_cfg_scale"] <= 10
-    assert request["seed"] > 0  # 0 lets the server draw one, and nobody could repeat it
+    assert request["seed"] > 0  # with 0 the server draws a seed, and the result is not reproducible
     assert None not in request.values()
     picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(request["image"][0].partition(",")[2]))))
     assert picture.shape[2] == 4
@@ -56,7 +56,7 @@ def test_a_nim_gets_masked_pictures_and_its_glb_becomes_a_closed_candidate(evide
     assert is_watertight(asset.mesh.vertices, asset.mesh.faces)
     extents = oriented_extents(asset.mesh.vertices)
     assert extents / extents[0] == pytest.approx([1, 0.75, 0.5], rel=1e-4)
-    assert asset.mesh.texture.shape == (32, 32, 3)  # kept, not baked anew
+    assert asset.mesh.texture.shape == (32, 32, 3)  # kept, not baked again
 
 
 def test_every_candidate_is_another_sample_and_each_can_be_repeated(evidence):
@@ -108,7 +108,7 @@ def test_nobody_there_is_one_line_with_the_address(evidence):
 def test_what_a_server_does_wrong_is_said_in_one_line(evidence, answer, kind, message):
     with answering(lambda *request: answer) as (address, asked), pytest.raises(kind, match=message) as refusal:
         nim(address).make(evidence, "c0", 0)
-    assert len(asked) == 1  # none of these passes by itself
+    assert len(asked) == 1  # retrying would help with none of these
     assert "\n" not in str(refusal.value)
 
 
@@ -142,7 +142,7 @@ def test_a_server_that_hangs_is_asked_once(evidence):
     with answering(hang) as (address, asked), held() as released:
         with pytest.raises(BackendUnavailable, match="gave no answer in"):
             Remote(url=f"{address}/v1/infer", patience=impatient).make(evidence, "c0", 0)
-        until(lambda: asked)  # it may take a request on after nobody waits for it any more
+        until(lambda: asked)  # the server may accept a request after its client has given up
     assert len(asked) == 1
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with meshes that people and models give, what is done about it, and that it is said."""
+"""Repair of defects in uploaded and generated meshes, and the notes about it."""
 
 import json
 import struct
@@ -20,13 +20,13 @@ from tests.core.generate.stub import textured_box
 
 @pytest.fixture(autouse=True)
 def small_textures():
-    """A new texture of 1024 px takes over a second, and most of these facts are about shape."""
+    """Small textures: one of 1024 px takes over a second, and most tests are about shape."""
     with tuning({repair.Params: repair.Params(texture_px=256)}):
         yield
 
 
 def repaired(*geometries):
-    """The mended mesh, joined at its seams, in units of its longest side; and the notes."""
+    """The repaired mesh, joined at its seams, in units of its longest side; and the notes."""
     mesh, notes = mended(parts_of(geometries), "mesh")
     vertices, faces = join_vertices(mesh.vertices, mesh.faces)
     vertices = vertices / np.ptp(vertices, axis=0).max()

@@ -18,12 +18,12 @@ from r2c2r_core.generate.evidence import gather_evidence  # noqa: E402
 from r2c2r_core.geometry.meshes import box_mesh, is_watertight  # noqa: E402
 from r2c2r_core.tuning import tuning  # noqa: E402
 
-LOW, HIGH = np.array([-0.23, 0.0, 0.9]), np.array([0.23, 0.34, 1.18])  # the scene's microwave, in the world
+LOW, HIGH = np.array([-0.23, 0.0, 0.9]), np.array([0.23, 0.34, 1.18])  # the scene's microwave, in world coordinates
 SCALE, TURN, SHIFT = 0.6, Rotation.from_euler("xyz", [0.3, -0.8, 1.2]), np.array([0.1, -0.2, 1.3])
 
 
 class FakePipeline:
-    """Answers with the true microwave, in the frames of the real model; checks the frames of what it is given."""
+    """Stand-in pipeline that returns the true microwave in the real model's frames, and checks the frames of its input."""
 
     def __init__(self):
         self.asked = []
@@ -57,7 +57,7 @@ class FakePipeline:
         seen = np.isfinite(points[..., 2])
         assert (points[seen][:, 2] > 0).all()
         rows, columns = np.nonzero(seen)
-        # x to the left, y up, principal point in the middle: a pixel right of the middle has negative x
+        # x to the left, y up, principal point in the centre: a pixel right of the centre has negative x
         x = -points[seen][:, 0] / points[seen][:, 2]
         y = -points[seen][:, 1] / points[seen][:, 2]
         focal = np.polyfit(x, columns + 0.5 - image.shape[1] / 2, 1)
@@ -66,7 +66,7 @@ class FakePipeline:
         self.asked.append({"seed": seed, "pixels": image.shape, "known": int(seen.sum())})
         vertices, faces = box_mesh(LOW, HIGH)
         p3d = self.camera_from_world.apply(vertices) * [-1, -1, 1]
-        upright = (p3d - SHIFT) @ TURN.as_matrix().T / SCALE  # undoes: scale, then rows times the rotation, then shift
+        upright = (p3d - SHIFT) @ TURN.as_matrix().T / SCALE  # inverts: scale, then rows times the rotation, then shift
         glb = trimesh.Trimesh(upright @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]).T, faces, process=False)  # +Y up
         glb.visual.vertex_colors = [80, 80, 90, 255]
         return {
@@ -78,7 +78,7 @@ class FakePipeline:
 
 
 class Config(dict):
-    """As much of omegaconf's DictConfig as is used."""
+    """The used part of omegaconf's DictConfig."""
 
     def __setattr__(self, name, value):
         self[name] = value
@@ -109,7 +109,7 @@ def evidence(appliance_scene):
 
 
 def made(package, evidence, candidate="c0"):
-    """A candidate from a pool of one frame, so that the fake knows where its camera stands."""
+    """A candidate from a pool of one frame, so that the stand-in knows the camera's pose."""
     one = replace(evidence, pool=evidence.pool[:1])
     package.pipeline.camera_from_world = evidence.pool[0].world_from_camera.inverse
     return sam3d.Sam3dObjects(weights=package.weights).make(one, candidate, 0)

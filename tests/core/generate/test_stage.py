@@ -1,4 +1,4 @@
-"""The stage as the pipeline calls it."""
+"""The generation stage as the pipeline calls it."""
 
 import json
 from dataclasses import replace

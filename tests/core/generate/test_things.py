@@ -1,4 +1,4 @@
-"""One kind of solid that cannot be made does not take the others with it."""
+"""A kind of solid that cannot be made does not prevent the others."""
 
 import numpy as np
 import pytest

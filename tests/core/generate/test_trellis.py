@@ -20,7 +20,7 @@ WEIGHTS = Path("weights")
 
 
 class FakePipeline:
-    """Signatures of TrellisImageTo3DPipeline; refuses what the real one falls over."""
+    """Signatures of TrellisImageTo3DPipeline; rejects the inputs that crash the real one."""
 
     def __init__(self):
         self.calls = []
@@ -65,18 +65,18 @@ class FakePipeline:
         for image in images:
             alpha = np.asarray(image)[..., 3]
             assert image.mode == "RGBA"
-            assert not (alpha == 255).all()  # the real one would look for rembg
-            assert (alpha > 0.8 * 255).any()  # the real one would take min() of nothing
+            assert not (alpha == 255).all()  # the real one would call rembg
+            assert (alpha > 0.8 * 255).any()  # the real one would take min() of an empty array
         self.calls.append({"call": call, "count": len(images), "seed": seed, "mode": mode, **structure, "latent": latent})
         if mode == "stochastic":
-            assert structure["steps"] >= len(images)  # each step looks at one image
+            assert structure["steps"] >= len(images)  # each step uses one image
         return {name: [name] for name in formats}
 
 
 def to_glb(
     app_rep, mesh, simplify=0.95, fill_holes=True, fill_holes_max_size=0.04, texture_size=1024, debug=False, verbose=True
 ):
-    assert (app_rep, mesh) == ("gaussian", "mesh")  # baking looks at the gaussians
+    assert (app_rep, mesh) == ("gaussian", "mesh")  # baking needs the gaussians
     return textured_box()
 
 

@@ -1,4 +1,4 @@
-"""A cap that no mask holds, and a shadow that every mask holds."""
+"""A cap that the masks miss, and a shadow that the masks include."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from r2c2r_core.generate.symmetry import Revolution
 from r2c2r_core.generate.unmasked import with_unmasked_top, without_flared_foot
 from r2c2r_core.geometry.transforms import Rigid3
 
-BODY = Revolution(np.zeros(2), np.array([0.9, 1.09, 1.13, 1.15]), np.array([0.04, 0.04, 0.015, 0.015]))  # to the cap's foot
+BODY = Revolution(np.zeros(2), np.array([0.9, 1.09, 1.13, 1.15]), np.array([0.04, 0.04, 0.015, 0.015]))  # up to the cap's base
 
 
 def test_a_cap_is_found_where_depth_stands_before_the_wall(bottle_scene):

@@ -33,7 +33,7 @@ def proportions(vertices):
 
 
 def textured_box(tmp_path, name="box.glb", flip=False):
-    """A closed 300 x 200 x 100 (millimetres, somewhere) box with half of its texture red."""
+    """A closed 300 x 200 x 100 box (millimetres, at any place) with half of its texture red."""
     mesh = trimesh.creation.box((300.0, 200.0, 100.0))
     mesh.apply_translation((1000.0, 5.0, -7.0))
     picture = np.zeros((64, 64, 3), np.uint8)

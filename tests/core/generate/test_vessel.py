@@ -1,4 +1,4 @@
-"""A mug is hollow, and its handle stands where the outlines show it."""
+"""Hollow mugs, with the handle where the outlines show it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""serve_worker and the remote generator together, over real sockets."""
+"""serve_worker with the remote generator, over real sockets."""
 
 import http.client
 import threading
@@ -42,7 +42,7 @@ def test_a_candidate_made_far_away_is_the_one_made_here(evidence):
     assert there.watertight
     for name in ("mask_iou", "depth_residual_m", "seen_fraction"):
         assert there.metrics[name] == pytest.approx(here.metrics[name], rel=1e-4)
-    # it arrives turned, and the search for the smallest box of a round thing ends elsewhere
+    # it arrives rotated, and the minimum box of a round object has another yaw
     assert there.metrics["volume_ratio"] == pytest.approx(here.metrics["volume_ratio"], rel=0.02)
     assert {name: there.parameters[name] for name in here.parameters} == here.parameters
 

@@ -1,4 +1,4 @@
-"""Agreement among wrong correspondences: a known similarity is recovered, forward and inverse."""
+"""Robust similarity estimation: a known similarity is recovered among outliers, forward and inverse."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def box_surface(count: int, rng: np.random.Generator) -> np.ndarray:
 def correspondences(
     seed: int, count: int, wrong_share: float, *, flat: bool = False
 ) -> tuple[np.ndarray, np.ndarray, Similarity3]:
-    """Points of a box, their noisy images, most of them replaced by any points of the same space, and the truth."""
+    """Points of a box, their noisy images with most replaced by random points of the same space, and the truth."""
     rng = np.random.default_rng(seed)
     truth = random_similarity(rng)
     world = box_surface(count, rng) * ([1, 1, 1e-9] if flat else [1, 1, 1])
@@ -64,7 +64,7 @@ def test_more_correspondences_than_are_compared_all_count_in_the_fit() -> None:
     fit = similarity_consensus(source, target, threshold=3 * NOISE_M, rng=np.random.default_rng(0))
     assert_near(fit, truth)
     assert fit is not None
-    assert fit.inliers.sum() > 0.95 * 1500  # 97 % of a normal error lie within three standard deviations of each axis
+    assert fit.inliers.sum() > 0.95 * 1500  # 97 % of a normal error are within three standard deviations of each axis
 
 
 def test_the_larger_of_two_agreements_wins() -> None:
@@ -90,7 +90,7 @@ def test_a_tiny_scale_cannot_win_by_collapsing_onto_a_cluster() -> None:
     rng = np.random.default_rng(8)
     source = box_surface(300, rng)
     target = source * 2.0 + rng.normal(0, 0.004, source.shape)
-    target[:240] = rng.normal(0, 0.05, (240, 3))  # wrong matches pile up on one spot
+    target[:240] = rng.normal(0, 0.05, (240, 3))  # wrong matches concentrate at one spot
     fit = similarity_consensus(
         source, target, threshold=0.05, scale_range=(0.01, 10.0), relative_threshold=0.05, rng=np.random.default_rng(0)
     )

@@ -12,7 +12,7 @@ def test_only_clear_and_mutual_pairs_are_taken() -> None:
     first = unit([[1, 0, 0], [0, 1, 0], [0.8, 0.1, 0.6], [0, 0, 1]])
     second = unit([[0, 1, 0.02], [1, 0.02, 0], [0.1, 0, 1], [0, 0.1, 1]])
     rows, columns = mutual_pairs(first, second, 0.8)
-    # row 2 likes column 1, which likes row 0 better; row 3 has two equal favourites
+    # row 2 is nearest to column 1, which is nearer to row 0; row 3 has a tie
     assert rows.tolist() == [0, 1]
     assert columns.tolist() == [1, 0]
 

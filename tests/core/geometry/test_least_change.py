@@ -29,7 +29,7 @@ def test_no_feasible_point_is_nearer() -> None:
         y = least_change(equal, equal_to, rows, bound)
         assert (rows @ y >= bound - 1e-9).all()
         np.testing.assert_allclose(equal @ y, equal_to, atol=1e-9)
-        for _ in range(200):  # towards any other feasible point the distance grows
+        for _ in range(200):  # the distance to any other feasible point is larger
             other = inside + rng.normal(size=8) * 0.3
             other -= equal.T @ np.linalg.solve(equal @ equal.T, equal @ other - equal_to)
             if (rows @ other >= bound).all():

@@ -1,4 +1,4 @@
-"""Kernels, normal equations and robust linear fits, against their definitions."""
+"""Kernels, normal equations and robust linear fits, compared with their definitions."""
 
 import numpy as np
 import pytest

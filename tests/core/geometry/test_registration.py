@@ -1,4 +1,4 @@
-"""Similarity fits: perturb a known truth and recover it, forward and inverse."""
+"""Similarity fits recover a perturbed known truth, forward and inverse."""
 
 import numpy as np
 import pytest

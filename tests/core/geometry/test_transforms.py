@@ -1,4 +1,4 @@
-"""The laws of the transforms, over random, tiny and identity samples of both groups and their mixtures."""
+"""Group laws of the transforms, over random, tiny and identity samples of both groups and their mixtures."""
 
 from collections.abc import Callable
 from itertools import product
@@ -17,13 +17,13 @@ from r2c2r_core.geometry.transforms import (
 )
 
 Transform = Rigid3 | Similarity3
-ATOL = 1e-9  # of lengths up to about 30 after three products: rounding, with four digits to spare
+ATOL = 1e-9  # of lengths up to about 30 after three products: rounding, with four digits of margin
 NUMBERS = {"identity": 0.0, "tiny": 1e-9, "small": 1e-3, "random": 1.0}
 """How far samples are from the identity: rotation vector in rad, translation in metres, logarithm of the scale."""
 
 
 def turned(vector: np.ndarray) -> np.ndarray:
-    """Rotation by a rotation vector, rad."""
+    """Rotation matrix of a rotation vector, rad."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_rotvec(vector).as_matrix())
@@ -55,7 +55,7 @@ def product_of(a: Transform, b: Transform) -> Transform:
 
 
 def is_member(transform: Transform) -> bool:
-    """A proper rotation, and a positive scale."""
+    """Whether it has a proper rotation and a positive scale."""
     rotation = transform.rotation
     proper = np.allclose(rotation @ rotation.T, np.eye(3), atol=ATOL) and np.linalg.det(rotation) > 0
     return bool(proper) and getattr(transform, "scale", 1.0) > 0
@@ -170,7 +170,7 @@ def test_a_rigid_transform_survives_its_matrix_and_noise_in_it_is_taken_out(rng:
 
 def test_the_nearest_rotation_is_proper_keeps_rotations_and_is_nearer_than_any_other(rng: np.random.Generator) -> None:
     for _ in range(20):
-        matrix = rng.normal(size=(3, 3))  # half of them mirror
+        matrix = rng.normal(size=(3, 3))  # half of them contain a reflection
         found = nearest_rotation(matrix)
         assert is_member(Rigid3(found))
         np.testing.assert_allclose(nearest_rotation(found), found, atol=ATOL)
@@ -195,12 +195,12 @@ def test_the_smallest_rotation_between_directions_takes_one_onto_the_other(
         assert is_member(Rigid3(found))
         np.testing.assert_allclose(found @ source, target, atol=ATOL)
         angle = np.arccos(np.clip((np.trace(found) - 1) / 2, -1, 1))
-        assert angle == pytest.approx(opening_rad, abs=1e-7)  # no turn about the direction itself; arccos is flat at its ends
+        assert angle == pytest.approx(opening_rad, abs=1e-7)  # no roll about the direction; arccos is flat at its ends
 
 
 def test_a_front_faces_where_it_was_told_with_its_left_on_the_left() -> None:
     for yaw in np.linspace(0, 2 * np.pi, 9):
-        outward = np.array([np.cos(yaw), np.sin(yaw), 0.4])  # what it tilts is left out
+        outward = np.array([np.cos(yaw), np.sin(yaw), 0.4])  # the vertical component is ignored
         rotation = front_rotation(outward)
         assert is_member(Rigid3(rotation))
         np.testing.assert_allclose(rotation @ [0, -1, 0], [np.cos(yaw), np.sin(yaw), 0], atol=ATOL)
@@ -209,5 +209,5 @@ def test_a_front_faces_where_it_was_told_with_its_left_on_the_left() -> None:
 
 def test_camera_axes_of_the_two_conventions_change_into_each_other_and_back() -> None:
     np.testing.assert_array_equal(CAMERA_CV_FROM_GL @ CAMERA_CV_FROM_GL, np.eye(3))
-    np.testing.assert_array_equal(CAMERA_CV_FROM_GL @ [0, 0, -1], [0, 0, 1])  # both look ahead
+    np.testing.assert_array_equal(CAMERA_CV_FROM_GL @ [0, 0, -1], [0, 0, 1])  # both look along the viewing direction
     np.testing.assert_array_equal(CAMERA_CV_FROM_GL @ [0, 1, 0], [0, -1, 0])  # up is -y in OpenCV

@@ -55,7 +55,7 @@ def test_views_are_spread_over_angles_though_the_camera_lingered() -> None:
     azimuths = sorted(9 * (k - 50) if k >= 50 else 0 for k in frames)
     assert azimuths[0] < 10
     assert azimuths[-1] > 60
-    assert min(np.diff(azimuths)) >= 9  # one place is taken once
+    assert min(np.diff(azimuths)) >= 9  # one viewpoint is used once
 
 
 def test_the_first_is_the_best_of_all() -> None:

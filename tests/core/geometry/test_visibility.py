@@ -43,7 +43,7 @@ def test_what_lies_behind_or_outside_the_camera_is_not_seen() -> None:
 def test_an_image_is_seen_through_a_camera_of_another_size() -> None:
     image = np.arange(48 * 63).reshape(48, 63)
     camera = Intrinsics(fx=50.0, fy=55.0, cx=31.0, cy=23.5, width=63, height=48)
-    values, inside = sample_through(image, camera, camera.resized(21, 16))  # a third: its centres are centres there
+    values, inside = sample_through(image, camera, camera.resized(21, 16))  # a third: pixel centres coincide
     assert inside.all()
     np.testing.assert_array_equal(values, image[1::3, 1::3])
 

@@ -8,7 +8,7 @@ DATA = Path(__file__).resolve().parents[3] / "../shared/data"
 
 @pytest.fixture(scope="session")
 def real():
-    """The folder of a real recording; the test is skipped where it is absent."""
+    """Factory of the folder of a real recording; the test is skipped if it is missing."""
 
     @functools.cache
     def find(name: str) -> Path:

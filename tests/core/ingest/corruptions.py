@@ -1,4 +1,4 @@
-"""What goes wrong with recordings, done to good ones on purpose; used by the tests and by benchmarks/capture_doctor.py."""
+"""Typical defects of recordings, applied to good ones; used by the tests and by benchmarks/capture_doctor.py."""
 
 import json
 import shutil
@@ -15,13 +15,13 @@ from scipy.spatial.transform import Rotation
 from r2c2r_core.geometry.camera import Intrinsics, depth_points, project
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL
 
-Pose = np.ndarray  # 4x4, as the file has it: of the format's own camera axes
+Pose = np.ndarray  # 4x4, as stored in the file: in the format's own camera axes
 Depth = np.ndarray  # metres
 
 
 @dataclass(frozen=True, kw_only=True)
 class Corruption:
-    """One mistake; `causes` are the words by which the doctor may name it first, `refusal` a word of the reader's error."""
+    """One defect; `causes` are words with which the doctor may name it first, `refusal` a word of the reader's error."""
 
     name: str
     causes: tuple[str, ...] = ()
@@ -35,12 +35,12 @@ class Corruption:
 
     @property
     def only_r3d(self) -> bool:
-        """Whether it is about what only a .r3d has: LZFSE and confidence."""
+        """Whether it concerns features of a .r3d only: LZFSE and confidence."""
         return self.confidence is not None or self.truncate(0) or self.truncate(1)
 
 
 def corrupt_r3d(corruption: Corruption, source: Path, target: Path) -> Path:
-    """A .r3d with the mistake in it."""
+    """Write a .r3d with the defect."""
     with zipfile.ZipFile(source) as good, zipfile.ZipFile(target, "w") as bad:
         metadata = json.loads(good.read("metadata"))
         camera = _depth_camera(metadata)
@@ -65,7 +65,7 @@ def corrupt_r3d(corruption: Corruption, source: Path, target: Path) -> Path:
 
 
 def corrupt_seven_scenes(corruption: Corruption, source: Path, target: Path, *, every: int = 1) -> Path:
-    """A 7-Scenes-like folder with the mistake in it, of every n-th of its frames."""
+    """Write a folder like 7-Scenes with the defect, with every n-th of its frames."""
     k = np.loadtxt(source / "intrinsics_color.txt")
     for name in ("color", "depth", "pose"):
         (target / name).mkdir(parents=True)
@@ -87,7 +87,7 @@ def corrupt_seven_scenes(corruption: Corruption, source: Path, target: Path, *, 
 
 
 def shifted_depth(depth: Depth, camera: Intrinsics, right_m: float = 0.03) -> Depth:
-    """What a depth camera so far to the left of the colour camera sees, taken for the colour camera's: not registered."""
+    """Unregistered depth: the view of a depth camera that far left of the colour camera, stored as the colour camera's."""
     points = depth_points(depth, camera)[depth > 0] + (right_m, 0.0, 0.0)
     uv = project(points, camera)
     column, row = np.floor(uv).astype(int).T
@@ -95,7 +95,7 @@ def shifted_depth(depth: Depth, camera: Intrinsics, right_m: float = 0.03) -> De
     seen = np.full(depth.shape, np.inf, np.float32)
     np.minimum.at(seen, (row[inside], column[inside]), points[inside, 2].astype(np.float32))
     seen[np.isinf(seen)] = 0
-    holes = cv2.medianBlur(seen, 3)  # cracks one pixel wide where a surface is seen larger than before
+    holes = cv2.medianBlur(seen, 3)  # cracks one pixel wide where a surface is magnified
     return np.where(seen > 0, seen, holes)
 
 
@@ -104,14 +104,14 @@ def _nan(number: int, pose: Pose) -> Pose:
 
 
 def _reordered(number: int, pose: Pose) -> Pose:
-    """Quaternions written w first, where the format has it last."""
+    """Quaternions with w first, where the format has it last."""
     changed = pose.copy()
     changed[:3, :3] = Rotation.from_quat(Rotation.from_matrix(pose[:3, :3]).as_quat()[[3, 0, 1, 2]]).as_matrix()
     return changed
 
 
 def _drifting(number: int, pose: Pose) -> Pose:
-    """Poses that wander by 3 mm a frame."""
+    """Poses that drift by 3 mm per frame."""
     changed = pose.copy()
     changed[:3, 3] += 0.003 * number * np.array([0.6, 0.0, 0.8])
     return changed

@@ -1,4 +1,4 @@
-"""Cleaning the fused surface."""
+"""Clean-up of the fused surface."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ def patch() -> tuple[np.ndarray, np.ndarray]:
 
 
 def spiked() -> tuple[Surface, int]:
-    """The patch with a spike of two far vertices on it, and how many faces the patch has."""
+    """The patch with a spike of two far vertices on it, and the number of the patch's faces."""
     flat, faces = patch()
     vertices = np.concatenate([flat, [[0.0, 0.0, 0.6], [0.0, 0.1, 0.9]]])
     return Surface(vertices, np.concatenate([faces, [[0, len(flat), len(flat) + 1]]]), np.zeros_like(vertices)), len(faces)
@@ -25,7 +25,7 @@ def test_statistical_outliers_leave_the_surface_they_hang_on():
     cleaned = drop_outliers(surface, 20)
     assert cleaned.vertices[:, 2].max() == 0.0
     assert len(cleaned.faces) >= 0.97 * flat_faces
-    assert drop_crumbs(surface, 0.01).vertices[:, 2].max() == 0.9  # connected, so no crumb
+    assert drop_crumbs(surface, 0.01).vertices[:, 2].max() == 0.9  # connected, so not a crumb
 
 
 def test_a_floating_crumb_goes():

@@ -1,4 +1,4 @@
-"""Damaged and hostile recordings of every format end in CaptureError or lose frames; nothing else ever comes out."""
+"""Damaged and malicious recordings of every format raise CaptureError or lose frames, and cause no other error."""
 
 import struct
 from collections.abc import Callable
@@ -52,7 +52,7 @@ def test_a_damaged_file_of_any_sort_costs_frames_or_is_explained(kind, tmp_path)
 
 
 def what_is_said(folder: Path) -> str | None:
-    """The error's line, with its hint; None when the recording can be read, with or without all its frames."""
+    """The error's line with its hint; None if the recording can be read, with or without all its frames."""
     try:
         read_all(folder)
     except CaptureError as problem:

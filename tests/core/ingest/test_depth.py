@@ -1,4 +1,4 @@
-"""What the depth cleaning keeps and drops, on exact scenes with a mixed edge."""
+"""Depth cleaning on exact scenes with a mixed edge: kept and dropped pixels."""
 
 import cv2
 import numpy as np
@@ -11,7 +11,7 @@ CAMERA = Intrinsics(fx=193.0, fy=193.0, cx=96.0, cy=128.0, width=192, height=256
 
 
 def mixed(fine: np.ndarray, noise: float = 0.004) -> np.ndarray:
-    """The sensor's view of a scene drawn at four times its resolution: pixels on edges are means of both sides."""
+    """The sensor's view of a scene drawn at four times its resolution: edge pixels are means of both sides."""
     coarse = cv2.resize(fine, (192, 256), interpolation=cv2.INTER_AREA)
     rng = np.random.default_rng(0)
     return (coarse * (1 + noise * rng.standard_normal(coarse.shape))).astype(np.float32)

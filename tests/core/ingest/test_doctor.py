@@ -1,4 +1,4 @@
-"""The doctor calls a good recording good, and names what is wrong with a bad one."""
+"""The capture doctor accepts good recordings and names the defect of bad ones."""
 
 import functools
 import json
@@ -21,7 +21,7 @@ from r2c2r_core.model.capture import Capture, Depth, Frame
 from .corruptions import CORRUPTIONS, Corruption, corrupt_r3d
 from .tiny import TinyRoom, write_r3d
 
-# Large enough for edges in depth to be laid over edges in colour
+# Large enough to align edges in depth with edges in colour
 ROOM = TinyRoom(count=24, rgb_size=(240, 320), depth_size=(120, 160), focal=230.0)
 CONFIG = IngestConfig(finest_voxel_m=0.03, coarsest_voxel_m=0.03)
 
@@ -47,13 +47,13 @@ def named(name: str) -> Corruption:
 
 @pytest.fixture(scope="module")
 def report(capture, scan) -> CaptureReport:
-    """Of the good recording."""
+    """Report of the good recording."""
     return examine(capture, open_recording(scan))
 
 
 @pytest.fixture(scope="module")
 def corrupted(scan, tmp_path_factory) -> Callable[[str], CaptureReport]:
-    """The report of the recording with a corruption, each read once."""
+    """Report of the recording with a defect; each is read once."""
 
     @functools.cache
     def report_of(name: str) -> CaptureReport:
@@ -73,7 +73,7 @@ def posed(frame: Frame, pose: Rigid3) -> Frame:
 
 
 class Darker:
-    """Every other six frames at a quarter of their light."""
+    """Images with a quarter of the light in alternate groups of six frames."""
 
     def __init__(self, images) -> None:
         self.images = images
@@ -93,7 +93,7 @@ def test_a_good_recording_is_good(report):
     assert report.scale is None
     figures = report.figures
     assert figures.frames == 24
-    assert figures.pair_error_mm < 8  # a pixel of the depth image is 1.5 cm wide, and the neighbour is looked up nearest
+    assert figures.pair_error_mm < 8  # a depth pixel is 1.5 cm wide, and the nearest one of the neighbour is used
     assert figures.drift_mm < 8
     assert figures.depth_coverage > 0.9
     assert figures.confidence_shares == (0.0, 0.0, 1.0)
@@ -152,7 +152,7 @@ def test_a_wrong_scale_and_focal_length_are_measured(corrupted):
     assert report.verdict == "unusable"
     depth = report.scale
     assert depth.factor == pytest.approx(1 / 0.9, rel=0.02)
-    assert depth.text == "the depth is 10 % too small"  # and not perhaps something else
+    assert depth.text == "the depth is 10 % too small"  # without a suggested alternative
     assert corrupted("focal length x1.1").scale.factor == pytest.approx(1 / 1.1, rel=0.03)
 
 
@@ -164,7 +164,7 @@ def test_images_turned_against_their_poses_and_shifted_frames_are_told(capture):
 
 
 def test_images_under_the_pose_of_the_next_frame_are_told(folder):
-    quick = TinyRoom(count=9)  # in so few frames each step is large
+    quick = TinyRoom(count=9)  # with so few frames each step is large
     capture = read_capture(write_r3d(folder / "quick.r3d", quick), folder / "quick", CONFIG)
     poses = [f.world_from_camera for f in capture.frames]
     report = examine(with_frames(capture, lambda k, f: posed(f, poses[min(k + 1, 8)])))
@@ -178,7 +178,7 @@ def test_colour_elsewhere_than_its_calibration_says_is_told(capture):
     assert report.remarks[0].cause == "colour_focal_length"
     assert report.registration.focal_factor == pytest.approx(1 / 1.1, rel=0.05)  # a depth pixel is 4 px of 640
     verdicts = {}
-    for off_px in (3.0, 9.0):  # a depth pixel of a phone, and more than masks bear
+    for off_px in (3.0, 9.0):  # a depth pixel of a phone, and more than masks tolerate
         found = judge(report.figures, None, None, replace(report.registration, off_px=off_px, limit_px=2.5))
         verdicts[off_px] = next(remark.verdict for remark in found if remark.cause == "colour_focal_length")
     assert verdicts == {3.0: "usable with care", 9.0: "unusable"}
@@ -199,8 +199,8 @@ def test_depth_a_few_pixels_beside_its_colour_is_used_with_care(report):
     ("numbers", "missing"),
     [
         (range(0, 120, 5), 0.0),  # every fifth frame was exported
-        ([n for n in range(0, 120, 5) if n % 15 != 5], 1 / 3),  # a third of those is gone: steps of 5 and of 10
-        ([1_000_003 * n + n * n for n in range(24)], 0.0),  # times, not numbers
+        ([n for n in range(0, 120, 5) if n % 15 != 5], 1 / 3),  # a third of those is missing: steps of 5 and of 10
+        ([1_000_003 * n + n * n for n in range(24)], 0.0),  # timestamps instead of numbers
     ],
 )
 def test_only_gaps_in_regular_numbers_are_dropped_frames(capture, numbers, missing):

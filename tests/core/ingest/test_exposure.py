@@ -1,4 +1,4 @@
-"""Pictures of one surface under changing exposure are brought to one; what is filmed evenly is left alone."""
+"""Exposure compensation: pictures of one surface are brought to a common exposure; constant exposure is unchanged."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ ROOM = TinyRoom(count=16, rgb_size=(240, 320), depth_size=(120, 160), focal=230.
 
 
 class Exposed:
-    """Images of a capture, each times its own gain."""
+    """Images of a capture, each with its own gain."""
 
     def __init__(self, capture: Capture, gains: np.ndarray) -> None:
         self._images = capture.images
@@ -56,7 +56,7 @@ def test_changing_exposure_and_white_balance_are_taken_out(capture):
     assert np.abs(left - np.median(left, axis=0)).max() < 0.06  # of exposures that differ by a factor of 1.9
     points = capture.surface.vertices_world[
         :: max(1, len(capture.surface.vertices_world) // 500)
-    ]  # others than it was found on
+    ]  # not those it was estimated on
     looks = see(found, images, points, capture.depth_noise)
     assert spread(looks, np.log(gains)) < 0.5 * spread(looks, np.zeros_like(gains))
 
@@ -67,7 +67,7 @@ def test_highlights_and_what_moved_do_not_pull_a_frames_gain():
     colour = rng.uniform(3.5, 5.0, (300, 3))
     point, frame = (part.ravel() for part in np.meshgrid(np.arange(300), np.arange(12)))
     log_rgb = colour[point] - true[frame] + rng.normal(0, 0.02, (len(point), 3))
-    odd = rng.random(len(point)) < 0.25 * (frame < 4)  # a quarter of what a third of the frames show
+    odd = rng.random(len(point)) < 0.25 * (frame < 4)  # a quarter of the points in a third of the frames
     log_rgb[odd] += 0.5
     found = solve_gains(Looks(point, frame, log_rgb), 12)
     error = found - true

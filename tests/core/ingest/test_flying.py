@@ -1,4 +1,4 @@
-"""Several frames agree on what hangs in the air, on an exact room; what stands there stays."""
+"""Multi-frame filter of flying pixels, on an exact room; real surfaces are kept."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from r2c2r_core.model.capture import Frame
 from .tiny import TinyRoom
 
 ROOM = TinyRoom(count=12, depth_size=(96, 128), rgb_size=(96, 128))
-HALO = (slice(40, 80), slice(47, 50))  # pixels that hang a hand's breadth before the surface in one frame only
+HALO = (slice(40, 80), slice(47, 50))  # pixels that float a hand's breadth before the surface in one frame only
 
 
 @pytest.fixture

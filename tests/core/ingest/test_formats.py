@@ -1,4 +1,4 @@
-"""What is particular to the format of each data set, and its traps."""
+"""Peculiarities of each data set's format."""
 
 import json
 import zipfile
@@ -176,7 +176,7 @@ def test_nerfstudios_distortion_is_taken_out(tmp_path):
     matrix, coefficients = integer_centred(room.camera), np.array([*lens.values(), 0.0])
     pixels = np.indices((256, 192), np.float64)[::-1].reshape(2, -1).T
     ideal = cv2.undistortPoints(pixels[:, None], matrix, coefficients, P=matrix).reshape(256, 192, 2).astype(np.float32)
-    for path in (folder / "images").iterdir():  # where a distorted pixel comes from in the ideal image
+    for path in (folder / "images").iterdir():  # source position of each ideal pixel in the distorted image
         clean = room.image(room.poses()[int(path.stem[-2:])], room.camera)
         cv2.imwrite(str(path), cv2.remap(clean, ideal[..., 0], ideal[..., 1], cv2.INTER_LINEAR))
     recording = open_recording(folder)
@@ -250,7 +250,7 @@ def test_tums_sequence_is_known_by_the_comments_that_head_its_lists(tmp_path):
     lists = (renamed / "rgb.txt").read_text()
     assert open_recording(renamed).frames[0].rgb_camera.fx == 517.3
     (renamed / "rgb.txt").write_text(f"# file: 'rgbd_dataset_freiburg2_desk.bag'\n{lists}")
-    assert open_recording(renamed).frames[0].rgb_camera.fx == 520.9  # what the recording says, before its folder's name
+    assert open_recording(renamed).frames[0].rgb_camera.fx == 520.9  # the recording's own content precedes its folder's name
 
 
 def _associated(folder, line):
@@ -316,7 +316,7 @@ def test_rtabmaps_poses_of_another_format_are_named_with_what_was_expected(tmp_p
     assert "format 11" in caught.value.hint
 
 
-# All of them
+# All formats
 
 
 def test_a_zip_that_windows_packed_is_read_like_the_folder(tmp_path):
@@ -408,7 +408,7 @@ def test_a_calibration_one_folder_up_is_taken_and_told(write, name, top, tmp_pat
     folder = write(tmp_path / "scene" / "made", SMALL)
     (folder / name).rename(tmp_path / "scene" / name)
     source = folder / top
-    if top:  # of 3DMatch, the sequence alone: its scene's calibration is then one folder up
+    if top:  # of 3DMatch only the sequence: its scene's calibration is then one folder up
         source = (folder / top).rename(tmp_path / "scene" / top)
     recording = open_recording(source)
     assert recording.frames[0].rgb_camera == ROOM.camera
@@ -472,7 +472,7 @@ def test_a_zip_packed_by_a_method_that_is_not_read_says_how_to_pack_it(tmp_path)
     with zipfile.ZipFile(zipped) as archive:
         last = archive.infolist()[-1]
     entry = content.rindex(b"PK\x01\x02")
-    for at in (entry + 10, last.header_offset + 8):  # the method, in the table of contents and before the member
+    for at in (entry + 10, last.header_offset + 8):  # the compression method, in the table of contents and in the local header
         content[at] = 9
     zipped.write_bytes(content)
     with pytest.raises(CaptureError, match="Deflate64") as caught:

@@ -1,4 +1,4 @@
-"""Levelling: exact on an exact room, whichever way the recording's own world is turned."""
+"""Levelling, exact on an exact room for any orientation of the recording's world."""
 
 import numpy as np
 import pytest
@@ -81,13 +81,13 @@ def test_a_files_gravity_gives_way_to_many_planes_that_agree(off):
     result, _, error_deg = levelled((90, 0, 0), file_up=off)
     assert error_deg < 0.1
     assert result.room.up_corrected
-    assert result.room.up_file_off_deg == pytest.approx(off, rel=0.06)  # `levelled` turns about no unit axis
+    assert result.room.up_file_off_deg == pytest.approx(off, rel=0.06)  # the rotation of `levelled` is not about a unit axis
     assert any("corrected by" in notice for notice in result.notices)
 
 
 def test_a_files_gravity_is_kept_against_one_plane_and_that_is_known():
     rng = np.random.default_rng(0)
-    points = np.column_stack([rng.random((4000, 2)) * 2, rng.normal(0, 0.003, 4000)])  # a ramp, for all one knows
+    points = np.column_stack([rng.random((4000, 2)) * 2, rng.normal(0, 0.003, 4000)])  # could be a ramp
     ramp = SurfaceSample(points=points, normals=np.tile([0.0, 0.0, 1.0], (4000, 1)), area_each_m2=1e-3)
     up = Rotation.from_euler("x", 5, degrees=True).apply([0.0, 0.0, 1.0])
     result = level_room(ramp, cameras(), up, None, np.random.default_rng(0))
@@ -106,13 +106,13 @@ def test_of_two_readings_of_a_files_gravity_the_planes_choose(first):
 
 
 def turned(poses: list[Rigid3], quarters: int) -> list[Rigid3]:
-    """The cameras of the same pictures, stored turned."""
+    """The cameras of the same pictures, stored rotated."""
     turn = np.rint(rotation_about_z(quarters * np.pi / 2))
     return [Rigid3(pose.rotation @ turn, pose.translation) for pose in poses]
 
 
 def walk() -> list[Rigid3]:
-    """The cameras, carried sideways and back by a meter."""
+    """The cameras, carried sideways and back by a metre."""
     return [Rigid3(c.rotation, c.translation + np.array([0.1 * k, 0.0, 0.01 * k])) for k, c in enumerate(cameras())]
 
 
@@ -121,13 +121,13 @@ def test_images_stored_sideways_without_gravity_do_not_turn_the_room(quarters):
     result = level_room(kitchen(), turned(walk(), quarters), None, None, np.random.default_rng(0))
     assert (result.world_from_capture.rotation @ [0.0, 0.0, 1.0])[2] > 0.9999
     assert any(("lie on their side" in n) == (quarters in (1, 3)) for n in result.notices)
-    assert (result.room.up_rival_capture is not None) == (quarters in (1, 3))  # it is said to be in doubt
+    assert (result.room.up_rival_capture is not None) == (quarters in (1, 3))  # reported as doubtful
 
 
 def test_up_is_in_doubt_where_the_camera_hardly_moved():
-    still = cameras()[2:3]  # straight at a wall
+    still = cameras()[2:3]  # facing a wall
     room = level_room(kitchen(), still, None, None, np.random.default_rng(0)).room
-    assert abs(room.up_rival_capture[2]) < 0.01  # it could as well lie
+    assert abs(room.up_rival_capture[2]) < 0.01  # portrait and landscape are equally possible
     assert level_room(kitchen(), still, np.array([0.0, 0.0, 1.0]), None, np.random.default_rng(0)).room.up_rival_capture is None
 
 
@@ -175,7 +175,7 @@ def test_what_a_person_says_names_them_and_keeps_the_surfaces_verdict():
     overrides = Overrides(objects={}, up_capture=up, floor_m=0.25, manhattan_yaw_rad=0.4, walls=walls)
     room = levelled((90, 0, 0), file_up=0.0, overrides=overrides)[0].room
     assert (room.up_source, room.floor_source, room.yaw_source, room.walls_source) == ("person",) * 4
-    assert room.up_spread_deg == pytest.approx(np.degrees(0.02), abs=0.5)  # the planes disagree, and that shows
+    assert room.up_spread_deg == pytest.approx(np.degrees(0.02), abs=0.5)  # the planes disagree, which the spread shows
     assert np.allclose(room.walls[0].normal, [0, -1, 0])
     assert room.walls[0].offset_m == pytest.approx(-2.5)
 
@@ -185,7 +185,7 @@ def test_a_clean_room_is_sure_of_itself():
     assert (room.floor_source, room.yaw_source, room.walls_source) == ("surface",) * 3
     assert room.up_spread_deg < 0.2
     assert room.yaw_spread_deg < 0.2
-    assert room.floor_spread_m == pytest.approx(0.004, abs=0.001)  # the noise it was made with
+    assert room.floor_spread_m == pytest.approx(0.004, abs=0.001)  # the noise level of the simulation
     assert all(w.spread_m == pytest.approx(0.004, abs=0.001) for w in room.walls)
 
 

@@ -1,4 +1,4 @@
-"""Recordings made to harm: what a file may make the reader open, wait for, or count."""
+"""Malicious recordings: limits on what a file can make the reader open, wait for, or count."""
 
 import contextlib
 import io
@@ -190,7 +190,7 @@ def test_a_bad_depth_array_is_explained(content: bytes, tmp_path: Path) -> None:
     folder = write_nerfstudio(tmp_path / "scan", ROOM, npy=True)
     arrays = sorted((folder / "depths").glob("*.npy"))
     arrays[0].write_bytes(content)
-    recording = open_recording(folder)  # the others are read
+    recording = open_recording(folder)  # the other frames are read
     with pytest.raises(UnreadableFrame, match="not a readable depth array"):
         recording.depth_of(recording.frames[0])
     for path in arrays:
@@ -204,7 +204,7 @@ def test_a_zip_whose_member_names_itself_in_no_encoding_is_one_line(tmp_path: Pa
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("metadata", b"{}")
     raw = bytearray(path.read_bytes())
-    raw[6:8] = (0x800).to_bytes(2, "little")  # of the member's own header: its name is UTF-8
+    raw[6:8] = (0x800).to_bytes(2, "little")  # of the local header: its name is UTF-8
     raw[30] = 0xFF
     path.write_bytes(raw)
     with pytest.raises(CaptureError, match="metadata"):

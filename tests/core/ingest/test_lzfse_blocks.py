@@ -1,4 +1,4 @@
-"""The unpacked size is known before unpacking."""
+"""Unpacked size, known before unpacking."""
 
 import lzfse
 import numpy as np

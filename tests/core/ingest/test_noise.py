@@ -8,12 +8,12 @@ from r2c2r_core.ingest.noise import estimate_depth_noise
 from r2c2r_core.model.capture import Depth, Frame
 
 CAMERA = Intrinsics(fx=100.0, fy=100.0, cx=64.0, cy=48.0, width=128, height=96)
-RAMP = np.array([[-4.0, -3.0, 1.0], [4.0, -3.0, 1.0], [4.0, 3.0, 4.0], [-4.0, 3.0, 4.0]])  # nearer at the top of the image
+RAMP = np.array([[-4.0, -3.0, 1.0], [4.0, -3.0, 1.0], [4.0, 3.0, 4.0], [-4.0, 3.0, 4.0]])  # closer at the top of the image
 FACES = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 2], [0, 2, 3]])
 
 
 class _Noisy:
-    """The ramp's depth with a known error, in every frame another draw of it."""
+    """The ramp's depth with noise of known sigma, independent in every frame."""
 
     def __init__(self, noise: DepthNoise, wrong_share: float = 0.0) -> None:
         self.noise, self.wrong_share = noise, wrong_share

@@ -1,4 +1,4 @@
-"""Poses from images and depth alone, on an exact textured room; what cannot be tracked is cut or refused."""
+"""RGB-D odometry on an exact textured room; untrackable frames are cut, or the recording is refused."""
 
 from dataclasses import dataclass, field
 
@@ -20,7 +20,7 @@ ROOM = TinyRoom(count=14, rgb_size=(192, 256), depth_size=(96, 128), focal=184.0
 
 
 def textured(room: TinyRoom, pose: Rigid3) -> np.ndarray:
-    """A picture of spots a few centimetres wide that stick to the surfaces."""
+    """A picture of spots a few centimetres wide that are fixed to the surfaces."""
     _, points = room._cast(pose, room.camera)
     waves = np.random.default_rng(5).normal(0, 40, (12, 3))
     value = sum(np.sin(points @ wave + 7 * k) for k, wave in enumerate(waves))
@@ -103,7 +103,7 @@ def test_a_recording_without_poses_becomes_a_levelled_capture(tmp_path, monkeypa
     monkeypatch.setattr(stage, "open_recording", without_poses)
     capture = read_capture(folder, tmp_path / "store", IngestConfig(finest_voxel_m=0.03, coarsest_voxel_m=0.03))
     assert capture.poses.source == "odometry"
-    assert capture.room.up_source == "floor"  # the file's gravity belongs to a world that is not there
+    assert capture.room.up_source == "floor"  # the file's gravity refers to a missing world frame
     expected = room.poses()[3].rotation[2]
     assert np.degrees(np.arccos(capture.frames[3].world_from_camera.rotation[2] @ expected)) < 0.7
     assert capture.frames[3].world_from_camera.translation[2] == pytest.approx(room.poses()[3].translation[2], abs=0.02)

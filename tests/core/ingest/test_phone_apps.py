@@ -1,4 +1,4 @@
-"""What is particular to what phone apps export, and its traps: Stray Scanner, its film, Polycam, 3D Scanner App."""
+"""Peculiarities of exports from phone apps: Stray Scanner, its video, Polycam, 3D Scanner App."""
 
 import json
 import shutil
@@ -95,7 +95,7 @@ def test_the_real_odometry_and_matrix_of_a_phone_are_read(real, tmp_path):
     assert [f.index for f in recording.frames] == list(range(7))
     frame = recording.frames[6]
     assert frame.timestamp_s == pytest.approx(0.166692834)
-    # held upright: the quaternion's camera has up along its -x, so three quarter turns, and x and y change places
+    # held upright: the quaternion's camera has up along its -x, so three quarter turns, and x and y are swapped
     assert (frame.rgb_camera.fx, frame.rgb_camera.width, frame.rgb_camera.height) == (1597.4362, 1440, 1920)
     metres = recording.depth_of(frame).metres
     assert metres.shape == (256, 192)
@@ -202,7 +202,7 @@ def test_scanner_apps_frames_without_a_photo_are_left_out_and_told(tmp_path):
     recording = open_recording(write_scanner_app(tmp_path / "s", SMALL, without_photo=(0, 2)))
     assert [f.index for f in recording.frames] == [1, 3]
     assert told(recording, "2 of 4 frames were left out: 2 a colour image missing")
-    assert [f.timestamp_s for f in recording.frames] == pytest.approx([0.25, 0.75])  # since the first frame, photo or not
+    assert [f.timestamp_s for f in recording.frames] == pytest.approx([0.25, 0.75])  # relative to the first frame, photo or not
     assert [set(recording.depth_of(f).confidence.ravel().tolist()) for f in recording.frames] == [{1}, {0}]
 
 

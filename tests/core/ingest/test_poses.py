@@ -1,4 +1,4 @@
-"""Drift is found and taken out on an exact room; poses that are right, or wrong in another way, stay as they are."""
+"""Pose drift is detected and removed on an exact room; correct poses, and other pose errors, are unchanged."""
 
 from dataclasses import dataclass, replace
 
@@ -41,7 +41,7 @@ def walk() -> tuple[list[Frame], Views]:
 
 
 def drifted(frames: list[Frame], metres: float, degrees: float) -> list[Frame]:
-    """Growing along the walk to the given size."""
+    """Poses with an error that grows along the walk to the given size."""
     moved = []
     for share, frame in zip(np.linspace(0, 1, len(frames)), frames, strict=True):
         turn = Rotation.from_rotvec(np.radians(degrees) * share * np.array([0.6, 0.0, 0.8])).as_matrix()
@@ -52,7 +52,7 @@ def drifted(frames: list[Frame], metres: float, degrees: float) -> list[Frame]:
 
 
 def error_m(frames, truth: list[Rigid3]) -> float:
-    """Rms displacement of a point 2 m ahead of each camera, up to one rigid motion of the whole."""
+    """RMS displacement of a point 2 m ahead of each camera, up to one rigid motion of the whole."""
     from r2c2r_core.geometry.registration import umeyama
 
     ahead = np.array([[0.0, 0.0, 2.0], [0.5, 0.0, 1.0], [0.0, 0.5, 1.0]])

@@ -1,4 +1,4 @@
-"""Every format is read to the same room: poses, cameras, depth and colour, in our conventions."""
+"""Every format gives the same room: poses, cameras, depth and colour, in our conventions."""
 
 from dataclasses import astuple, replace
 
@@ -100,7 +100,7 @@ def test_every_format_gives_each_frame_its_own_upright_picture(kind, tmp_path):
         colour = colour_pixels(recording.colour_of(frame), frame.rgb_name)
         off = [np.abs(colour - picture).mean() for picture in pictures]
         assert int(np.argmin(off)) == frame.index // stride
-        assert min(off) < 6.0  # grey levels: the loss of a JPEG, or of a video with halved colour resolution
+        assert min(off) < 6.0  # grey levels: the loss of JPEG, or of video with halved colour resolution
 
 
 def depth_size(kind: str) -> tuple[int, int]:
@@ -109,7 +109,7 @@ def depth_size(kind: str) -> tuple[int, int]:
 
 
 def world_of(recording: Recording) -> np.ndarray:
-    """Our world (+Z up) from the recording's: known up to the first pose, which the test takes for granted."""
+    """Our world (+Z up) from the recording's: the first pose is assumed to be right."""
     first = ROOM.poses()[0].matrix
     return first @ np.linalg.inv(recording.frames[0].capture_from_camera.matrix)
 
@@ -162,7 +162,7 @@ def test_init_pose_turns_gravity_into_the_recordings_own_world(tmp_path):
     turn = Rotation.from_euler("x", 40, degrees=True)
     recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, initPose=[*turn.as_quat(), 0, 0, 0]))
     assert np.allclose(turn.apply(recording.up_capture), [0, 1, 0])
-    assert np.allclose(recording.other_ups, [[0, 1, 0], turn.apply([0, 1, 0])])  # its other readings in the wild
+    assert np.allclose(recording.other_ups, [[0, 1, 0], turn.apply([0, 1, 0])])  # other possible conventions
 
 
 def test_images_are_not_turned_while_initpose_can_be_read_in_two_ways(tmp_path):

@@ -1,4 +1,4 @@
-"""The pass marks of real recordings: held-out frames, furniture heights, a measured cabinet, a door's depth."""
+"""Acceptance figures of real recordings: held-out frames, furniture heights, a measured cabinet, a door's depth."""
 
 import shutil
 

@@ -1,4 +1,4 @@
-"""Depth that does not lie on its colour is moved there on request, and nothing else is."""
+"""Registration of depth to colour on request; nothing else changes."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from r2c2r_core.ingest.stage import IngestConfig, read_capture
 from .corruptions import Corruption, corrupt_r3d, shifted_depth
 from .tiny import TinyRoom, write_r3d
 
-# Large enough for edges in depth to be laid over edges in colour
+# Large enough to align edges in depth with edges in colour
 ROOM = TinyRoom(count=12, rgb_size=(240, 320), depth_size=(240, 320), focal=230.0)
 CONFIG = IngestConfig(finest_voxel_m=0.03, coarsest_voxel_m=0.03)
 ASKED = replace(CONFIG, register_depth=True)
@@ -26,7 +26,7 @@ def scan(tmp_path_factory):
 
 
 def errors_m(capture) -> np.ndarray:
-    """Stored depth less what the colour camera would measure, where something is stored."""
+    """Stored depth minus what the colour camera would measure, where depth is stored."""
     errors = []
     for frame, pose in zip(capture.frames, ROOM.poses(), strict=True):
         depth = capture.images.depth(frame.index).metres
@@ -43,7 +43,7 @@ def test_depth_beside_colour_is_moved_there_by_the_fit_when_asked(scan, tmp_path
     assert "unregistered" in {r.cause for r in told.remarks}
     assert any("--register-depth" in reason for reason in told.reasons)
     assert not {"unregistered", "colour_focal_length"} & {r.cause for r in examine(after).remarks}
-    off = [np.mean(np.abs(errors_m(capture)) > 0.1) for capture in (before, after)]  # pixels of another surface
+    off = [np.mean(np.abs(errors_m(capture)) > 0.1) for capture in (before, after)]  # fraction of pixels on another surface
     assert off[1] < 0.35 * off[0]
     assert after.notices[0].startswith("depth was registered to the colour images")
     assert not any("registered" in notice for notice in before.notices)
@@ -73,7 +73,7 @@ def test_redrawn_depth_is_what_the_other_camera_measures():
 
     drawn = redrawn(plane(source, np.zeros(3)), source, target, at)
     inner = (slice(12, -12), slice(12, -12))
-    assert (drawn[inner] > 0).all()  # no gaps, though each pixel is larger than it was
+    assert (drawn[inner] > 0).all()  # no gaps, though each pixel is magnified
     assert np.abs(drawn - plane(target, at))[inner].max() < 0.004  # half a pixel of the slope
 
 
@@ -82,6 +82,6 @@ def test_of_two_surfaces_the_nearer_hides_the_other():
     depth = np.full((40, 100), 2.0, np.float32)
     depth[:, 40:60] = 1.0
     drawn = redrawn(depth, camera, camera, np.array([0.1, 0.0, 0.0]))
-    assert (drawn[:, 30:50] == 1.0).all()  # moved by 10 px, what lies behind it by 5
+    assert (drawn[:, 30:50] == 1.0).all()  # shifted by 10 px, the surface behind it by 5
     assert set(np.unique(drawn[:, :30])) == {2.0}
-    assert (drawn[:, 50:55] == 0).all()  # behind the near one nothing was seen
+    assert (drawn[:, 50:55] == 0).all()  # the area behind the near surface was not seen

@@ -1,4 +1,4 @@
-"""A recording becomes a capture on disk; what cannot be read ends in one clear line."""
+"""A recording becomes a capture on disk; unreadable ones raise a clear one-line error."""
 
 import errno
 import json
@@ -30,7 +30,7 @@ def read(source: Path, tmp_path: Path, **kwargs):
 
 
 def rewritten(source: Path, target: Path, change) -> Path:
-    """The zip with its members passed through `change(name, content)`; None drops one."""
+    """Write the zip with its members passed through `change(name, content)`; None drops one."""
     with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
         for name in old.namelist():
             content = change(name, old.read(name))
@@ -46,13 +46,13 @@ def written(tmp_path_factory):
 
 @pytest.fixture
 def scan(written, tmp_path):
-    """The test's own copy."""
+    """A copy of the scan for one test."""
     return Path(shutil.copyfile(written, tmp_path / "scan.r3d"))
 
 
 @pytest.fixture(scope="module")
 def once(written, tmp_path_factory):
-    """The capture of the scan, read once; tests leave its store as it is."""
+    """The capture of the scan, read once; tests do not change its store."""
     return read_capture(written, tmp_path_factory.mktemp("once") / "store", QUICK)
 
 
@@ -68,7 +68,7 @@ def test_the_capture_is_level_stands_on_the_floor_and_has_the_rooms_yaw(once):
         assert ours.translation[2] == pytest.approx(expected.translation[2], abs=0.004)
         assert np.allclose(ours.rotation[2], expected.rotation[2], atol=1e-6)
     axis = (capture.frames[0].world_from_camera.rotation @ truth[0].rotation.T)[:, 0] @ [1, 0, 0]
-    assert axis == pytest.approx(1.0)  # a y-up world is only tipped over, not turned
+    assert axis == pytest.approx(1.0)  # a y-up world is tipped over without yaw
     assert np.degrees(capture.room.manhattan_yaw_rad) == pytest.approx(np.degrees(ROOM.yaw_rad), abs=1.0)
     heights = np.quantile(capture.surface.vertices_world[:, 2], (0.01, 0.99))
     assert heights[0] == pytest.approx(0.0, abs=0.02)
@@ -86,7 +86,7 @@ def test_every_format_gives_the_same_surface(write, once, tmp_path):
     other = read_capture(write(tmp_path / "other", ROOM), tmp_path / "b", QUICK)
     from scipy.spatial import cKDTree
 
-    # x and y start at each recording's own origin: compare the heights and the way to the camera instead
+    # x and y start at each recording's own origin: compare the heights and the distance to the camera instead
     def around(c):
         eye = c.frames[0].world_from_camera
         return eye.inverse.apply(c.surface.vertices_world)
@@ -119,7 +119,7 @@ def test_images_can_be_opened_again_and_are_shared_read_only(scan, tmp_path):
 def test_colours_are_red_green_blue(tmp_path):
     folder = write_seven_scenes(tmp_path / "kitchen", ROOM)
     for path in (folder / "color").iterdir():
-        cv2.imwrite(str(path), np.full((*ROOM.rgb_size[::-1], 3), (20, 60, 220), np.uint8))  # OpenCV writes BGR: this is red
+        cv2.imwrite(str(path), np.full((*ROOM.rgb_size[::-1], 3), (20, 60, 220), np.uint8))  # OpenCV writes BGR: red
     capture = read(folder, tmp_path)
     assert (capture.images.rgb(0)[..., 0] > 200).all()
     assert np.median(capture.surface.colours, axis=0) == pytest.approx([220, 60, 20], abs=12)
@@ -195,7 +195,7 @@ def test_a_damaged_jpeg_in_the_middle_is_skipped_with_a_notice(scan, tmp_path):
     assert any("rgbd/4.jpg" in n for n in capture.notices)
 
 
-DEPTH_BOMB = 200 * lzfse.compress(bytes(2**20))[:-4] + b"bvx$"  # blocks of 1 MB: to compress 200 MB in one takes a minute
+DEPTH_BOMB = 200 * lzfse.compress(bytes(2**20))[:-4] + b"bvx$"  # blocks of 1 MB: compressing 200 MB in one takes a minute
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""A camera's path asked at the times of images."""
+"""Interpolation of a camera trajectory at image timestamps."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Up from gravity, planes, cameras or a person: a room of known up, turned any way, with what the file says of it."""
+"""Up direction from gravity, planes, cameras or a person, in a room of known up and any orientation, and the file's value."""
 
 from dataclasses import replace
 
@@ -28,12 +28,12 @@ def turned(planes: tuple[Plane, ...], rotation: np.ndarray) -> list[Plane]:
 
 
 def tilted(deg: float) -> np.ndarray:
-    """Up, tilted by degrees in no special direction."""
+    """Up, tilted by that many degrees in an arbitrary direction."""
     return Rotation.from_rotvec(np.radians(deg) * np.array([0.6, 0.8, 0.0])).apply(Z)
 
 
 def walking(rotation: np.ndarray) -> list[Rigid3]:
-    """Cameras held upright at 1.5 m while one turns about, in a world turned by `rotation`."""
+    """Cameras held upright at 1.5 m by a person who turns around, in a world rotated by `rotation`."""
     yaws = Rotation.from_euler("z", np.linspace(-60, 60, 9)[:, None], degrees=True).as_matrix()
     places = np.column_stack([np.linspace(0, 2, 9), np.zeros(9), np.full(9, 1.5)])
     return [Rigid3(rotation @ yaw @ UPRIGHT, rotation @ place) for yaw, place in zip(yaws, places, strict=True)]
@@ -55,7 +55,7 @@ def test_planes_give_back_the_way_up_of_a_room_turned_any_way(seed: int) -> None
 def test_walls_that_face_one_way_settle_nothing() -> None:
     assert find_up([NORTH, plane((0, 1, 0), 3.0)], tilted(3.0), 10.0) is None
     assert find_up([], Z, 10.0) is None
-    corner = find_up([NORTH, EAST], tilted(3.0), 10.0)  # two that face differently do: the line they share
+    corner = find_up([NORTH, EAST], tilted(3.0), 10.0)  # two planes that face differently determine it: the line they share
     assert corner is not None
     assert degrees_between(corner[0], Z) < 0.01
 

@@ -1,4 +1,4 @@
-"""Turning a recording moves no point of the world, and every frame stands up."""
+"""Rotation of a recording to upright: no point of the world moves, and every frame is upright."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +18,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def recording(tmp_path: Path, rolls_deg: list[float], up=UP) -> Recording:
-    """Frames whose cameras are rolled about their viewing direction; pixels hold their own number."""
+    """Frames whose cameras are rolled about their viewing direction; pixels contain their own index."""
     frames = tuple(
         RawFrame(
             index=3 * k,
@@ -45,7 +45,7 @@ def recording(tmp_path: Path, rolls_deg: list[float], up=UP) -> Recording:
 
 
 def world_points(made: Recording, position: int) -> np.ndarray:
-    """(n, 4): where each depth pixel lies, and its confidence; sorted."""
+    """(n, 4): position of each depth pixel, and its confidence; sorted."""
     frame = made.frames[position]
     metres, confidence = made.depth_of(frame)
     points = frame.capture_from_camera.apply(depth_points(metres, frame.depth_camera).reshape(-1, 3))

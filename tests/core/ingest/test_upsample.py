@@ -1,4 +1,4 @@
-"""Depth at colour size: sharper than its pixels, with no point in the air and none where nothing was measured."""
+"""Depth upsampling to colour size: sharper than the sensor, no points in the air, and none without a measurement."""
 
 import cv2
 import numpy as np

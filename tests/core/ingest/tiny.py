@@ -1,4 +1,4 @@
-"""Tiny recordings of a room with a box, written to each format's facts; depth is exact, by casting rays."""
+"""Tiny recordings of a room with a box, written in each format's layout; depth is exact, by ray casting."""
 
 import json
 import zipfile
@@ -59,7 +59,7 @@ class TinyRoom:
         return self._cast(pose, camera)[0]
 
     def image(self, pose: Rigid3, camera: Intrinsics) -> np.ndarray:
-        """BGR picture with a texture that sticks to the surfaces."""
+        """BGR picture with a texture that is fixed to the surfaces."""
         _, points = self._cast(pose, camera)
         waves = [np.sin(points @ np.array(k)) for k in ((9.0, 4.0, 7.0), (-5.0, 8.0, 11.0), (13.0, -6.0, 3.0))]
         return (127 + 60 * np.stack(waves, axis=-1)).astype(np.uint8)
@@ -167,7 +167,7 @@ def jpeg(bgr: np.ndarray) -> bytes:
 
 
 def integer_centred(camera: Intrinsics) -> np.ndarray:
-    """The calibration matrix as the formats write it: pixel centres at integers."""
+    """The calibration matrix as the formats store it: pixel centres at integers."""
     matrix = camera.matrix.copy()
     matrix[:2, 2] -= 0.5
     return matrix
@@ -209,7 +209,7 @@ def _metadata(room: TinyRoom, changes: dict[str, object]) -> dict[str, object]:
 
 
 def _tum_poses(room: TinyRoom, start: float, offset_s: float) -> list[str]:
-    """Poses of a smooth walk, sampled off the images' clock by moving along each step."""
+    """Poses of a smooth walk, sampled at times offset from the images' clock by moving along each step."""
     from scipy.spatial.transform import Slerp
 
     poses = room.poses()

@@ -1,4 +1,4 @@
-"""The tiny room as the other apps and datasets would have recorded it; each writer follows its format's published facts."""
+"""The tiny room as recorded by other apps and data sets; each writer follows its format's published specification."""
 
 import json
 import shutil
@@ -17,18 +17,18 @@ HEVC = Path(__file__).with_name("tiny-room-hevc.mp4")
 """The default room's sensor_images by libx265 (crf 10, hvc1, 12 frames), as a phone would have filmed it."""
 
 TILTED = Rigid3(Rotation.from_euler("xyz", [70.0, 12.0, -25.0], degrees=True).as_matrix(), np.array([0.3, -1.0, 2.0]))
-_UPRIGHT_FROM_SENSOR = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the image was turned clockwise
+_UPRIGHT_FROM_SENSOR = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the image was rotated clockwise
 
 
 def sensor_camera(camera: Intrinsics) -> Intrinsics:
-    """The camera of an upright image as the sensor sees it: turned clockwise by 90 deg."""
+    """The camera of an upright image in sensor orientation: rotated clockwise by 90 deg."""
     return Intrinsics(
         fx=camera.fy, fy=camera.fx, cx=camera.height - camera.cy, cy=camera.cx, width=camera.height, height=camera.width
     )
 
 
 def sensor_pose(pose: Rigid3) -> Rigid3:
-    """The pose of the sensor for that of the upright camera."""
+    """The sensor's pose from that of the upright camera."""
     return Rigid3(pose.rotation @ _UPRIGHT_FROM_SENSOR, pose.translation)
 
 
@@ -109,7 +109,7 @@ def write_scanner_app(folder: Path, room: TinyRoom, *, without_photo: tuple[int,
 
 
 def write_arkitscenes(folder: Path, room: TinyRoom) -> Path:
-    """ARKitScenes in sensor orientation: every second image has a pose, names and clocks differ by a millisecond."""
+    """ARKitScenes in sensor orientation: every second image has a pose; names and clocks differ by a millisecond."""
     for name in ("lowres_wide", "lowres_depth", "confidence", "lowres_wide_intrinsics"):
         (folder / name).mkdir(parents=True)
     camera = sensor_camera(room.camera)
@@ -150,7 +150,7 @@ def write_scannet(folder: Path, room: TinyRoom, *, lost: tuple[int, ...] = ()) -
 
 
 def write_scannetpp(folder: Path, room: TinyRoom, *, aligned: bool = True) -> Path:
-    """ScanNet++'s iPhone folder in sensor orientation: the JSON also has frames of the film that were not extracted."""
+    """ScanNet++'s iPhone folder in sensor orientation: the JSON also has frames of the video that were not extracted."""
     for name in ("rgb", "depth"):
         (folder / name).mkdir(parents=True)
     camera, entries = integer_centred(sensor_camera(room.camera).resized(1920, 1440)), {}
@@ -168,7 +168,7 @@ def write_scannetpp(folder: Path, room: TinyRoom, *, aligned: bool = True) -> Pa
 
 
 def write_threedmatch(folder: Path, room: TinyRoom, *, intrinsics: bool = True, sequences: int = 1) -> Path:
-    """A 3DMatch scene: sequences below, their calibration above; rotations are off by 2e-4."""
+    """A 3DMatch scene: sequences below it, with their calibration in it; rotations are off by 2e-4."""
     for s in range(sequences):
         sequence = folder / f"seq-{s + 1:02d}"
         sequence.mkdir(parents=True)
@@ -251,7 +251,7 @@ def write_nerfstudio(folder: Path, room: TinyRoom, *, depth: bool = True, npy: b
 
 
 def write_arti4d(folder: Path, room: TinyRoom, *, flipped: bool = False, tf: bool = True) -> Path:
-    """A raw sequence of Arti4D: poses are of a tracked base; `flipped` scenes were filmed upside down and turned back."""
+    """A raw sequence of Arti4D: poses are of a tracked base; `flipped` scenes were filmed upside down and rotated back."""
     for name in ("rgb", "depth", "odom"):
         (folder / name).mkdir(parents=True)
     base_from_depth, depth_from_rgb = TILTED, Rigid3(np.eye(3), np.array([0.03, 0.001, -0.002]))
@@ -289,5 +289,5 @@ def millimetres(depth_m: np.ndarray) -> np.ndarray:
 
 
 def told(recording, words):
-    """Whether a notice says these words."""
+    """Whether a notice contains these words."""
     return any(words in notice for notice in recording.notices)

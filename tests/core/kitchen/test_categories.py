@@ -1,4 +1,4 @@
-"""The category table, and every name in it through every stage: they agree because there is nothing else to ask."""
+"""The category table, and every name in it through every stage: all stages use the same table."""
 
 from dataclasses import replace
 from typing import Any
@@ -32,18 +32,18 @@ OPENS = {"drawer": "prismatic", "sideways": "prismatic", "side": "revolute", "pa
 
 
 def unit_called(name: str, category: Category) -> Unit:
-    """An object of usual size that a person calls so."""
+    """An object of usual size with that name as its category."""
     kind = "thing" if category.kind == "thing" else "appliance"
     return Unit("a", name, (0, 0, 1.2), category.usual_m, kind=kind)
 
 
 def built_as(name: str, category: Category) -> SceneObject:
-    """What is built of it."""
+    """The object that is built from it."""
     return built(unit_called(name, category)).objects[0]
 
 
 def exported_as(name: str, category: Category) -> tuple[SceneObject, dict[str, Any]]:
-    """What is built of it and fitted to a mesh, and what the manifest says of that."""
+    """The object as built and fitted to a mesh, and its manifest entry."""
     track, placement, asset = placed_unit(unit_called(name, category), np.random.default_rng(0))
     of = (track,), (placement,), (asset,)
     scene = build_scene(capture(()), *of, Overrides(objects={}), SynthesizeConfig(surroundings=False))
@@ -54,7 +54,7 @@ def exported_as(name: str, category: Category) -> tuple[SceneObject, dict[str, A
 
 
 def facts_of(item: SceneObject) -> dict[str, Any]:
-    """All of an object but what it is called, as plain values."""
+    """All data of an object except its name, as plain values."""
     links = [
         (
             link.name,
@@ -79,13 +79,13 @@ def facts_of(item: SceneObject) -> dict[str, Any]:
 
 
 def unnamed(entry: dict[str, Any]) -> dict[str, Any]:
-    """A manifest's entry without the word and the sentences that it stands in."""
+    """A manifest entry without the category's name and the sentences that contain it."""
     labels = {body: {**said, "category": ""} for body, said in entry["labels"].items()}
     return {**entry, "category": "", "labels": labels, "warnings": len(entry["warnings"])}
 
 
 def plain(value: Any) -> Any:
-    """With arrays as lists."""
+    """The value with arrays as lists."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     return [plain(each) for each in value] if isinstance(value, (tuple, list)) else value
@@ -118,7 +118,7 @@ def test_every_name_is_built_fitted_and_exported_as_the_first(category: Category
     first, entry = exported_as(category.name, category)
     for name in category.names[1:]:
         item, said = exported_as(name, category)
-        assert item.category == said["category"] == name  # as the person wrote it
+        assert item.category == said["category"] == name  # as typed
         assert facts_of(item) == facts_of(first), name
         assert unnamed(said) == unnamed(entry), name
 
@@ -134,15 +134,15 @@ def test_every_name_is_looked_for_and_measured_the_same(category: Category, monk
     front = Rectangle3(world_from_front=Rigid3(), width_m=0.6, height_m=0.6)
     for name in category.names:
         found = category_of(name)
-        # segment: what is looked for
+        # segment: kind of object searched for
         finders._front(bench, found, np.zeros((1, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
         assert asked["pair"] == (category.name in PAIRED or category.name.endswith("refrigerator"))
         assert asked["kind"] is category
         assert sized_as(found).radius_m == min(category.longest_m / 2, 1.0)
-        # generate: how deep it is, and which wall may be behind it
+        # generate: its depth, and which wall may be behind it
         depths = depths_behind(capture((wall,)), front, found)
         assert depths[-1].depth_m == pytest.approx(category.depth.usual, abs=0.006)
-    # synthesize: what is built
+    # synthesize: the built parts
     assert item.fixture == (category.name if category.fixture is not None else "object")
     assert {joint.type for joint in item.joints} == ({OPENS[category.opens]} if category.opens in OPENS else set())
     density = {part.density_kg_m3 for part in parts_of(category)}

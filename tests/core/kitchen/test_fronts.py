@@ -1,4 +1,4 @@
-"""Align, synthesize and warp mean the same front plane of a mesh: of a shaker door, the frame."""
+"""Align, synthesize and warp use the same front plane of a mesh: for a shaker door, the frame's."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ Surface = tuple[np.ndarray, np.ndarray]
 
 
 def shared_by_stages(vertices: np.ndarray, faces: np.ndarray) -> list[float]:
-    """Where align, synthesize and warp put the front of a mesh in the object frame, along y."""
+    """Position along y at which align, synthesize and warp put the front of a mesh in the object frame."""
     rng = np.random.default_rng(0)
     mesh = TexturedMesh(vertices=vertices, faces=faces, uv=np.zeros((len(vertices), 2)), texture=np.zeros((2, 2, 3), np.uint8))
     shape = prepare_shape(mesh, point_count=6000, face_limit=2000, rng=rng)
@@ -34,7 +34,7 @@ def shared_by_stages(vertices: np.ndarray, faces: np.ndarray) -> list[float]:
 
 
 def two_drawers() -> Surface:
-    """Two fronts in one plane, a gap between them, each with a bar before it."""
+    """Two fronts in one plane with a gap between them, each with a bar before it."""
     x, z = WIDTH / 2, HEIGHT / 2
     carcass = block((-x, FRONT_Y + 0.02, -z), (x, DEPTH / 2, z))
     fronts = [block((-x, FRONT_Y, a), (x, FRONT_Y + 0.021, b)) for a, b in ((-z, -0.0015), (0.0015, z))]

@@ -1,4 +1,4 @@
-"""What people type names one line of the category table, or says that it does not."""
+"""Typed names map to one line of the category table, or are reported as unknown."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A new unit is one file in synthesize/fixtures and one line in the category table."""
+"""A new kind of unit takes one file in synthesize/fixtures and one line in the category table."""
 
 from pathlib import Path
 
@@ -47,7 +47,7 @@ LINE = Category(
 
 @pytest.fixture
 def plate_warmer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The file and the line."""
+    """Add the file and the line."""
     (tmp_path / "plate_warmer.py").write_text(FILE, encoding="utf-8")
     monkeypatch.setattr(fixtures, "__path__", [*fixtures.__path__, str(tmp_path)])
     monkeypatch.setattr(categories, "CATEGORIES", (*categories.CATEGORIES, LINE))

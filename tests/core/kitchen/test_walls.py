@@ -1,4 +1,4 @@
-"""Segment, generate and synthesize mean the same wall behind a front, at the same distance."""
+"""Segment, generate and synthesize use the same wall behind a front, at the same distance."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -22,13 +22,13 @@ MIDDLE = np.array([1.0, 0.5, 0.6])
 
 
 def wall_at(distance_m: float, *, off_deg: float = 0.0) -> Wall:
-    """A wall that far behind the front's middle, along its normal, and turned about the vertical."""
+    """A wall that far behind the front's centre, along its normal, and turned about the vertical."""
     normal = rotation_about_z(np.deg2rad(off_deg)) @ OUTWARD
     return Wall(normal=normal, offset_m=float(normal @ (MIDDLE - distance_m * OUTWARD)), area_m2=4.0)
 
 
 def asked(walls: tuple[Wall, ...], category: str) -> list[float | None]:
-    """What each stage says."""
+    """Distance that each stage finds."""
     kind, scan = category_of(category), capture(walls)
     face = Rectangle3(world_from_front=Rigid3(np.eye(3), MIDDLE), width_m=0.6, height_m=0.6)
     front: Any = SimpleNamespace(outline=face)
@@ -37,7 +37,7 @@ def asked(walls: tuple[Wall, ...], category: str) -> list[float | None]:
     generated = next((d.depth_m for d in depths_behind(scan, face, kind) if d.source == "wall"), None)
     return [
         depth_behind_front(front, scan.room, kind).wall_m,
-        None if generated is None else generated + 0.005,  # what stands against a wall leaves it a gap
+        None if generated is None else generated + 0.005,  # objects keep a gap to the wall
         depth_behind_box(scan, np.eye(3), low, high, kind.depth).wall_m,
     ]
 

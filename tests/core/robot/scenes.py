@@ -1,4 +1,4 @@
-"""One cabinet by hand: a front of 18 mm in a frame of boards, hinged or sliding, and what a test wants different of it."""
+"""A hand-made cabinet, configurable for tests: a front of 18 mm in a frame of boards, hinged or sliding."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from r2c2r_core.robot.rig import Rig, gripper_in
 
 @dataclass(frozen=True, kw_only=True)
 class Bar:
-    """A handle on two posts, or a plate: width and height, and how far it stands out."""
+    """A handle on two posts, or a plate: width, height and protrusion."""
 
     wide: float = 0.012
     high: float = 0.16
@@ -26,7 +26,7 @@ def scene(
     beside: str = "",
     turned: float = 0.0,
 ) -> Path:
-    """scene.xml of a front 0.4 m wide and 0.5 m high, its outer face at y = -0.3 before it is turned about z."""
+    """scene.xml of a front 0.4 m wide and 0.5 m high, its outer face at y = -0.3 before it is rotated about z."""
     joint = {
         "hinge": f'type="hinge" axis="0 0 1" pos="0.2 -0.282 0" range="0 1.92" damping="0.3" frictionloss="{frictionloss}"',
         "drawer": f'type="slide" axis="0 -1 0" range="0 0.4" damping="8" frictionloss="{frictionloss}"',

@@ -65,7 +65,7 @@ def test_a_picture_shows_each_body_where_it_is(tmp_path: Path) -> None:
 
     rig = gripper_in(scene(tmp_path).with_name("scene.xml"), lambda spec: [setattr(g, "group", 2) for g in spec.geoms])
     camera, camera_from_world = aimed(np.array([0.0, -1.5, 0.6]), np.array([0.0, 0.0, 0.6]), (160, 120), 0.8)
-    rig.data.qpos[rig.axes[2]] = 3.0  # the gripper out of sight
+    rig.data.qpos[rig.axes[2]] = 3.0  # the gripper out of view
     import mujoco
 
     mujoco.mj_forward(rig.model, rig.data)

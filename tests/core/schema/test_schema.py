@@ -1,4 +1,4 @@
-"""One description of each document, for the command line, the app, and whoever writes one."""
+"""One schema of each document, shared by the command line, the app, and external writers."""
 
 import json
 from collections.abc import Iterator

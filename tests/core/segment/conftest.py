@@ -19,7 +19,7 @@ def boxes() -> tuple[Capture, Truth]:
 
 @pytest.fixture(scope="session")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of what is prepared of the boxes: one folder for all workers, which wait for each other."""
+    """Cache of the prepared boxes: one folder for all workers, which wait for each other."""
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "segment-boxes"
     folder.mkdir(exist_ok=True)

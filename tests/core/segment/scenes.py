@@ -1,4 +1,4 @@
-"""A small kitchen of coloured boxes with known panels, filmed by a few exact cameras; each scene once a process: only read."""
+"""A small kitchen of coloured boxes with known panels, filmed by a few exact cameras; each scene is made once per process."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -28,7 +28,7 @@ Corners = tuple[tuple[float, float, float], tuple[float, float, float]]
 Named = tuple[tuple[float, ...], tuple[float, ...], tuple[int, int, int], str | None]
 TABLE: Corners = ((-0.6, -0.35, 0.0), (0.6, 0.35, 0.73))
 CHAIR: Corners = ((0.05, -0.80, 0.0), (0.47, -0.42, 0.90))
-POST = (0.62, 0.72)  # x range of a post that stands before door_b
+POST = (0.62, 0.72)  # x range of a post in front of door_b
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,14 @@ class Shapes:
     vertices: np.ndarray
     faces: np.ndarray
     colours: np.ndarray
-    ids: np.ndarray  # a vertex: 0 none
+    ids: np.ndarray  # per vertex: 0 none
 
 
 @cache
 def kitchen(
     drawn_out_m: float = 0.0, from_step: int = 0, swung_rad: float = 0.0
 ) -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
-    """The capture, and the true mask of each named thing in each frame; from a step on, the middle drawer stands out.
+    """The capture, and the true mask of each named object in each frame; from a step on, the middle drawer is pulled out.
 
     Or door_c is swung open on its left edge; the carcass then begins further back.
     """
@@ -73,7 +73,7 @@ def kitchen(
 def _filmed(
     name: str, poses: list[Rigid3], scenes: list[tuple[Shapes, list[str]]], walls: tuple[Wall, ...]
 ) -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
-    """What the scene, one a pose, looks like from each pose, and the true mask of each named thing."""
+    """Render the scenes, one per pose; the capture, and the true mask of each named object."""
     colours: dict[int, np.ndarray] = {}
     depths: dict[int, np.ndarray] = {}
     truth: dict[str, dict[int, np.ndarray]] = {named: {} for named in scenes[0][1]}
@@ -145,11 +145,11 @@ CAP_M, WORKTOP_M = 0.24, 0.90
 def bottle() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
     """A bottle with a cap before a wall with a dark patch, beside another one, and their true masks.
 
-    Its colours are those of the patch: only depth and views from several sides tell them apart.
+    Its colours are those of the patch: only depth and views from several sides distinguish them.
     """
     boxes: list[Named] = [
         ((-1.5, 0.0, 0.0), (2.0, 0.02, 2.4), (200, 202, 198), None),  # wall
-        ((-0.06, -0.002, 0.90), (0.06, 0.0, 1.12), (110, 118, 112), None),  # as a shadow on it
+        ((-0.06, -0.002, 0.90), (0.06, 0.0, 1.12), (110, 118, 112), None),  # like a shadow on it
         ((-1.5, -0.62, 0.86), (2.0, 0.0, WORKTOP_M), (70, 74, 80), None),
         ((-1.5, -3.5, -0.02), (2.0, 0.0, 0.0), (120, 100, 80), None),
     ]
@@ -175,7 +175,7 @@ def bottle() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
 def _lathe(
     foot: tuple[float, float, float], profile: tuple[tuple[float, float], ...], colour: tuple[int, int, int], number: int
 ) -> Shapes:
-    """A body of revolution with a lid, lighter on one side."""
+    """A body of revolution with a lid, brighter on one side."""
     sides = 32
     angles = np.arange(sides) / sides * 2 * np.pi
     rings = [(radius, z) for radius, z in (*profile, (0.0, profile[-1][1]))]
@@ -196,7 +196,7 @@ def _legs(box: Corners, width: float, height: float, colour: tuple[int, int, int
 
 
 def click_on(capture: Capture, point_world: tuple[float, float, float], frame_index: int, label: int = 1) -> PromptPoint:
-    """The click that sees a world point in a frame."""
+    """The click on a world point's pixel in a frame."""
     frame = capture.frame(frame_index)
     x, y, z = frame.world_from_camera.inverse.apply(np.array([point_world]))[0]
     camera = frame.rgb_camera
@@ -254,7 +254,7 @@ def _shapes(drawn_out_m: float, swung_rad: float, hollow: bool) -> tuple[Shapes,
 
 
 def _packed(boxes: list[Named], names: list[str], swung_rad: float = 0.0) -> tuple[Shapes, list[str]]:
-    """Coloured boxes as triangles, those of a name with its number in `names`."""
+    """Coloured boxes as triangles, with each name's number in `names` as id."""
     vertices, faces, attributes = [], [], []
     count = 0
     for low, high, colour, name in boxes:
@@ -273,14 +273,14 @@ def _packed(boxes: list[Named], names: list[str], swung_rad: float = 0.0) -> tup
 
 
 def _swung(vertices: np.ndarray, angle_rad: float) -> np.ndarray:
-    """door_c's vertices, turned out about the left edge of its face."""
+    """door_c's vertices, swung open about the left edge of its face."""
     hinge = np.array([DOORS["door_c"][0], FRONT_Y, 0.0])
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.asarray((vertices - hinge) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) + hinge)
 
 
 def _box(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Six quads with vertices of their own, so that each face has its own shade."""
+    """Six quads with separate vertices, so that each face has its own shade."""
     vertices, faces = [], []
     for axis in range(3):
         a, b = [k for k in range(3) if k != axis]

@@ -1,4 +1,4 @@
-"""Every rule finds what it is for, and a right kitchen contradicts nothing."""
+"""Every rule finds its contradiction, and a correct kitchen has none."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -89,10 +89,10 @@ def test_clicks_that_the_mask_disobeys() -> None:
     assert left_out.message == "door_1: the click at (120, 60) in frame 4 is on it, but outside its mask"
     (taken_in,) = found((door, prompt("door_1", "cabinet", 40.5, label=0)))
     assert taken_in.message == "door_1: the click at (40, 60) in frame 4 is off it, but inside its mask"
-    assert found((door, prompt("door_1", "cabinet", 81.0))) == ()  # on its border, as fingers go
-    (unseen,) = found((door, prompt("door_1", "cabinet", 40.5, frame=5)))  # a frame in which nothing of it was found
+    assert found((door, prompt("door_1", "cabinet", 81.0))) == ()  # on its border, as clicks may be
+    (unseen,) = found((door, prompt("door_1", "cabinet", 40.5, frame=5)))  # a frame in which it was not found
     assert unseen.message == "door_1: the click at (40, 60) in frame 5 is on it, but it is not visible in that frame"
-    absent = FrameSaid(frame=5, mask=None)  # a person said so
+    absent = FrameSaid(frame=5, mask=None)  # marked as absent by a person
     assert found((door, replace(prompt("door_1", "cabinet", 40.5, frame=5), frames=(absent,)))) == ()
 
 

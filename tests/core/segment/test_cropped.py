@@ -1,4 +1,4 @@
-"""A crop box limits a thing in its masks and its size, whatever was found beyond it."""
+"""A crop box limits the masks and the size of an object, whatever was found beyond it."""
 
 from dataclasses import replace
 from typing import Any
@@ -43,7 +43,7 @@ def test_what_is_seen_behind_the_box_is_none_of_it(boxes: Boxes) -> None:
     kept = cropped_mask(everything, frame, capture.images.depth(60).metres, crop)
     carton = boxes[1]["carton"][60]
     assert (kept & carton).sum() > 0.75 * carton.sum()
-    assert (kept & carton).sum() > 0.9 * kept.sum()  # its silhouette holds three times as much wall
+    assert (kept & carton).sum() > 0.9 * kept.sum()  # its silhouette covers three times as much wall
 
 
 def test_the_box_is_where_it_was_drawn_however_the_world_was_turned(boxes: Boxes) -> None:

@@ -22,7 +22,7 @@ def box(left: int, top: int, right: int, bottom: int) -> np.ndarray:
 @pytest.mark.parametrize("side", [20, 60, 200])
 def test_it_is_the_overlap_of_a_box_whose_border_is_off_all_around(side: int) -> None:
     truth, grown = box(200, 200, 200 + side, 200 + side), box(198, 198, 202 + side, 202 + side)
-    with tuning(changed({"segment.expected_iou": {"slope": 1.0, "offset": 0.0}})):  # before its map
+    with tuning(changed({"segment.expected_iou": {"slope": 1.0, "offset": 0.0}})):  # without the calibration map
         expected = expected_iou(truth, 1.0, FRAME, AT_2_M, border_m=0.008)  # 2 px
     assert expected == pytest.approx(mask_iou(truth, grown), abs=0.035)
 

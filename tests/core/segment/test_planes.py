@@ -1,4 +1,4 @@
-"""Vertical planes of a surface that is known exactly."""
+"""Vertical planes of an exactly known surface."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def together(*parts: SceneSurface) -> SceneSurface:
 
 
 def front(x: float = 0.0, y: float = 0.0, z: float = 0.3, width: float = 0.8, height: float = 0.6) -> SceneSurface:
-    """A rectangle facing -Y whose lower left corner is given."""
+    """A rectangle facing -Y with a given lower left corner."""
     return patch((x, y, z), (width, 0, 0), (0, 0, height))
 
 
@@ -82,7 +82,7 @@ def test_fronts_eight_centimetres_apart_are_two_and_the_larger_is_first() -> Non
 
 
 def frame(stile: float, y: float = 0.0) -> SceneSurface:
-    """Rails and stiles of that width round 0.6 by 0.5 m; the opening's lower left corner is at (0, 0.3)."""
+    """Rails and stiles of that width around 0.6 by 0.5 m; the opening's lower left corner is at (0, 0.3)."""
     return together(
         front(-stile, y, 0.3 - stile, 0.6 + 2 * stile, stile),
         front(-stile, y, 0.8, 0.6 + 2 * stile, stile),

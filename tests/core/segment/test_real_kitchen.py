@@ -81,7 +81,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> GeometricSession:
     return opened
 
 
-QUICK = ("door_3", "controller")  # a front and the thing that takes the least; benchmarks/segment_outlines.py measures all
+QUICK = ("door_3", "controller")  # a front and the fastest thing; benchmarks/segment_outlines.py measures all
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_one_click_gives_the_outlines_drawn_by_hand(session: GeometricSession, d
 def test_doors_have_catalogue_widths(session: GeometricSession, name: str, width_m: float) -> None:
     panel = session.find(next(p for p in read_prompts(PROMPTS).objects if p.name == name)).panel()
     assert panel is not None
-    assert panel.width_m == pytest.approx(width_m, abs=0.015)  # poses are 13 mm off
+    assert panel.width_m == pytest.approx(width_m, abs=0.015)  # poses are off by 13 mm
     assert panel.handle is not None
     assert not panel.handle.is_vertical
     assert panel.handle.centre[1] > 0.2

@@ -1,4 +1,4 @@
-"""What lies under a pixel where the sensor has no depth."""
+"""Surface point under a pixel without sensor depth."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +19,7 @@ SCALE = 960 / 256
 
 
 def at(column: float, *, gap: int, far_m: float = FAR_M) -> float | None:
-    """Depth at a column of a depth image in which `gap` pixels are missing from the end of the near side on."""
+    """Depth at a column of a depth image in which `gap` pixels are missing after the end of the near side."""
     depth = np.full((192, 256), NEAR_M, np.float32)
     depth[:, STEP_COLUMN:] = far_m
     depth[:, STEP_COLUMN : STEP_COLUMN + gap] = 0
@@ -54,13 +54,13 @@ HOB_LOW, HOB_HIGH, TABLE_M = np.array([0.2, -0.15]), np.array([0.5, 0.15]), 0.73
 
 
 def in_hob(points_world: np.ndarray) -> np.ndarray:
-    """Which points (..., 3) are on a rectangle of the table's top."""
+    """Mask of the points (..., 3) on a rectangle of the table's top."""
     plan = ((points_world[..., :2] > HOB_LOW) & (points_world[..., :2] < HOB_HIGH)).all(axis=-1)
     return np.asarray(plan & (np.abs(points_world[..., 2] - TABLE_M) < 0.02))
 
 
 def with_hob(*, opening: bool) -> Capture:
-    """The dining table with a sheet of black glass let into it, which returns no light; or with an opening there.
+    """The dining table with a sheet of black glass let into it, which returns no depth; or with an opening there.
 
     The first frame measures nothing in the opening either; the others measure the floor through it.
     """

@@ -1,4 +1,4 @@
-"""Captures, tracks, placements and meshes made by hand: a box with a handle, placed by a random similarity."""
+"""Hand-made captures, tracks, placements and meshes: a box with a handle, placed by a random similarity."""
 
 from dataclasses import dataclass
 
@@ -79,7 +79,7 @@ def unit_mesh(unit: Unit, subdivide: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 
 def textured(vertices: np.ndarray, faces: np.ndarray, half: np.ndarray) -> TexturedMesh:
-    """uv is the front view (x right, z up), with a red mark in the upper left eighth of a grey picture."""
+    """Mesh with uv from the front view (x right, z up), and a red mark in the upper left eighth of a grey picture."""
     texture = np.full((64, 64, 3), 150, np.uint8)
     texture[4:12, 4:12] = (220, 20, 20)
     uv = np.clip((vertices[:, [0, 2]] + half[[0, 2]]) / (2 * half[[0, 2]]), 0, 1)
@@ -89,7 +89,7 @@ def textured(vertices: np.ndarray, faces: np.ndarray, half: np.ndarray) -> Textu
 def placed_unit(
     unit: Unit, rng: np.random.Generator, *, subdivide: int = 0, stretch: tuple[float, float, float] = (1, 1, 1)
 ) -> tuple[MaskTrack, Placement, MeshAsset]:
-    """What the earlier stages would say about a unit: its mesh in a random frame, and the similarity back."""
+    """Outputs of the earlier stages for a unit: its mesh in a random frame, and the similarity back."""
     vertices, faces = unit_mesh(unit, subdivide)
     half = np.array(unit.size) / 2
     mesh = textured(vertices, faces, half)

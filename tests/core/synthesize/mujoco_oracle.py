@@ -1,4 +1,4 @@
-"""MuJoCo as the oracle: does the scene rest, and does every joint open?"""
+"""MuJoCo as the oracle: whether the scene rests, and every joint opens."""
 
 import mujoco
 import numpy as np
@@ -64,7 +64,7 @@ def _add(spec: mujoco.MjSpec, item: SceneObject) -> None:
 
 
 def deepest_contact(model: mujoco.MjModel, positions: dict[str, float] | None = None) -> float:
-    """Deepest penetration in metres with the given joint positions, 0 when nothing touches."""
+    """Deepest penetration in metres at the given joint positions; 0 without contact."""
     data = mujoco.MjData(model)
     for name, value in (positions or {}).items():
         data.joint(name).qpos[0] = value
@@ -73,7 +73,7 @@ def deepest_contact(model: mujoco.MjModel, positions: dict[str, float] | None = 
 
 
 def sweep(scene: ArticulatedScene, model: mujoco.MjModel) -> dict[str, float]:
-    """Deepest penetration over each joint's sweep, 21 positions, the others closed."""
+    """Deepest penetration over each joint's sweep of 21 positions, with the others closed."""
     return {
         joint.name: max(deepest_contact(model, {joint.name: float(q)}) for q in np.linspace(joint.lower, joint.upper, 21))
         for item in scene.objects
@@ -82,7 +82,7 @@ def sweep(scene: ArticulatedScene, model: mujoco.MjModel) -> dict[str, float]:
 
 
 def reached(scene: ArticulatedScene, model: mujoco.MjModel, seconds: float = 4.0) -> dict[str, float]:
-    """Share of each joint's travel under 30 N or 10 N m."""
+    """Fraction of each joint's travel reached under 30 N or 10 N m."""
     result = {}
     for item in scene.objects:
         for joint in item.joints:

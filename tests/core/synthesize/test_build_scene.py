@@ -61,7 +61,7 @@ def test_an_object_whose_measuring_fails_is_left_out_and_the_others_stand(monkey
     monkeypatch.setattr(stage, "measure_object", measured)
     units = [unit for unit in KITCHEN if unit.name in ("cab_l", "cab_r", "bottle", "micro")]
     scene = built(*units)
-    assert {item.name for item in scene.objects} - {"plinth_1"} == {"cab_l", "micro"}  # nobody clicked the plinth
+    assert {item.name for item in scene.objects} - {"plinth_1"} == {"cab_l", "micro"}  # the plinth has no clicks
     assert set(scene.failures) == {"cab_r", "bottle"}
     assert scene.failures["cab_r"].startswith("synthesize: cab_r: LinAlgError: SVD did not converge")
     with pytest.raises(StageError, match="no object could be measured"):
@@ -258,7 +258,7 @@ def test_no_door_swings_open_by_its_own_weight(way: str, opens_by_itself: bool) 
     model = compile_scene(scene)
     state = mujoco.MjData(model)
     mujoco.mj_forward(model, state)
-    pull = -float(state.qfrc_bias[0])  # what gravity does to the closed joint
+    pull = -float(state.qfrc_bias[0])  # effect of gravity on the closed joint
     assert (pull > 0.1) == opens_by_itself
     assert model.dof_frictionloss[0] > max(pull, 0.0)
 
@@ -331,7 +331,7 @@ def _clear_depth(item: SceneObject, front: str, rear: str) -> float:
 
 
 def _span(item: SceneObject, board: str, axis: int) -> tuple[float, float]:
-    """From where to where a board reaches along an axis of the object."""
+    """Extent of a board along an axis of the object."""
     link, box = next((link, box) for link in item.links for box in link.boxes if box.name == board)
     middle = (link.object_from_link @ box.link_from_box).translation[axis]
     return middle - box.size_m[axis] / 2, middle + box.size_m[axis] / 2

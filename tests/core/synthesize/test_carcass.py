@@ -1,4 +1,4 @@
-"""Carcasses: laws of every plan, and NVIDIA Scene Synthesizer's beside ours."""
+"""Carcasses: invariants of every plan, and comparison with NVIDIA Scene Synthesizer's."""
 
 import importlib.util
 import itertools
@@ -40,7 +40,7 @@ def corners(box: Box) -> tuple[np.ndarray, np.ndarray]:
 
 
 def apart_m(a: Box, b: Box) -> float:
-    """The gap between two boxes; negative by how deep they overlap."""
+    """The gap between two boxes; negative for the depth of their overlap."""
     (low_a, high_a), (low_b, high_b) = corners(a), corners(b)
     return float(np.maximum(low_b - high_a, low_a - high_b).max())
 
@@ -126,13 +126,13 @@ def test_every_kind_of_front_is_planned_here() -> None:
 def test_a_plain_install_brings_neither_scene_synthesizer_nor_triangle() -> None:
     project = tomllib.loads((Path(__file__).resolve().parents[3] / "pyproject.toml").read_text())["project"]
     brought = closure(project["dependencies"])
-    assert {"trimesh", "networkx", "yourdfpy"} <= brought  # it was resolved
+    assert {"trimesh", "networkx", "yourdfpy"} <= brought  # the requirements were resolved
     assert not {"scene-synthesizer", "triangle"} & brought
     assert {"scene-synthesizer", "triangle"} <= closure(project["optional-dependencies"]["scene-synthesizer"])
 
 
 def closure(requirements: list[str]) -> set[str]:
-    """Names of everything that these requirements bring, by the metadata of what is installed."""
+    """Names of all transitive dependencies, from the metadata of installed packages."""
     brought: set[tuple[str, frozenset[str]]] = set()
     waiting = [Requirement(text) for text in requirements]
     while waiting:
@@ -143,7 +143,7 @@ def closure(requirements: list[str]) -> set[str]:
         brought.add(key)
         try:
             further = [Requirement(text) for text in requires(wanted.name) or ()]
-        except PackageNotFoundError:  # of another platform, or taken away after installing
+        except PackageNotFoundError:  # for another platform, or removed after installation
             continue
         extras = ("", *wanted.extras)
         waiting += [r for r in further if r.marker is None or any(r.marker.evaluate({"extra": e}) for e in extras)]

@@ -1,4 +1,4 @@
-"""Motions of joints, and how far they go before something that stands still is in the way."""
+"""Joint motions, and their free range up to a stationary obstacle."""
 
 from dataclasses import replace
 
@@ -14,12 +14,12 @@ from r2c2r_core.synthesize.clearance import free_travel, gathered, motion_at, op
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
-SPARE_M, SPARE_RAD = 0.003, np.deg2rad(1.0)  # kept free before an obstacle
+SPARE_M, SPARE_RAD = 0.003, np.deg2rad(1.0)  # clearance kept before an obstacle
 ROOM = Rigid3(rotation_about_z(0.7), np.array([2.0, -1.0, 0.3]))
 
 
 def unit(category: str, *, room: Rigid3 | None = None) -> SceneObject:
-    """A unit of 0.6 x 0.58 x 0.7 m at the origin whose front faces -Y, or the same elsewhere."""
+    """A unit of 0.6 x 0.58 x 0.7 m at the origin whose front faces -Y, or elsewhere."""
     made = placed_unit(Unit("a", category, (0.0, 0.0, 0.5), (0.6, 0.58, 0.7)), np.random.default_rng(0))
     item = build_scene(capture(), *([m] for m in made), Overrides(objects={}), SynthesizeConfig()).objects[0]
     return moved(item, room or Rigid3())
@@ -30,7 +30,7 @@ def moved(item: SceneObject, motion: Rigid3) -> SceneObject:
 
 
 def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> SceneObject:
-    """Something that stands still between two corners."""
+    """A stationary block between two corners."""
     size = np.subtract(high, low)
     box = Box(name="block", role="carcass", size_m=size, link_from_box=Rigid3())
     shown = unit("cabinet")
@@ -82,7 +82,7 @@ def test_a_drawer_stops_short_of_what_stands_before_it(distance_m: float) -> Non
     wall_before = block((-1.0, face - distance_m - 0.3, 0.0), (1.0, face - distance_m, 1.0))
     free, blocker = travel(unit("drawer"), wall_before)
     assert blocker == "block"
-    assert free == pytest.approx(distance_m - SPARE_M, abs=1.5e-3)  # half a millimetre may touch; a 64th of a step
+    assert free == pytest.approx(distance_m - SPARE_M, abs=1.5e-3)  # half a millimetre of contact is allowed; a 64th of a step
 
 
 def test_nothing_in_the_way_is_the_whole_travel_and_what_can_be_pushed_is_nothing() -> None:
@@ -118,7 +118,7 @@ def test_a_flap_stops_where_its_handle_meets_the_floor_and_opens_wholly_above_a_
     flap = next(link for link in grounded.links if link.name == joint.child)
     touching = motion_at(grounded, joint, joint.upper + SPARE_RAD) @ grounded.world_from_object @ flap.object_from_link
     corners = [(touching @ box.link_from_box).apply(box_corners(box.size_m)) for box in flap.boxes]
-    assert -1e-3 < np.concatenate(corners)[:, 2].min() <= 0.0  # half a millimetre may touch; a 64th of a step
+    assert -1e-3 < np.concatenate(corners)[:, 2].min() <= 0.0  # half a millimetre of contact is allowed; a 64th of a step
     assert oven(0.1).joints[0].upper == pytest.approx(np.pi / 2)
 
 

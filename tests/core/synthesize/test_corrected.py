@@ -1,4 +1,4 @@
-"""What geometry shows of a correction without a run."""
+"""Immediate geometric preview of a correction without a run."""
 
 import numpy as np
 import pytest

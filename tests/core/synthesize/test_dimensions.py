@@ -79,7 +79,7 @@ CARTON = Unit("a", "box", (0, 0, 1.0), (0.19, 0.08, 0.29), kind="thing")
 
 
 def carton_seen(points: np.ndarray, parameters: dict[str, float] | None = None) -> MeasuredObject:
-    """The carton, in a scan that shows these points of it."""
+    """The carton, in a scan with these observed points."""
     track, placement, asset = placed_unit(CARTON, np.random.default_rng(0))
     scan = capture()
     scan = replace(scan, surface=replace(scan.surface, vertices_world=points))
@@ -141,7 +141,7 @@ def test_the_height_of_an_appliance_that_ends_at_the_floor_is_inferred(bottom_m:
     found = measure(unit)
     assert found.sources[2] == said
     np.testing.assert_allclose(found.dimensions_m[2], 1.6, atol=0.01)
-    assert measure(Unit("c", "cabinet", (0.0, 0.0, 0.36), (0.6, 0.58, 0.7))).sources[2] == "measured"  # a door's edge is seen
+    assert measure(Unit("c", "cabinet", (0.0, 0.0, 0.36), (0.6, 0.58, 0.7))).sources[2] == "measured"  # its edge is visible
 
 
 @pytest.mark.parametrize(("scale", "depth_m", "source"), [(1.01, 0.60, "measured"), (1.10, 0.63, "inferred")])

@@ -38,7 +38,7 @@ def right_edge(item: MeasuredObject) -> np.ndarray:
     return item.front_centre + item.world_from_object.rotation[:, 0] * item.dimensions_m[0] / 2
 
 
-# `a` faces -y, its right edge runs to x = 0.63; `b` faces -x with its front plane at x = 0.60, where an inside corner is
+# `a` faces -y, its right edge is at x = 0.63; `b` faces -x with its front plane at x = 0.60, where an inside corner is
 def corner(width: float) -> list[MeasuredObject]:
     a = door("a", (0.0, -1.0), (0.63 - width / 2, 0.0), width)
     b = door("b", (-1.0, 0.0), (0.60, -0.22), 0.5)
@@ -48,10 +48,10 @@ def corner(width: float) -> list[MeasuredObject]:
 def test_a_door_does_not_reach_behind_the_run_it_meets() -> None:
     a, b = leave_fillers(corner(0.63))
     assert right_edge(a)[0] == pytest.approx(0.60 - Params().width_m, abs=1e-9)
-    assert a.front_centre[1] == pytest.approx(0.0, abs=1e-9)  # the plane stays
+    assert a.front_centre[1] == pytest.approx(0.0, abs=1e-9)  # the plane is unchanged
     assert a.sources == ("inferred", "inferred", "measured")
     assert "80 mm" in a.warnings[0]
-    assert b.dimensions_m[0] < 0.5  # its own edge ran into the plane of `a` as well
+    assert b.dimensions_m[0] < 0.5  # its own edge extended into the plane of `a` as well
 
 
 def test_a_diagonal_unit_leaves_its_neighbour_as_wide_as_it_is() -> None:

@@ -1,4 +1,4 @@
-"""Every line of the fixture table, all the way: built, written as URDF, MJCF and USD, linted, loaded and opened."""
+"""Every line of the fixture table end to end: built, written as URDF, MJCF and USD, linted, loaded and opened."""
 
 from pathlib import Path
 
@@ -39,7 +39,7 @@ PARTS = {
 
 @pytest.fixture(scope="module")
 def every_fixture() -> ArticulatedScene:
-    """Two metres apart, each at its usual size, standing on the floor."""
+    """Fixtures two metres apart, each at its usual size, standing on the floor."""
     return built(
         *(Unit(s.name, s.name, (2.0 * k, 0, s.height.usual / 2), s.usual_m, kind="appliance") for k, s in enumerate(BUILT))
     )
@@ -73,7 +73,7 @@ def test_what_opens_opens_onto_room(folder: Path) -> None:
 
 def test_every_fixture_is_written_without_a_finding(folder: Path) -> None:
     found = [f for f in lint(folder) if "preview" not in f.message]
-    assert {f.rule for f in found} == {"hinge-unsure"}  # not one of the doors here has a handle
+    assert {f.rule for f in found} == {"hinge-unsure"}  # none of the doors here has a handle
 
 
 def test_nothing_of_a_fixture_touches_at_rest_or_on_its_way(every_fixture: ArticulatedScene) -> None:

@@ -1,4 +1,4 @@
-"""Whole kitchens of other shapes: L, U, an island, two rows. Measured with noise; compared with where things truly are."""
+"""Whole kitchens of other layouts (L, U, island, two rows), measured with noise and compared with the true positions."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,7 +15,7 @@ DEPTH, WIDTH, GAP = 0.58, 0.5, 0.003
 
 
 def run(name: str, start: tuple[float, float], yaw: float, kinds: Sequence[str], *, z: float = 0.5) -> list[Unit]:
-    """Units side by side from `start`, the left end of the front line, to the right of a person who faces them."""
+    """Units side by side from `start`, the left end of the front line, to the right as seen from the front."""
     right = np.array([np.cos(yaw), np.sin(yaw)])
     into = np.array([-np.sin(yaw), np.cos(yaw)])
     units = []
@@ -29,7 +29,7 @@ def run(name: str, start: tuple[float, float], yaw: float, kinds: Sequence[str],
 
 
 def measured(units: Sequence[Unit], rng: np.random.Generator, noise_m: float = 0.002) -> list[Unit]:
-    """The units as a scan would place them: edges off by 2-3 mm, turned by half a degree, unseen backs 2 cm too deep."""
+    """The units as a scan would place them: edges off by 2-3 mm, yaw off by half a degree, unseen backs 2 cm too deep."""
     noisy = []
     for unit in units:
         deeper = np.array([-np.sin(unit.yaw), np.cos(unit.yaw), 0.0]) * 0.01

@@ -19,7 +19,7 @@ FRONT = Unit("front", "sliding_door", (0, 0, 0.5), (WIDTH_M, 0.58, 0.74), handle
 
 
 def rear(track_m: float = TRACK_M, **more: object) -> Unit:
-    """The leaf behind: the camera sees what the one in front leaves of it."""
+    """The rear leaf: the camera sees the part not covered by the front one."""
     seen = WIDTH_M - OVERLAP_M
     return Unit("rear", "sliding_door", ((WIDTH_M + seen) / 2, track_m / 2, 0.5), (seen, 0.58 - track_m, 0.74), **more)  # type: ignore[arg-type]
 
@@ -52,7 +52,7 @@ def test_each_leaf_slides_along_the_front_over_the_other_until_it_covers_it(scen
         np.testing.assert_allclose(joint.axis_object, [towards, 0.0, 0.0])
         assert joint.upper == pytest.approx(WIDTH_M - OVERLAP_M, abs=0.004)
         assert joint.sources["axis"] == "inferred"
-        assert joint.sources["limits"] == "default"  # nothing was in its way
+        assert joint.sources["limits"] == "default"  # no obstacle in its way
 
 
 def test_the_edge_that_nobody_saw_lies_where_a_leaf_as_wide_as_the_other_ends(scene: ArticulatedScene) -> None:
@@ -105,7 +105,7 @@ def test_a_rear_leaf_that_was_cut_to_its_panel_is_as_high_as_the_front_one_and_r
     assert item.dimensions_m[0] == pytest.approx(WIDTH_M, abs=0.004)
     grip = next(box for box in item.links[1].boxes if box.role == "handle")
     at = item.world_from_object.apply(grip.link_from_box.translation)
-    assert at[[0, 2]] == pytest.approx([x + 0.03 + 0.22, z - 0.04 + 0.1], abs=0.004)  # where it was seen
+    assert at[[0, 2]] == pytest.approx([x + 0.03 + 0.22, z - 0.04 + 0.1], abs=0.004)  # where it was observed
     assert min(joint.upper for each in scene.objects[:2] for joint in each.joints) > 0.5
 
 

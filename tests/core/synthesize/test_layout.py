@@ -43,7 +43,7 @@ def test_a_run_becomes_coplanar_and_parallel() -> None:
     yaws = np.array([np.arctan2(o.outward[1], o.outward[0]) for o in layout.objects])
     assert np.ptp(fronts) < 1e-6
     assert np.ptp(yaws) < 1e-9
-    assert abs(yaws[0] + np.pi / 2) < np.deg2rad(0.35)  # five fronts over 2 m, 4 mm noise each
+    assert abs(yaws[0] + np.pi / 2) < np.deg2rad(0.35)  # five fronts over 2 m, 4 mm of noise each
     assert max(layout.moves_m.values()) < 0.015
 
 

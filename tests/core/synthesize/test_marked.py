@@ -1,4 +1,4 @@
-"""States that a person marks move those that were measured."""
+"""States marked by a person adjust the measured ones."""
 
 import numpy as np
 import pytest
@@ -44,8 +44,8 @@ def test_closed_here_moves_the_zero_of_every_frame() -> None:
     assert values(moved) == {0: 0.0, 5: pytest.approx(0.9, abs=0.005), 9: None}
     assert moved is not None
     assert moved.largest == pytest.approx(0.9, abs=0.005)
-    assert moved.states[0].sigma is None  # a person's word
-    assert moved.stop_seen  # it was held still where it was, wherever that is
+    assert moved.states[0].sigma is None  # marks of a person have no uncertainty
+    assert moved.stop_seen  # it was held still at that position
 
 
 def test_two_marks_give_the_scale_too() -> None:
@@ -97,6 +97,6 @@ def test_of_what_was_not_measured_the_marks_are_all_that_is_known() -> None:
     assert motion is not None
     assert (values(motion), motion.source, motion.covariance) == ({7: 0.0, 30: 2.0}, "person", None)
     np.testing.assert_allclose(np.abs(motion.axis_world), [0, 0, 1], atol=1e-9)
-    assert item.joints[0].upper == 2.0  # it was seen to open further than its category does
+    assert item.joints[0].upper == 2.0  # it was seen to open further than its category's usual limit
     assert item.joints[0].sources["limits"] == "at_least"
     assert any("corrections of a joint lid were not used" in line for line in item.warnings)

@@ -1,4 +1,4 @@
-"""Every number of the physics has a source, and what is built weighs and resists what such things do."""
+"""Every physical parameter has a source, and the resulting masses and forces are realistic."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_every_fixture_is_built_of_what_the_table_says(category: Category) -> No
     parts = built_of(category).parts
     assert {part.density_kg_m3 for part in parts} == {category.material.density_kg_m3}
     least, most = category.material.weight_kg or (0.0, np.inf)
-    if category.name not in ("freezer", "side_by_side_refrigerator"):  # lower and wider than their material's usual whole one
+    if category.name not in ("freezer", "side_by_side_refrigerator"):  # lower and wider than the usual unit of their material
         assert least <= sum(inertial_of_boxes(part.boxes, part.density_kg_m3).mass_kg for part in parts) <= most
 
 
@@ -52,7 +52,7 @@ def test_one_hand_opens_a_joint_slowly_and_a_released_one_is_slowed(name: str) -
     assert (feel.friction + feel.damping * speed) / lever < ONE_HAND_N / 2
     assert feel.friction > 0.0
     assert feel.damping > 0.0
-    assert ONE_HAND_N * lever < feel.effort < 100.0  # a limit that a hand does not reach, and that means something
+    assert ONE_HAND_N * lever < feel.effort < 100.0  # a limit that a hand does not reach, yet a finite one
 
 
 @pytest.mark.parametrize("edge_m", [0.01, 0.09, 0.5])

@@ -1,4 +1,4 @@
-"""What fails in a step that all objects go through stays with the one it failed for, and is said in one line."""
+"""A failure in a step shared by all objects affects only the object it failed for, and is reported in one line."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,7 +20,7 @@ MUG = Unit("mug", "mug", (0.335, 3.0, 0.05), (0.1, 0.1, 0.1), kind="thing")
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, when: Callable[..., bool]) -> None:
-    """The module's function fails where it is called with what `when` says."""
+    """Make the module's function fail if `when` is true for its arguments."""
     real = getattr(module, name)
 
     def fails(*inputs: Any, **settings: Any) -> Any:
@@ -32,7 +32,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, when: Calla
 
 
 def named(scene: ArticulatedScene, what: str) -> set[str]:
-    """Who carries a warning about it, each with the reason."""
+    """Objects with a warning about it, each with the reason."""
     lines = {item.name: [line for line in item.warnings if what in line] for item in scene.objects}
     assert all("LinAlgError: SVD did not converge" in line for found in lines.values() for line in found)
     return {name for name, found in lines.items() if found}

@@ -1,4 +1,4 @@
-"""The least change of all faces together: what gives way, what holds, and that the frame does not matter."""
+"""Least change of all faces together: soft and hard bounds, independent of the frame."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -12,7 +12,7 @@ from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.solve import Face, Tie, solved
 
 GAP_M = 0.002
-ATOL = 1e-5  # what a bound may give where it must
+ATOL = 1e-5  # tolerance of a bound
 
 
 def item(name: str, centre: tuple[float, float, float], *, category: str = "cabinet", fixed: bool = False) -> MeasuredObject:

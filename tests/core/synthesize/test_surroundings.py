@@ -26,14 +26,14 @@ FRIDGE = Unit("fridge", "fridge", (-0.61, -0.02, 0.9), (0.6, 0.6, 1.8), handle=H
 WALL_UNIT = Unit("wall_unit", "wall_cabinet", (0.0, 0.1, 1.7), (0.6, 0.35, 0.7), handle=Handle(0.24, -0.2))
 BOTTLE = Unit("bottle", "bottle", (0.9, 0.0, 1.012), (0.08, 0.08, 0.23), kind="thing")
 RUN = (CAB_L, CAB_R, UPPER, LOWER, FRIDGE, WALL_UNIT)
-WORKTOP = ((-0.3, -0.295, 0.86), (1.506, 0.28, 0.892))  # 15 mm over the fronts
+WORKTOP = ((-0.3, -0.295, 0.86), (1.506, 0.28, 0.892))  # 15 mm beyond the fronts
 PLINTH = ((-0.3, -0.22, 0.0), (1.506, -0.2, 0.1))
 BEHIND = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=-0.30, area_m2=5.0)
 BROWN = (150, 90, 30)
 
 
 def scanned(*solids: tuple[Corner, Corner]) -> Capture:
-    """A capture whose surface is these boxes, cut into faces of centimetres as a fused scan is."""
+    """A capture whose surface is these boxes, divided into faces of centimetres like a fused scan."""
     from trimesh import Trimesh
     from trimesh.util import concatenate
 
@@ -74,8 +74,8 @@ def test_a_worktop_that_nobody_clicked_lies_on_the_units_at_the_scanned_height()
     (counter,) = of(kitchen(), "counter")
     low, high = bounds(counter)
     np.testing.assert_allclose(high[2], 0.892, atol=1e-3)
-    np.testing.assert_allclose(low[2], 0.852, atol=1e-3)  # the units' tops, and what keeps them apart
-    np.testing.assert_allclose(low[1], -0.295, atol=0.006)  # hangs over the fronts as the scan shows
+    np.testing.assert_allclose(low[2], 0.852, atol=1e-3)  # the units' tops, and the gap between them
+    np.testing.assert_allclose(low[1], -0.295, atol=0.006)  # overhangs the fronts as in the scan
     np.testing.assert_allclose(high[1], 0.30, atol=0.002)  # the wall
     np.testing.assert_allclose([low[0], high[0]], [-0.3, 1.506], atol=0.02)  # not over the refrigerator
     np.testing.assert_allclose(counter.links[0].colour, np.array(BROWN) / 255, atol=0.01)
@@ -121,7 +121,7 @@ def test_the_fit_leaves_them_as_they_are() -> None:
     "solids",
     [
         (),
-        (((0.2, -0.1, 0.86), (0.45, 0.15, 0.9)),),  # a tray: level, but no worktop
+        (((0.2, -0.1, 0.86), (0.45, 0.15, 0.9)),),  # a tray: level, but not a worktop
         (((-0.3, -0.28, 1.1), (1.5, 0.28, 1.12)),),  # a shelf
     ],
 )
@@ -161,7 +161,7 @@ def test_counters_of_two_runs_meet_at_the_corner_without_overlap() -> None:
     along = ((-0.3, -0.295, 0.86), (1.6, 0.28, 0.892))
     scene = built((CAB_L, CAB_R, UPPER, LOWER, *side), scanned(along, top_2))
     first, second = (bounds(o) for o in of(scene, "counter"))
-    assert first[1][0] > 2.09  # the longer run takes the corner
+    assert first[1][0] > 2.09  # the longer run includes the corner
     gap = first[0][1] - second[1][1]
     assert 0 < gap < 0.01
     assert deepest_contact(compile_scene(scene)) < 5e-4

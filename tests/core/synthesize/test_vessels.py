@@ -1,4 +1,4 @@
-"""A mug with a handle, made of solids: its colliders leave its hollow open and stay inside its walls."""
+"""A mug with a handle, made of solids: its colliders keep its cavity open and stay inside its walls."""
 
 import manifold3d
 import numpy as np

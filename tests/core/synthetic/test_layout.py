@@ -1,4 +1,4 @@
-"""Facts about the kitchens of many seeds that need no picture."""
+"""Properties of the kitchens of many seeds that need no rendering."""
 
 import itertools
 
@@ -87,7 +87,7 @@ def test_the_walk_stays_in_the_room_and_shows_every_object_often(kitchen: Kitche
     assert distance.min() > 0.8
     assert distance.max() < 2.6
     speed = np.linalg.norm(np.diff(eyes, axis=0), axis=1) / (shots[1].timestamp_s - shots[0].timestamp_s)
-    assert speed.max() < 2.0  # m/s: a person walks
+    assert speed.max() < 2.0  # m/s: walking speed
     objects = true_objects(kitchen)
     of_all = np.concatenate([corners(thing) for thing in objects])
     whole = np.zeros(len(objects), int)
@@ -146,7 +146,7 @@ def test_a_ray_through_an_objects_pixel_ends_on_its_box(seed: int) -> None:
             assert (np.abs(local) < thing.dimensions_m / 2 + 0.004).all(), (
                 thing.name
             )  # the carcass is a gap wider than the front
-            # on the surface, not inside: bottles narrow towards their necks, feet stand back by 3 cm
+            # on the surface, not inside: bottles narrow towards their necks, feet are set back by 3 cm
             if thing.category != "bottle":
                 inside = (thing.dimensions_m / 2 - np.abs(local)).min(axis=1)
                 assert inside.max() < 0.04, thing.name

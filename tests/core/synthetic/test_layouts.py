@@ -1,4 +1,4 @@
-"""Kitchens of more than one run: where their units stand, what is in them, and how they are walked round."""
+"""Kitchens of several runs: positions and contents of their units, and the camera path around them."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def corners(thing: TrueObject) -> np.ndarray:
 
 
 def solids(kitchen: Kitchen) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Name, lowest and highest corner of every object's box; runs stand at right angles."""
+    """Name, lowest and highest corner of every object's box; runs are at right angles."""
     return [(thing.name, corners(thing).min(axis=0), corners(thing).max(axis=0)) for thing in true_objects(kitchen)]
 
 
@@ -41,7 +41,7 @@ def test_objects_have_names_of_their_own_and_boxes_that_keep_apart_in_the_room(k
         assert (high < [x_max + 1e-6, y_max + 1e-6, ceiling]).all(), name
         for other, other_low, other_high in boxes[i + 1 :]:
             if name.startswith("sliding") and other.startswith("sliding"):
-                continue  # one stands behind the other: the box of each reaches to the wall
+                continue  # one is behind the other: the box of each reaches to the wall
             assert np.maximum(low - other_high, other_low - high).max() > -1e-6, (name, other)
 
 

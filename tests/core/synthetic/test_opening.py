@@ -1,4 +1,4 @@
-"""What is opened in a film stands in every frame where its joint says, and what is seen behind it is as deep as it says."""
+"""Filmed openings: every frame shows the joint's true state, and the interior has the true depth."""
 
 import json
 import zipfile
@@ -36,7 +36,7 @@ def film_of(seed: int, layout: str | None) -> Film:
 
 
 def front_to_rear(film: Film, front: Front) -> float:
-    """Metres from the back of a closed front straight in, to the furthest surface of its drawer or of its compartment."""
+    """Metres from the back of a closed front straight in, to the farthest surface of its drawer or of its compartment."""
     import open3d as o3d
 
     hollow = film.hollows[front.hollow_key]
@@ -67,7 +67,7 @@ def test_films_open_all_kinds_of_fronts_in_turn_together_from_the_start_and_to_t
         assert 1 <= (states[-1] > 0).sum() <= 2
         assert (states[int(0.2 * FRAMES) : int(0.4 * FRAMES)] == 0).all()
         together += bool(((states > 0).sum(axis=1) >= 2).any())
-    assert together >= len(films) - 1  # fronts that one view shows and that keep clear of each other are not everywhere
+    assert together >= len(films) - 1  # not every kitchen has fronts that one view shows and that do not collide
 
 
 def test_a_front_opens_no_further_than_its_joint_and_is_still_only_there(film: Film) -> None:
@@ -79,7 +79,7 @@ def test_a_front_opens_no_further_than_its_joint_and_is_still_only_there(film: F
 def test_insides_are_as_deep_as_they_say(film: Film) -> None:
     for opening in film.openings:
         front = film.fronts[opening.joint]
-        if front.owner == "microwave":  # it stands askew on the worktop
+        if front.owner == "microwave":  # it stands rotated on the worktop
             continue
         assert front_to_rear(film, front) == pytest.approx(film.hollows[front.hollow_key].inside.depth_m, abs=2e-3)
 

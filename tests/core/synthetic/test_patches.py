@@ -1,4 +1,4 @@
-"""Closed bodies enclose their volume with a positive sign: their faces look outwards, or the renderer would drop them."""
+"""Closed bodies have a positive signed volume: their faces point outwards, otherwise the renderer would drop them."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_a_turned_box_keeps_its_volume() -> None:
 
 def test_a_lathe_encloses_the_cylinder_of_its_profile() -> None:
     body = lathe((0.3, -0.2, 0.9), [(0.0, 0.3), (0.05, 0.3), (0.05, 0.0), (0.0, 0.0)], PAINT, sides=64)
-    assert enclosed_volume([body]) == pytest.approx(np.pi * 0.05**2 * 0.3, rel=0.01)  # a 64-gon for a circle
+    assert enclosed_volume([body]) == pytest.approx(np.pi * 0.05**2 * 0.3, rel=0.01)  # a 64-gon instead of a circle
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.05, -0.05])

@@ -1,4 +1,4 @@
-"""Kitchens in a style and a palette of one's choice."""
+"""Kitchens in a chosen style and palette."""
 
 import hashlib
 from typing import NamedTuple
@@ -24,7 +24,7 @@ from r2c2r_core.synthetic.styled import plan_styled_kitchen
 from r2c2r_core.synthetic.truth import true_objects
 
 SEEDS = range(4)
-WITHOUT_CHOICE = {  # of the surfaces drawn before styles could be chosen
+WITHOUT_CHOICE = {  # digests of the surfaces drawn before styles could be chosen
     0: "ebdf1a791bf39d2e",
     1: "ecbe5dafe3c51e8a",
     3: "8351896a3c746b80",
@@ -43,7 +43,7 @@ def leaves(kitchen: Kitchen) -> list[tuple[Furniture, Leaf]]:
 
 
 def digest(patches: list[Patch]) -> str:
-    """Of geometry to a micrometre, paints and owners."""
+    """Digest of geometry to a micrometre, paints and owners."""
     content = hashlib.sha256()
     for patch in patches:
         size, colour = np.round(patch.size_m, 6).tolist(), np.round(patch.paint.colour, 6).tolist()
@@ -88,7 +88,7 @@ def test_handles_are_those_of_the_style_and_stand_on_the_opening_side() -> None:
     assert kinds["knobs"] == kinds["framed"] == {"knob"}
     assert kinds["cup"] == {"cup", "knob"}
     assert kinds["slab"] <= {"bar", "bow", "flat"}
-    assert 0 < np.mean(level) < 0.25  # of doors with a handle: it lies in the middle and says nothing of the hinge
+    assert 0 < np.mean(level) < 0.25  # fraction of doors with a centred handle, which does not indicate the hinge
 
 
 def test_frames_and_panes_are_where_the_style_has_them(kitchen: Kitchen, request: pytest.FixtureRequest) -> None:
@@ -165,7 +165,7 @@ def test_the_same_choice_gives_the_same_kitchen() -> None:
 
 
 class Pane(NamedTuple):
-    """A glazed unit of a kitchen, lit, and what a camera a metre before its first pane sees."""
+    """A glazed unit of a kitchen, lit, and the view of a camera one metre before its first pane."""
 
     kitchen: Kitchen
     unit: Furniture
@@ -210,5 +210,5 @@ def test_light_passes_through_a_clear_pane(pane: Pane) -> None:
     bare = render_view(without, pane.camera, pane.camera_from_kitchen).colour.mean(axis=2) + 1.0
     share = (pane.view.colour.mean(axis=2) + 1.0) / bare
     glass = np.array([patch.paint.kind == "glass" for patch in pane.patches])[pane.view.patch]
-    # what a pane passes, against what is beside it: panes change the exposure of the whole
+    # light through a pane relative to its surroundings: panes change the exposure of the whole
     assert np.median(share[80:112, 112:144]) / np.median(share[~glass]) == pytest.approx(0.86, abs=0.05)

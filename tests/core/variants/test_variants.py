@@ -84,7 +84,7 @@ def test_a_stretched_object_keeps_its_front_and_its_underside(bundle: Path, tmp_
     assert low_after[1] == pytest.approx(low[1], abs=2e-3)  # the front board's own thickness grows by 5 % of 18 mm
     assert low_after[2] == pytest.approx(low[2], abs=1e-6)
     grip, grip_after = (_grip(model) for model in (before, after))
-    np.testing.assert_allclose(grip_after, grip * change.scale, rtol=1e-6)  # the site's own axes are others: x is upright
+    np.testing.assert_allclose(grip_after, grip * change.scale, rtol=1e-6)  # the site has other axes: x is vertical
     mass, mass_after = (model.body("cabinet_1_base").mass[0] for model in (before, after))
     assert mass_after == pytest.approx(1.2 * 1.01 * 1.05 * 0.98 * mass)
 
@@ -134,7 +134,7 @@ def test_a_bundle_whose_parts_overlap_has_no_variants(bundle: Path, tmp_path: Pa
 
 
 def _grip(model: object) -> np.ndarray:
-    """Sides of the cabinet's handle, in its door's frame."""
+    """Side lengths of the cabinet's handle, in its door's frame."""
     part = part_of(model, "cabinet_1_hinge")
     assert part is not None
     assert part.bar is not None
@@ -142,7 +142,7 @@ def _grip(model: object) -> np.ndarray:
 
 
 def _box(model: object) -> tuple[np.ndarray, np.ndarray]:
-    """The ends of the cabinet's colliders in the world; it stands unturned."""
+    """Extent of the cabinet's colliders in the world; it is not rotated."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     own = [g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name.startswith("cabinet_1")]  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""The front face of a mesh, where a frame, a sunk panel, a handle and noise compete for it."""
+"""Front face of a mesh with a frame, a recessed panel, a handle and noise."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def shaker(sunk_m: float, frame_m: float = 0.06) -> tuple[np.ndarray, np.ndarray
 
 
 def turned(vertices: np.ndarray, degrees: float) -> np.ndarray:
-    """A lean about x and a turn about z, both by the angle."""
+    """The vertices tilted about x and rotated about z, both by the angle."""
     a = np.deg2rad(degrees)
     lean = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
     turn = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
@@ -40,7 +40,7 @@ def test_the_frame_of_a_shaker_door_is_its_front_however_large_the_panel(sunk_m:
     assert found is not None
     x, z = WIDTH / 2, HEIGHT / 2
     corners = turned(np.array([[x, FRONT_Y, z], [-x, FRONT_Y, z], [-x, FRONT_Y, -z], [x, FRONT_Y, -z]]), degrees)
-    np.testing.assert_allclose(found.corners, corners, atol=1.5e-3)  # the samples' edge, where no vertex says better
+    np.testing.assert_allclose(found.corners, corners, atol=1.5e-3)  # accuracy of the samples' edge, where no vertex is nearer
 
 
 def test_noise_on_the_surface_moves_the_front_by_less_than_itself() -> None:
@@ -63,7 +63,7 @@ def test_what_looks_nowhere_forwards_has_no_front() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_sliver_along_an_edge_of_the_front_belongs_to_it(seed: int) -> None:
-    # As a cut leaves it: a strip of the same plane, in faces of its own; most of the surface is elsewhere
+    # As after a cut: a strip of the same plane, in separate faces; most of the surface is elsewhere
     x, y, top = 0.3, -4.0, 1.7
     body = block((-x, y, 0.0), (x, -y, top))
     strip = np.array([[-x, y, top], [x, y, top], [x, y, top + 0.0065], [-x, y, top + 0.0065]])

@@ -218,5 +218,5 @@ def test_the_papers_map_can_be_chosen_and_keeps_the_depth_that_ours_fits() -> No
     backs = [in_object(item, 0).vertices[:, 1].max() - item.dimensions_m[1] / 2 for item in (ours, paper)]
     assert backs[0] == pytest.approx(0.0, abs=1e-6)
     assert backs[1] < -0.01
-    for item in (ours, paper):  # a box's corners form a rectangle, which the affine map hits
+    for item in (ours, paper):  # a box's corners form a rectangle, which the affine map reproduces exactly
         assert item.warp_residual_paper_m == pytest.approx(0.0, abs=1e-9)

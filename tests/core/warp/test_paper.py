@@ -1,4 +1,4 @@
-"""The paper's corners and affine map, as printed: what they do exactly, and what they leave over."""
+"""The paper's corners and affine map, as printed: exact cases, and their residuals."""
 
 import numpy as np
 import pytest

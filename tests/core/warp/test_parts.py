@@ -1,4 +1,4 @@
-"""A mesh cut into fronts and a hollow carcass by the roles of the primitive's boards, whatever their names."""
+"""Division of a mesh into fronts and a hollow carcass by the roles of the primitive's boards, whatever their names."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def unit(category: str, size: tuple[float, float, float] = (0.6, 0.58, 0.7)) -> 
 
 
 def renamed(item: SceneObject) -> SceneObject:
-    """The same unit whose boards have names of somebody else's."""
+    """The same unit with renamed boards."""
     called = {"back": "rear", "left": "port", "front": "leaf", "top": "lid"}
 
     def other(box: Box) -> Box:
@@ -33,7 +33,7 @@ def renamed(item: SceneObject) -> SceneObject:
 
 
 def cut(item: SceneObject) -> dict[str, TexturedMesh]:
-    """A closed box of the unit's size, cut as the unit is."""
+    """A closed box of the unit's size, divided like the unit."""
     vertices, faces = box_mesh(-item.dimensions_m / 2, item.dimensions_m / 2)
     mesh = TexturedMesh(
         vertices=vertices, faces=faces, uv=np.full((len(vertices), 2), 0.5), texture=np.full((8, 8, 3), 90, np.uint8)
@@ -57,7 +57,7 @@ def test_the_inside_lies_between_the_boards() -> None:
     low, high = cavity(item)
     np.testing.assert_allclose(high, [x - WALL_M, y - WALL_M, z - WALL_M], atol=1e-9)
     np.testing.assert_allclose(low[[0, 2]], [WALL_M - x, WALL_M - z], atol=1e-9)
-    assert low[1] == pytest.approx(-y + FRONT_M, abs=1e-9)  # right behind the door
+    assert low[1] == pytest.approx(-y + FRONT_M, abs=1e-9)  # directly behind the door
 
 
 @pytest.mark.parametrize("axis_sign", [(0, -1), (0, 1), (1, 1), (2, -1), (2, 1)])
@@ -97,7 +97,7 @@ def test_fronts_reach_to_the_units_edge_and_stop_at_their_seam() -> None:
     left, right = (front_region(item, link) for link in item.links[1:])
     assert left.low[0] < -1 < 1 < right.high[0]  # the mesh's own edge, wherever it ends
     assert right.low[0] - left.high[0] == pytest.approx(0.003, abs=1e-9)
-    assert left.low[1] < -1  # the handle, however far it stands out
+    assert left.low[1] < -1  # the handle, however far it protrudes
     assert left.high[1] == pytest.approx(-item.dimensions_m[1] / 2 + FRONT_M, abs=1e-9)
 
 

@@ -22,7 +22,7 @@ def test_the_glb_is_y_up_and_holds_every_link_where_it_stands(tmp_path: Path) ->
     assert {f"{body.name}_vis" for body in plan.bodies} == set(scene.geometry)
     corners = np.concatenate([c for body in plan.bodies if body.link.visual is None for c in collider_corners_world(body)])
     turned = corners @ Y_UP_FROM_WORLD[:3, :3].T
-    assert scene.bounds[0][1] == pytest.approx(turned[:, 1].min(), abs=2e-3)  # metres; the bottle's mesh is its own
+    assert scene.bounds[0][1] == pytest.approx(turned[:, 1].min(), abs=2e-3)  # metres; the bottle has its own mesh
     for body in plan.bodies:
         pose, _ = scene.graph.get(body.name)
         np.testing.assert_allclose(pose, Y_UP_FROM_WORLD @ body.world_from_body.matrix, atol=1e-6)

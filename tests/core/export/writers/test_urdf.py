@@ -1,4 +1,4 @@
-"""scene.urdf against a golden file, compared by meaning: element by element, numbers within 1e-6."""
+"""scene.urdf compared semantically with a golden file: element by element, numbers within 1e-6."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""scene.usda as the USD library reads it, against the plan it was written from."""
+"""scene.usda as the USD library reads it, compared with the plan it was written from."""
 
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,7 @@ def frame(position: Any, rotation: Any) -> Rigid3:
 
 
 def along_x(kind: str, value: float) -> Rigid3:
-    """What a joint of USD's axis X does at a position in metres or degrees."""
+    """Transform of a joint along or about USD's X axis, at a position in metres or degrees."""
     if kind == "PhysicsPrismaticJoint":
         return Rigid3(np.eye(3), np.array([value, 0.0, 0.0]))
     c, s = np.cos(np.radians(value)), np.sin(np.radians(value))

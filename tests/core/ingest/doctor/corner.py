@@ -1,4 +1,4 @@
-"""Views of a corner of a room, ray cast exactly: a floor, two walls and a box before them."""
+"""Exact ray-cast views of a corner of a room: a floor, two walls and a box before them."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,7 +13,7 @@ _UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 def poses(count: int) -> list[Rigid3]:
-    """A camera carried 1.6 m along the corner while it turns and nods a little."""
+    """Poses of a camera carried 1.6 m along the corner while it turns and nods a little."""
     share = np.linspace(0, 1, count)
     turns = Rotation.from_euler("zx", np.column_stack([25 - 55 * share, -12 + 8 * np.sin(9 * share)]), degrees=True)
     places = np.column_stack([-0.2 + 1.6 * share, -0.6 + 0.5 * share**2, 1.3 + 0.2 * np.sin(5 * share)])
@@ -34,7 +34,7 @@ def depth_at(pose: Rigid3) -> np.ndarray:
 
 
 def views_of(count: int = 12, seed: int = 0) -> Views:
-    """The views as they are stacked from a recording, their depth exact."""
+    """The views as stacked from a recording, with exact depth."""
     rng, placed = np.random.default_rng(seed), poses(count)
     depth = np.stack([depth_at(pose) for pose in placed])
     row, column = rng.integers(0, CAMERA.height, (count, 700)), rng.integers(0, CAMERA.width, (count, 700))

@@ -1,4 +1,4 @@
-"""Each usual mistake in reading a recording, made on purpose, is named; a recording without one is left alone."""
+"""Each usual mistake in interpreting a recording is identified; a correct recording is not flagged."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -77,7 +77,7 @@ def test_depth_of_another_scale_is_named_with_its_factor(factor: float) -> None:
     finding = find_scale(wrong, pairs)
     assert finding is not None
     assert finding.cause == "depth_scale"
-    assert finding.factor == pytest.approx(factor, rel=0.03)  # three hundredths of the step between tried scales and noise
+    assert finding.factor == pytest.approx(factor, rel=0.03)  # three hundredths: the step between tried scales, and noise
     assert finding.error_so_mm is not None
     assert finding.error_so_mm < 20
 

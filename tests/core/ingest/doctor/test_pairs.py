@@ -1,4 +1,4 @@
-"""How well views agree, on a corner whose depth and poses are exact."""
+"""Agreement between views, on a corner with exact depth and poses."""
 
 from dataclasses import replace
 
@@ -14,8 +14,8 @@ def test_views_of_one_surface_agree_and_less_so_the_farther_they_are_moved() -> 
     views = views_of()
     pairs = neighbours(views)
     exact = compare(views, pairs)
-    assert exact.agreement.mean() > 0.6  # the rest lies outside the neighbour's picture, or behind the box
-    assert exact.error_m.max() < 0.01  # a pixel of 160 covers 1 cm at 2 m, more where a surface is seen flatly
+    assert exact.agreement.mean() > 0.6  # the rest is outside the neighbour's picture, or behind the box
+    assert exact.error_m.max() < 0.01  # a pixel of 160 covers 1 cm at 2 m, more at grazing angles
     assert (exact.cost < 0.5).all()
     costs = [exact.cost.mean()]
     for off_m in (0.03, 0.1):

@@ -1,4 +1,4 @@
-"""Drawn photographs of an upright box before a tiled wall: a line on its front, no depth."""
+"""Synthetic photographs of an upright box before a tiled wall: a line on its front, no depth."""
 
 import cv2
 import numpy as np
@@ -11,7 +11,7 @@ from r2c2r_core.segment.appliances.edges import Photo
 CAMERA = Intrinsics(fx=700.0, fy=700.0, cx=320.0, cy=240.0, width=640, height=480)
 LEFT_M, RIGHT_M, BACK_M, BOTTOM_M, TOP_M = -0.25, 0.25, 0.36, -0.15, 0.15
 WALL_Y = 0.45
-LINE_Z = 0.11  # on its front, clearer than its upper edge
+LINE_Z = 0.11  # on its front, with more contrast than its upper edge
 TRUE = np.array([0.0, LEFT_M, RIGHT_M, 0.0, BACK_M, BOTTOM_M, TOP_M])
 EYES = [
     (-1.2, -1.3, 0.5),
@@ -29,7 +29,7 @@ Corners = list[tuple[float, float, float]]
 def photo(
     eye: tuple[float, float, float], body_grey: int = 60, *, side_grey: int = 50, tiles: bool = True, hidden: bool = False
 ) -> Photo:
-    """What a camera at `eye` shows of the box; `hidden`: depth says that something stands in front."""
+    """Photograph of the box from a camera at `eye`; `hidden`: depth shows an occlusion in front."""
     pose = looking_at_the_box(np.array(eye))
     rgb = np.full((CAMERA.height, CAMERA.width, 3), 200, np.uint8)
 
@@ -53,7 +53,7 @@ def photo(
 
 
 def looking_at_the_box(eye: np.ndarray) -> Rigid3:
-    """World from a camera there."""
+    """World pose of a camera there, looking at the box."""
     forward = -eye / np.linalg.norm(eye)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)

@@ -1,4 +1,4 @@
-"""Which edges of a box a photograph is asked for, and how candidates are weighed."""
+"""Selection of a box's edges for a photograph, and weights of edge candidates."""
 
 import numpy as np
 import pytest
@@ -8,11 +8,11 @@ from r2c2r_core.segment.appliances.edges import LEFT, EdgeView, associate, displ
 from tests.core.segment.appliances.drawn import CAMERA, EYES, TRUE, photo
 
 HERE = Rigid3(np.eye(3), np.zeros(3))
-BACK_LEFT, BACK_RIGHT = {6, 7, 8}, {9, 10, 11}  # three parts an edge
+BACK_LEFT, BACK_RIGHT = {6, 7, 8}, {9, 10, 11}  # three parts per edge
 
 
 def candidates(places_px: list[float], contrasts: list[float]) -> EdgeView:
-    """One part of an edge, a pixel of which is 2 mm."""
+    """One part of an edge, at 2 mm per pixel."""
     one = np.zeros((1, 2, 2))
     peaks, heights = np.array([places_px]), np.array([contrasts])
     return EdgeView(CAMERA, HERE, np.array([0]), one, np.array([[1.0, 0.0]]), np.array([0.002]), peaks, heights)

@@ -1,4 +1,4 @@
-"""What depth says of a box: the patches on its faces, where a side ends, and what the frames look through."""
+"""Depth evidence for a box: patches on its faces, ends of a side, and free space seen by the frames."""
 
 from types import SimpleNamespace
 from typing import cast
@@ -16,14 +16,14 @@ from r2c2r_core.segment.surface import parts_of
 from tests.core.segment.appliances.drawn import TRUE
 
 HERE = Rigid3(np.eye(3), np.zeros(3))
-DEEP = TRUE + np.array([0, 0, 0, 0, 0.09, 0, 0])  # to the wall
+DEEP = TRUE + np.array([0, 0, 0, 0, 0.09, 0, 0])  # extended to the wall
 CELL_M = 0.01
 CAMERA = Intrinsics(fx=200.0, fy=200.0, cx=128.0, cy=96.0, width=256, height=192)
 Span = tuple[float, float]
 
 
 def sheet(axis: int, at: float, first: Span, second: Span, outward: float) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and faces of a flat piece across an axis, which faces along it (1) or against it (-1)."""
+    """Vertices and faces of a flat piece normal to an axis, facing along it (1) or against it (-1)."""
     rows, columns = (np.arange(low, high + CELL_M / 2, CELL_M) for low, high in (first, second))
     grid = np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
     vertices = np.insert(grid, axis, at, axis=1)

@@ -1,4 +1,4 @@
-"""Which plane a click on an appliance means."""
+"""Choice of the plane for a click on an appliance."""
 
 from types import SimpleNamespace
 from typing import Any, cast
@@ -15,7 +15,7 @@ from r2c2r_core.segment.prepared import PreparedCapture
 
 
 def plane(centre: tuple[float, float, float], outward: tuple[float, float], width_m: float, height_m: float) -> PlaneRegion:
-    """All of it seen; `outward` in plan."""
+    """A fully observed plane; `outward` in plan."""
     normal = np.array([*outward, 0.0]) / np.hypot(*outward)
     shape = (round(height_m / 0.02), round(width_m / 0.02))
     pose = Rigid3(front_rotation(normal), np.array(centre))
@@ -24,13 +24,13 @@ def plane(centre: tuple[float, float, float], outward: tuple[float, float], widt
 
 FRONT = plane((0.0, 0.0, 0.87), (0.0, -1.0), 0.60, 1.74)
 SIDE = plane((-0.32, 0.33, 0.87), (-1.0, 0.0), 0.60, 1.74)
-ROUNDED = plane((-0.30, 0.02, 0.87), (-0.5, -1.0), 0.06, 1.60)  # what fusion makes of the edge between them
+ROUNDED = plane((-0.30, 0.02, 0.87), (-0.5, -1.0), 0.06, 1.60)  # from fusion of the edge between them
 
 
 def asked_for(
     point: Vector3, kind: str = "refrigerator", planes: tuple[PlaneRegion, ...] = (FRONT, SIDE, ROUNDED)
 ) -> PlaneRegion:
-    """The plane whose run a click on a refrigerator at a world point asks for."""
+    """The plane whose run a click on a refrigerator at a world point requests."""
     asked: list[PlaneRegion] = []
     camera = SimpleNamespace(world_from_camera=Rigid3(np.eye(3), np.array([-1.2, -1.6, 1.4])))
     centre = camera.world_from_camera.translation

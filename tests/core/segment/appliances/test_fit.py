@@ -1,4 +1,4 @@
-"""An appliance's box from drawn photographs and from depth on its faces, from guesses centimetres off."""
+"""Box fit of an appliance from synthetic photographs and depth on its faces, from initial guesses centimetres off."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_top_and_back_are_found_from_a_line_of_the_front_and_the_depth_of_the_wa
     start[[TOP, BACK]] = LINE_Z, 0.42
     found = solved(start, [photo(eye) for eye in EYES])
     assert found.box[TOP] == pytest.approx(TOP_M, abs=PIXEL_M)
-    assert found.box[BACK] == pytest.approx(BACK_M, abs=0.006)  # seen at a slant
+    assert found.box[BACK] == pytest.approx(BACK_M, abs=0.006)  # seen at a grazing angle
 
 
 def test_depths_that_are_unlike_are_judged_by_their_edges_at_the_finest_spread(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,7 +127,7 @@ def test_a_side_in_depth_tells_how_a_body_is_turned_whose_front_is_mostly_glass(
     points[40:, 0] += rng.normal(0, 0.003, 100)
     patches = Patches(points @ rotation_about_z(turn).T, np.repeat([1, 0], [40, 100]), np.repeat([FRONT, RIGHT], [40, 100]), {})
     found = solved(TRUE, [], patches=patches)
-    assert np.degrees(found.box[YAW]) == pytest.approx(turn_deg, abs=0.6)  # drawn a little to the plane that was found
+    assert np.degrees(found.box[YAW]) == pytest.approx(turn_deg, abs=0.6)  # slightly biased towards the found plane
     assert found.box[RIGHT] == pytest.approx(0.25, abs=0.004)
 
 

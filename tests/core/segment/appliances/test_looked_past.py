@@ -1,4 +1,4 @@
-"""Depth goes past a front's plane beside what it is the front of, and nowhere on it."""
+"""Depth beyond a front's plane, seen beside the front but never on it."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Where the faces of a rendered appliance end, from the depth pixels past them."""
+"""Ends of a rendered appliance's faces, from the depth pixels beyond them."""
 
 import numpy as np
 import pytest

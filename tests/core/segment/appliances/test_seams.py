@@ -1,4 +1,4 @@
-"""Where an appliance's doors may end above a drawer: the likeliest level line of its run first, each seam once."""
+"""Candidate seams between an appliance's doors and a drawer below: the likeliest level line of its run first, each once."""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -15,11 +15,11 @@ from r2c2r_core.segment.runs.run import Run
 
 CELL_M = 0.005
 FRONT = Cell(0, 0, 120, 360)  # 0.6 by 1.8 m
-LIKELIER, FAINTER = 240, 200  # rows, within the lower 60 % and over the lowest 15 %
+LIKELIER, FAINTER = 240, 200  # rows, within the lower 60 % and above the lowest 15 %
 
 
 def front(*rows: int) -> Front:
-    """A refrigerator whose run was parted at those rows."""
+    """A refrigerator whose run was cut at those rows."""
     faint = np.full((360 // STEP, 120 // STEP), -4, np.float32)
     level = faint.copy()
     level[FAINTER // STEP], level[LIKELIER // STEP] = 1, 4

@@ -1,4 +1,4 @@
-"""How likely a front's edges are right: what is faint, beside a rival, of one colour or hardly on a front is doubted."""
+"""Confidence of a front's edges: low for faint edges, near rivals, without contrast, or hardly on a front."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -15,7 +15,7 @@ from r2c2r_core.segment.runs.run import Run
 
 CELL_M = 0.0025
 PANEL = Cell(60, 60, 260, 300)
-ROWS, COLUMNS = 180, 160  # of the odds
+ROWS, COLUMNS = 180, 160  # size of the odds
 FAINT: dict[str, Callable[[Run], None]] = {
     "a part of its edge is unlikely": lambda run: run.odds.upright[30:60, 29:32].fill(-3),
     "a likely line is 3 cm within its edge": lambda run: run.odds.level[36, 30:130].fill(4),

@@ -1,4 +1,4 @@
-"""Clicks on fronts that return no light."""
+"""Clicks on fronts without depth returns."""
 
 from typing import Any, cast
 
@@ -16,7 +16,7 @@ WIDTH_M, HEIGHT_M = 1.7, 0.9
 
 
 class Film:
-    """As much of a scene as a click asks for."""
+    """The part of a scene that a click needs."""
 
     def __init__(self, *, glass: bool, dark_corner: bool = False) -> None:
         self._film = filmed("left", np.zeros(3), glass=glass)
@@ -42,7 +42,7 @@ class Film:
 
 
 def _plane(behind_m: float, *, hole: bool) -> PlaneRegion:
-    """A plane so far behind LEAF's face, with a hole where LEAF is."""
+    """A plane that far behind LEAF's face, with a hole at LEAF."""
     place = LEAF.world_from_front
     support = np.ones((round(HEIGHT_M / 0.02), round(WIDTH_M / 0.02)), bool)
     if hole:
@@ -82,7 +82,7 @@ def test_a_hole_that_goes_on_beyond_the_picture_is_no_front_s() -> None:
 
 
 def _band(top_m: float, bottom_m: float) -> PlaneRegion:
-    """What is seen of LEAF's face between two heights, over its middle."""
+    """The observed part of LEAF's face between two heights, across its middle."""
     place, height = LEAF.world_from_front, top_m - bottom_m
     origin = place.apply(np.array([0.0, 0.0, (top_m + bottom_m) / 2]))
     support = np.ones((round(height / 0.02), round(WIDTH_M / 0.02)), bool)

@@ -25,7 +25,7 @@ def prompted(category: str, front: DrawnFront) -> ObjectPrompt:
 
 
 def test_a_drawn_front_is_the_rectangle_to_the_tenth_of_a_millimetre(session: GeometricSession, boxes: Boxes) -> None:
-    # where no line is: half of one door and half of the next
+    # where there is no line: half of one door and half of the next
     front = drawn(boxes[0], 0.251, 0.7533, 0.1307, 0.8011)
     track = session.track(prompted("cabinet", front))
     panel = track.front
@@ -43,7 +43,7 @@ def test_its_masks_are_what_is_visible_of_it(session: GeometricSession, boxes: B
     assert set(track.masks) == {frame.index for frame in capture.frames}
     for frame in capture.frames:
         mask = session.mask_at(prompted("cabinet", drawn(capture, left, left + width, BOTTOM_M, TOP_M)), frame.index)
-        assert mask_iou(mask, truth["door_b"][frame.index]) > 0.94  # the post before it left out
+        assert mask_iou(mask, truth["door_b"][frame.index]) > 0.94  # without the post before it
 
 
 def test_its_handle_is_found_or_drawn_or_none(session: GeometricSession, boxes: Boxes) -> None:
@@ -100,7 +100,7 @@ def test_elevations_are_to_scale_in_the_recordings_own_world(session: GeometricS
     assert down[2] == pytest.approx(-1.0, abs=1e-3)
     assert first.picture.shape[1] == first.upright.clarity.shape[1]
     assert first.picture.shape[0] == first.level.clarity.shape[1]
-    # seams show in the profile that edges snap to
+    # seams are visible in the profile that edges snap to
     profile = first.upright.clarity.mean(axis=0)
     seams = [round((edge - corners[0, 0] + lefts[0, 0]) / first.cell_m) for edge in (0.5015, 1.0045)]
     assert all(profile[seam - 2 : seam + 3].max() > 3 * np.median(profile) + 10 for seam in seams)

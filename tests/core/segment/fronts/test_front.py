@@ -71,7 +71,7 @@ def test_an_edge_without_a_change_of_colour_is_unsure(session: GeometricSession,
     assert isinstance(found, FoundFront)
     assert min(edge_strengths(found.front)) > 0.5
     pale = dataclasses.replace(found.front.run, mosaic=np.full_like(found.front.run.mosaic, 200))
-    assert max(edge_strengths(dataclasses.replace(found.front, run=pale))) < 0.3  # as the run asks about it
+    assert max(edge_strengths(dataclasses.replace(found.front, run=pale))) < 0.3  # evaluated on the run's mosaic
 
 
 @pytest.mark.parametrize("name", DRAWERS)
@@ -80,7 +80,7 @@ def test_a_stack_is_cut_into_its_drawers(session: GeometricSession, boxes: Boxes
     panel = session.find(prompt(name, "drawer", click_on(boxes[0], (left + 0.1, FRONT_Y, bottom + 0.06), 60))).panel()
     assert panel is not None
     assert panel.width_m == pytest.approx(width, abs=3e-3)
-    assert panel.height_m == pytest.approx(height, abs=5e-3)  # a gap is a pixel: its two sides are not told apart
+    assert panel.height_m == pytest.approx(height, abs=5e-3)  # a gap is one pixel: its two sides are not distinguished
     assert panel.handle is not None
     assert not panel.handle.is_vertical
     np.testing.assert_allclose(panel.handle.centre, (0, 0), atol=8e-3)
@@ -106,7 +106,7 @@ def test_a_double_door_is_one_object_from_one_click(session: GeometricSession, b
     )
     assert single is not None
     assert double is not None
-    assert double.width_m == pytest.approx(1.003, abs=4e-3)  # doors a and b, whose handles meet
+    assert double.width_m == pytest.approx(1.003, abs=4e-3)  # doors a and b, whose handles are adjacent
     assert double.width_m > 1.9 * single.width_m
 
 
@@ -168,10 +168,10 @@ def test_two_names_on_one_panel_part_it_where_a_line_is(boxes: Boxes, cache: Pat
     run, apart = first.front.run, [session.panel(door) for door in doors]
     hits = [session.scene.pick(click.frame, click.x, click.y) for door in doors for click in door.points]
     cells = [cell for column, row in run.grid.cells_of(np.array(hits)) if (cell := run.cell_at(column, row)) is not None]
-    run.cells = (joined(cells), *(cell for cell in run.cells if cell not in cells))  # a seam that nobody saw
+    run.cells = (joined(cells), *(cell for cell in run.cells if cell not in cells))  # an undetected seam
     run.handles = tuple(None for _ in run.cells)
 
-    again = [dataclasses.replace(door, category="base_cabinet") for door in doors]  # found anew
+    again = [dataclasses.replace(door, category="base_cabinet") for door in doors]  # found again
     both = [session.panel(door) for door in again]
     assert [panel is not None and panel.width_m > 0.9 for panel in both] == [True, True]
     towel = dataclasses.replace(again[1], category="towel")
@@ -222,7 +222,7 @@ def test_a_click_just_past_a_fronts_edge_means_the_front(session: GeometricSessi
     ("left", "top", "right", "bottom", "kept"),
     [
         (40, 20, 60, 24, (40, 20, 60, 24)),
-        (80, 20, 110, 24, (80, 20, 100, 24)),  # a bar that parallax shows across the edge
+        (80, 20, 110, 24, (80, 20, 100, 24)),  # a bar displaced across the edge by parallax
         (104, 20, 112, 28, None),  # the neighbour's knob
         (2, 2, 98, 48, None),  # the raised frame of a framed front
     ],

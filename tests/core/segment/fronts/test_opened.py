@@ -16,14 +16,14 @@ Filmed = tuple[Capture, Truth, SegmentSession]
 
 @pytest.fixture(scope="module")
 def drawn_out(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
-    """The middle drawer stands out in the last frames."""
+    """The middle drawer is pulled out in the last frames."""
     capture, truth = kitchen(OUT_M, from_step=10)
     return capture, truth, open_session(capture, tmp_path_factory.mktemp("drawn_out"))
 
 
 @pytest.fixture(scope="module")
 def swung(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
-    """A door stands open for longer than it is closed."""
+    """A door is open for longer than it is closed."""
     capture, truth = kitchen(from_step=4, swung_rad=np.deg2rad(60.0))
     return capture, truth, open_session(capture, tmp_path_factory.mktemp("swung"))
 
@@ -35,7 +35,7 @@ def test_a_drawer_open_in_the_last_frames_is_told_from_the_closed_one(drawn_out:
     shown = [f for f, mask in truth["drawer_mid"].items() if mask.sum() > 3000]
     assert {f for f in shown if f in track.opened_frames} == {f for f in shown if f >= 100}
     (motion,) = track.motions
-    assert (motion.kind, motion.stop_seen) == ("prismatic", False)  # nobody saw it being drawn out
+    assert (motion.kind, motion.stop_seen) == ("prismatic", False)  # the frames do not show it being pulled out
     values = [motion.states[f].value for f in shown if f >= 100]
     assert values == pytest.approx([OUT_M] * len(values), abs=0.006)  # 2 mm of depth noise
     overlap = {f: mask_iou(unpack_mask(track.masks[f]), truth["drawer_mid"][f]) for f in shown}
@@ -56,12 +56,12 @@ def test_a_door_open_in_the_last_frames_tells_its_hinge_and_its_angle(tmp_path: 
 
 
 def assert_hinge_and_angle(filmed: Filmed, closed_frame: int, from_frame: int) -> None:
-    """Of the door that stands open by 60 degrees from a frame on, clicked where it is closed."""
+    """Check the door that is open by 60 degrees from a frame on, clicked where it is closed."""
     capture, truth, session = filmed
     x, width = DOORS["door_c"]
     door = prompt("door_c", "cabinet", click_on(capture, (x + width / 2, FRONT_Y, 0.5), closed_frame))
     track = session.track(door)
-    assert track.opened_frames == {f for f in track.masks if f >= from_frame}  # before, it is closed
+    assert track.opened_frames == {f for f in track.masks if f >= from_frame}  # it is closed before
     (motion,) = track.motions
     np.testing.assert_allclose(motion.axis_world, [0.0, 0.0, -1.0], atol=np.deg2rad(0.5))
     assert motion.pivot_world is not None

@@ -1,4 +1,4 @@
-"""A door that stands before a panel beside it slides; one beside a blind panel at its own thickness, or a run, does not."""
+"""Sliding doors: one before the adjacent panel slides; one beside a blind panel at its own thickness, or a run, does not."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +18,7 @@ OUTWARD = np.array([0.0, -1.0, 0.0])
 
 
 def door(handle_x_m: float | None = 0.04) -> Front:
-    """From x = 0 to 0.5 m in the plane y = 0, in a picture of one colour, its pull that far from its left edge."""
+    """A door from x = 0 to 0.5 m in the plane y = 0, of uniform colour, its pull that far from its left edge."""
     rotation = front_rotation(OUTWARD)
     grid = PlaneGrid(
         world_from_plane=Rigid3(rotation, np.zeros(3)), left_m=0.0, top_m=HEIGHT, cell_m=CELL_M, columns=400, rows=280
@@ -31,7 +31,7 @@ def door(handle_x_m: float | None = 0.04) -> Front:
 
 
 def panel(back_m: float, height_m: float = HEIGHT) -> PlaneRegion:
-    """From x = 0.5 to 1 m, that far behind the door's plane, about its middle height."""
+    """A panel from x = 0.5 to 1 m, that far behind the door's plane, about its middle height."""
     middle = np.array([0.75, back_m, HEIGHT / 2])
     support = np.ones((round(height_m / 0.02), 25), bool)
     return PlaneRegion(Rigid3(front_rotation(OUTWARD), middle), 0.5, height_m, support, 0.02, 0.5 * height_m)

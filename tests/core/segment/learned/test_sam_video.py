@@ -1,4 +1,4 @@
-"""The adapter against the real classes of transformers with random weights: what it asks of them, not how well they see."""
+"""Adapter of video models, run with the real classes of transformers and random weights: tests its calls, not mask quality."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +18,7 @@ MOST_FAMILIES = pytest.mark.parametrize(
     "family",
     [
         pytest.param(SAM2, id="sam2"),
-        pytest.param(EDGETAM, id="edgetam", marks=pytest.mark.slow),  # its memory is kept as sam2's is
+        pytest.param(EDGETAM, id="edgetam", marks=pytest.mark.slow),  # its memory works as sam2's
         pytest.param(SAM3, id="sam3"),
     ],
 )
@@ -57,7 +57,7 @@ def test_the_frame_clicked_last_comes_first_then_the_other_clicked_ones() -> Non
 @MOST_FAMILIES
 def test_frames_after_the_click_are_as_in_the_models_own_loop(family: Family) -> None:
     """`propagate_in_video_iterator` holds the whole video and forgets nothing; forgetting must not change an answer."""
-    model, count = tiny(family), 24  # more than the 16 whose pointers, and the 7 whose memories, it looks back on
+    model, count = tiny(family), 24  # more than the 16 frames of pointers and 7 of memories that it attends to
     session = model.session()
     session.processed_frames = {k: model.pixels(image(k)) for k in range(count)}
     side = model.size
@@ -92,7 +92,7 @@ def test_memory_stays_flat_over_sixty_frames(family: Family, monkeypatch: pytest
     assert len(sessions) == 1
     assert len(held) == 64
     one_frame = held[3] - held[2]
-    assert held[-1] <= max(held[:40]) + one_frame  # both directions hold 16 frames by then; one may be a clicked one
+    assert held[-1] <= max(held[:40]) + one_frame  # both directions hold 16 frames by then, one possibly clicked
     assert not sessions[0].processed_frames
 
 
@@ -190,7 +190,7 @@ def logits(model: VideoModel, clicks: dict[int, list[Click]], count: int = 7) ->
 
 
 def bytes_in(session: Any) -> int:
-    """Of all tensors a session holds on to."""
+    """Bytes of all tensors that a session holds."""
     return sum(t.element_size() * t.nelement() for t in tensors(vars(session), set()))
 
 

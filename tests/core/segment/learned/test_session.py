@@ -1,4 +1,4 @@
-"""Learned segmenters end to end but for the network: a model that answers with true masks, spoilt as real ones are."""
+"""Learned segmenters end to end without the network: a stand-in model returns true masks with realistic errors."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -27,7 +27,7 @@ Spoil = Callable[[int, np.ndarray], np.ndarray]
 
 @dataclass
 class TrueMasks:
-    """Stands where VideoModel stands: the true masks of one object by position, spoilt; counts what it is asked."""
+    """Stand-in for VideoModel: the true masks of one object by position, with errors; counts its calls."""
 
     masks: list[np.ndarray]
     spoil: Spoil = lambda position, mask: mask
@@ -82,7 +82,7 @@ def test_true_masks_of_a_front_give_its_rectangle(session: GeometricSession, box
     assert track.front.height_m == pytest.approx(0.74, abs=0.006)
     assert track.front.world_from_front.translation[0] == pytest.approx(left + width / 2, abs=0.006)
     assert track.front.world_from_front.translation[1] == pytest.approx(FRONT_Y, abs=0.01)
-    assert np.mean(ious(boxes, "door_b", track.masks)) > 0.97  # fusing leaves good masks alone
+    assert np.mean(ious(boxes, "door_b", track.masks)) > 0.97  # fusion does not degrade good masks
 
 
 def test_true_masks_of_a_thing_give_its_box(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:

@@ -1,4 +1,4 @@
-"""The real video model classes with random weights, small enough for a test: 64 px images, one layer of everything."""
+"""The real video model classes with random weights, small enough for tests: 64 px images, one layer of everything."""
 
 from typing import Any
 
@@ -42,7 +42,7 @@ def _sam2() -> Any:
 
 
 def _edgetam() -> Any:
-    """EdgeTAM with a pyramid of plain convolutions where it has timm's RepViT: timm needs torchvision, which is not here."""
+    """EdgeTAM with a pyramid of plain convolutions instead of timm's RepViT: timm needs torchvision, which is not installed."""
     vision = transformers.EdgeTamVisionConfig(
         backbone_config=_HIERA, backbone_channel_list=[64, 32, 16, 8], backbone_feature_sizes=_maps(_SIDE, 16)
     )

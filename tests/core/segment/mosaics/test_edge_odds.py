@@ -1,4 +1,4 @@
-"""Odds of edges on what nobody saw, and on dark fronts with lit gaps."""
+"""Edge log-odds at unobserved cells, and on dark fronts with bright gaps."""
 
 import cv2
 import numpy as np
@@ -41,7 +41,7 @@ def test_what_nobody_saw_does_not_speak_against_a_line_through_it() -> None:
 
 
 def _two_dark_doors(gap: int) -> np.ndarray:
-    """On a light wall, 90 by 60 cm, their gap of a lightness in column 200."""
+    """Two dark doors of 90 by 60 cm on a bright wall, with a gap of that lightness in column 200."""
     rgb = np.full((280, 400, 3), 200.0)
     rgb[20:260, 20:380] = 70
     rgb[20:260, 199:201] = gap
@@ -94,7 +94,7 @@ def test_depth_falls_short_of_an_end_where_it_shows_nothing_beyond(before_it: bo
     """It ends at 100; the network thinks an edge likelier at 105, as it is, than there, and possible at both."""
     count, raised = np.zeros((140, 200)), np.zeros((140, 200))
     count[:, :100] = 10
-    if before_it:  # a worktop's edge stands out beyond
+    if before_it:  # a worktop's edge protrudes beyond
         count[:, 100:], raised[:, 100:] = 10, 1
     empty = np.zeros(count.shape)
     relief = Relief(CELL_M * STEP, count, raised, 0.02 * raised, empty)

@@ -1,4 +1,4 @@
-"""A panel's edges by colour: where depth stops short of them, and below the shadow of a worktop."""
+"""Colour edges of a panel: where depth ends before them, and below the shadow of a worktop."""
 
 import cv2
 import numpy as np
@@ -11,7 +11,7 @@ from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 CELL_M = 0.0025
 WALL, BLUE, STONE = (225, 225, 215), (70, 100, 130), (120, 120, 125)
 PANEL = Cell(60, 60, 260, 300)
-EDGE_CELLS = 2.0  # 5 mm: a mosaic is blurred by as much
+EDGE_CELLS = 2.0  # 5 mm: the blur of a mosaic
 
 
 def mosaic(*areas: tuple[Cell, tuple[int, int, int]], background: tuple[int, int, int] = WALL, blur: float = 1.0) -> np.ndarray:
@@ -26,7 +26,7 @@ def area(cell: Cell) -> tuple[slice, slice]:
 
 
 def edges(image: np.ndarray, cut: Cell, on_plane: Cell, *heights: tuple[Cell, float]) -> tuple[float, ...]:
-    """Where depth sees nothing but what has a height (m over the plane) and the plane."""
+    """Edges found when depth covers only the plane and parts at a height (m above the plane)."""
     height, points = np.zeros(image.shape[:2]), np.zeros(image.shape[:2])
     points[area(on_plane)] = 1
     for cell, height_m in heights:
@@ -165,7 +165,7 @@ def test_a_front_hides_the_top_of_a_channel_below_it_from_depth_and_ends_over_it
 
 def test_depth_that_falls_off_at_a_free_end_moves_no_edge() -> None:
     image = mosaic((PANEL, BLUE))
-    flying = (Cell(60, 60, 260, 66), -0.015)  # depth of an edge is mixed with that of what is behind it
+    flying = (Cell(60, 60, 260, 66), -0.015)  # depth at an edge is mixed with the surface behind it
     assert edges(image, PANEL, PANEL, flying)[1] == pytest.approx(60, abs=EDGE_CELLS)
 
 

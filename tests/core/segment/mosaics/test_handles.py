@@ -1,4 +1,4 @@
-"""Handles on a panel, from the network's log-odds and the relief."""
+"""Handle detection on a panel, from the network's log-odds and the relief."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ LIFT_M = 0.03
 
 
 def found(*parts: tuple[slice, slice, float], raised: tuple[slice, slice] | None = None) -> tuple[PanelOdds, Relief]:
-    """A panel with nothing but these rectangles likely a handle, and one of them standing out."""
+    """A panel on which only these rectangles are likely handles, one of them raised."""
     nothing = np.full((ROWS, COLUMNS), -4.0, np.float32)
     handle, share = nothing.copy(), np.zeros((ROWS, COLUMNS))
     for rows, columns, odds in parts:
@@ -47,7 +47,7 @@ def test_parts_of_a_bar_are_one_handle_and_a_speck_elsewhere_is_none_of_it() -> 
     handle = find_handle(*found((*upper, 2.0), (*lower, 2.0), (*speck, 4.0)), PANEL)
     assert handle is not None
     assert (handle.top, handle.bottom) == (20 * STEP, 50 * STEP)
-    assert handle.protrusion_m == 0.0  # depth saw nothing stand out
+    assert handle.protrusion_m == 0.0  # depth showed no protrusion
 
 
 def test_a_handle_at_the_edge_of_its_panel_stays_as_large_as_it_is() -> None:

@@ -1,4 +1,4 @@
-"""Which cells of a plane a frame shows."""
+"""Visibility of a plane's cells in a frame."""
 
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -17,7 +17,7 @@ HOLLOW = filmed("left", np.full(len(OPEN), 2.8), noise_m=0.0)
 
 @dataclass(kw_only=True)
 class Scan(Film):
-    """A film beside the surface that was fused from it."""
+    """A film with the surface that was fused from it."""
 
     surface: Film
 
@@ -27,7 +27,7 @@ class Scan(Film):
 
 
 def _shares(film: Film, surface: Film) -> np.ndarray:
-    """Of the front's cells, how many each frame finds open."""
+    """Fraction of the front's cells that each frame finds open."""
     scan = Scan(film.frames, film.depths, surface=surface)
     return np.array([opened_cells(GRID, scan, frame).mean() for frame in film.frames])
 
@@ -35,7 +35,7 @@ def _shares(film: Film, surface: Film) -> np.ndarray:
 def test_a_frame_that_looks_into_an_open_unit_shows_no_front_there() -> None:
     found = _shares(filmed("left", OPEN), CLOSED)
     assert (found[OPEN == 0] == 0).all()
-    assert (found[OPEN > 0] > 0.5).all()  # the leaf itself hides the rest
+    assert (found[OPEN > 0] > 0.5).all()  # the leaf itself occludes the rest
 
 
 def test_what_every_frame_looks_past_is_glass_and_stays_in_the_mosaic() -> None:
@@ -56,5 +56,5 @@ def test_an_end_that_few_frames_show_and_none_of_them_well_is_shown_by_one_of_th
     scene: Any = SimpleNamespace(frames=[SimpleNamespace(index=10 * k) for k in range(40)])
     chosen = [index // 10 for index in choose_frames(quality, scene, 6)]
     assert len(set(chosen)) == 6
-    assert 37 in chosen[:4]  # the best of those that show the end
+    assert 37 in chosen[:4]  # the best frame that shows the end
     assert choose_frames(quality[:, :0], scene, 6) == []

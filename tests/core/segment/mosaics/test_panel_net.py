@@ -1,4 +1,4 @@
-"""The network that finds edges of fronts: what it is fed, and what it makes of elevations it was not trained on."""
+"""Seam network: its input, and its output on elevations outside its training set."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from training.elevations import draw
 from training.sight import Sight, seen
 from training.styles import FaceFrame, any_style
 
-UNSEEN = range(10_000_000, 10_000_008)  # far from what any training draws
+UNSEEN = range(10_000_000, 10_000_008)  # outside the seeds of any training
 
 
 def judged(sight: Sight) -> PanelOdds:
@@ -60,7 +60,7 @@ def test_what_it_is_fed_does_not_depend_on_the_number_of_depth_points() -> None:
 
 
 def touching(seed: int) -> float:
-    """Of the upright edges that a drawing tells, the share with a front at both sides."""
+    """Fraction of a drawing's labelled upright edges with a front on both sides."""
     drawn = draw(seed)
     rows, columns = np.nonzero(drawn.upright[:, 6:-6])
     return float((drawn.front[rows, columns] * drawn.front[rows, columns + 12] > 0).mean())  # 15 mm to each side
@@ -85,4 +85,4 @@ def test_training_draws_crops_of_one_size_with_their_truth() -> None:
     for inputs, truth in crops(10_000_001, count=2):
         assert inputs.shape == (19, 256, 256)
         assert truth.shape == (4, 256, 256)
-        assert set(np.unique(truth[:2])) <= {0, 1, 2}  # 2: too near a line to say
+        assert set(np.unique(truth[:2])) <= {0, 1, 2}  # 2: too near a line for a label

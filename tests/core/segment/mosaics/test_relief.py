@@ -1,4 +1,4 @@
-"""Where depth says that a front ends: at its edges and where it stands before another, not at its handles or frames."""
+"""Ends of a front in depth: at its edges and where it is in front of another one, not at its handles or frames."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ SURE = 4.0  # of 6
 
 
 def relief(level_m: np.ndarray, lift_m: np.ndarray, seen: np.ndarray) -> Relief:
-    """Of profiles over the columns: the panel's level, what stands out, and how many points were seen."""
+    """Relief from profiles over the columns: the panel's level, the height above it, and the number of points."""
 
     def tall(values: np.ndarray) -> np.ndarray:
         return np.tile(values, (ROWS, 1))
@@ -69,7 +69,7 @@ def test_a_plane_steps_back_where_a_door_stands_before_another_and_not_where_its
 
 def test_the_plane_does_not_end_at_a_pane_of_glass_in_a_frame_but_at_a_channel_between_fronts() -> None:
     def framed(top: int, bottom: int) -> list[float]:
-        """Level lines of a plane in the middle of nothing, with a hole in it between these rows."""
+        """Level lines of an isolated plane with a hole between these rows."""
         seen = np.zeros((120, 120))
         seen[10:110, 10:110] = 20
         seen[top:bottom, 22:98] = 0

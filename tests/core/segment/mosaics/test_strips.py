@@ -1,4 +1,4 @@
-"""What of a panel is a strip of another material that runs along the fronts, and what is a part of the front."""
+"""Strips of another material along the fronts, distinguished from parts of the front."""
 
 import numpy as np
 import pytest
@@ -9,12 +9,12 @@ from r2c2r_core.segment.mosaics.strips import clear_of_strips
 
 CELL_M = 0.0025
 RED, BLACK, GREY, WHITE = (150, 30, 35), (25, 25, 28), (150, 160, 165), (235, 235, 232)
-PANEL = Cell(80, 60, 260, 340)  # as it was cut: 45 x 70 cm
+PANEL = Cell(80, 60, 260, 340)  # as cut: 45 x 70 cm
 Colour = tuple[int, int, int]
 
 
 def mosaic(front: Colour, *, around: Colour = WHITE) -> np.ndarray:
-    """A row of three such fronts."""
+    """A row of three fronts of that colour."""
     rng = np.random.default_rng(0)
     image = np.zeros((400, 340, 3), np.float32)
     image[:], image[60:340] = around, front
@@ -22,7 +22,7 @@ def mosaic(front: Colour, *, around: Colour = WHITE) -> np.ndarray:
 
 
 def cleared(image: np.ndarray, cut: Cell = PANEL) -> tuple[float, float]:
-    """By how many cells the upper and lower edge of a panel move inwards."""
+    """Number of cells by which the upper and lower edge of a panel move inwards."""
     nothing = np.zeros(image.shape[:2])
     surface = Surface(*as_lab(image.clip(1, 255).astype(np.uint8)), nothing, nothing)
     panel = clear_of_strips(cut, surface, CELL_M)

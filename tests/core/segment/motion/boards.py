@@ -1,4 +1,4 @@
-"""Depth of a board that moves before a hollow unit, in closed form: rays and boxes."""
+"""Depth of a moving board before a hollow unit, in closed form by ray casting of boxes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -25,7 +25,7 @@ LEAF = Leaf(
 
 @dataclass
 class Film:
-    """As much of a scene as motion asks for."""
+    """The part of a scene that motion estimation needs."""
 
     frames: tuple[Frame, ...]
     depths: dict[int, np.ndarray]
@@ -62,11 +62,11 @@ def filmed(
     thickness_m: float = THICKNESS_M,
     seed: int = 0,
 ) -> Film:
-    """LEAF in those states, one a frame, by cameras that walk past it; an arm hangs before it in frames `hands`.
+    """LEAF in those states, one per frame, filmed by cameras that walk past it; an arm occludes it in frames `hands`.
 
-    In frames `other` it is closed, and a board like it stands before it where it would be, hung on its left and opened by 0.9.
-    With `niche` it is closed between two machines that reach into the room, and the cameras pass so far that they hide it.
-    With `jars` a row of them stands on a shelf behind it, and the unit's rear board returns no light. With `glass` its outer
+    In frames `other` it is closed, and a similar board stands before it where it would be, hinged left and opened by 0.9.
+    With `niche` it is closed between two appliances that protrude into the room and occlude it at the ends of the walk.
+    With `jars` a row of them stands on a shelf behind it, and the unit's rear board returns no depth. With `glass` its outer
     face returns none.
     """
     rng = np.random.default_rng(seed)
@@ -114,7 +114,7 @@ def cast_rays(solids: Sequence[Solid], world_from_camera: Rigid3) -> np.ndarray:
         with np.errstate(divide="ignore", invalid="ignore"):
             first, second = ((np.array(edge) - seen.translation) / turned for edge in (low, high))
         near, far = np.minimum(first, second), np.maximum(first, second)
-        enter = np.maximum(np.maximum(near[:, 0], near[:, 1]), near[:, 2])  # numpy is slow along an axis of three
+        enter = np.maximum(np.maximum(near[:, 0], near[:, 1]), near[:, 2])  # numpy is slow along an axis of length three
         leave = np.minimum(np.minimum(far[:, 0], far[:, 1]), far[:, 2])
         nearest = np.where((enter < leave) & (enter > 0), np.minimum(nearest, enter), nearest)
     return np.where(np.isfinite(nearest), nearest, 0.0).reshape(CAMERA.height, CAMERA.width)

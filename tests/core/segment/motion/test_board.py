@@ -9,11 +9,11 @@ from tests.core.segment.motion.boards import CAMERA, LEAF, cast_rays, joint
 from tests.core.segment.scenes import look_at
 
 HELD_M = 0.3
-HAND = (-0.07, -0.045, -0.07), (0.07, -0.02, 0.07)  # lowest and highest corner before the face: on a handle
+HAND = (-0.07, -0.045, -0.07), (0.07, -0.02, 0.07)  # lowest and highest corner, in front of the face: on a handle
 
 
 class OnePhoto:
-    """As much of a scene as a mask asks for: a light front, and a dark hand on it."""
+    """The part of a scene that a mask needs: a bright front with a dark hand on it."""
 
     noise = DepthNoise(floor_m=0.004, per_m=0.003)
 

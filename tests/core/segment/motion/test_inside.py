@@ -15,7 +15,7 @@ def stays(frame: Frame) -> Rigid3 | None:
 def test_the_rear_board_of_an_open_unit_tells_its_inner_depth() -> None:
     inside = measure_inside(LEAF, stays, filmed("left", HELD))
     assert inside is not None
-    assert inside.depth_m == pytest.approx(0.45 + THICKNESS_M - 0.019, abs=0.005)  # the unit's rear, less a usual front
+    assert inside.depth_m == pytest.approx(0.45 + THICKNESS_M - 0.019, abs=0.005)  # the unit's rear, minus a usual front
     assert inside.shelves_m == ()
 
 
@@ -46,7 +46,7 @@ def test_what_stays_in_the_unit_is_no_rear_of_a_drawer() -> None:
     """The unit's own rear board is seen over the front of a drawer, in every frame farther behind that."""
     film = filmed("out", DRAWN)
     assert measure_inside(LEAF, comes_out, film, drawn_out_m=0.1) is None
-    assert measure_inside(LEAF, stays_behind, film) is not None  # it is in view
+    assert measure_inside(LEAF, stays_behind, film) is not None  # the rear is visible
 
 
 def stays_behind(frame: Frame) -> Rigid3 | None:

@@ -16,7 +16,7 @@ RAD, M = ("left", "right", "top", "bottom"), ("out", "slides_left", "slides_righ
 
 
 def opened_and_held(largest: float) -> np.ndarray:
-    """Closed, opened slowly, held, and closed by half."""
+    """States of a leaf: closed, opened slowly, held, and half closed again."""
     return np.concatenate(
         [np.zeros(8), np.linspace(0, largest, 12), np.full(10, largest), np.linspace(largest, largest / 2, 5)]
     )
@@ -27,7 +27,7 @@ def scene(*args: Any, **more: Any) -> Any:
 
 
 def quick(ways: tuple[str, ...], few: tuple[str, ...]) -> list[Any]:
-    """The few ways that differ in kind; those that mirror them are slow."""
+    """The few kinds of motion that differ; their mirror images are slow."""
     return [pytest.param(way, marks=() if way in few else pytest.mark.slow) for way in ways]
 
 
@@ -52,7 +52,7 @@ def test_a_leaf_that_rests_almost_closed_is_closed() -> None:
     motion = find_motion(LEAF, scene("left", states))
     assert motion is not None
     assert [motion.states[k].value for k in range(7)] == [0.0] * 7
-    assert motion.states[9].value == pytest.approx(states[9], abs=np.deg2rad(2))  # on its way it is where it was seen
+    assert motion.states[9].value == pytest.approx(states[9], abs=np.deg2rad(2))  # while moving it is where it was observed
 
 
 def test_a_flap_opens_no_further_than_its_stays_let_it() -> None:
@@ -162,7 +162,7 @@ def test_a_drawer_below_a_door_is_a_leaf_of_its_own() -> None:
     (drawer,) = FilmedLeaves(whole, category_of("refrigerator"), film, 0.6, (LEAF.half_m[1] - 0.15,)).motions
     assert (drawer.part, drawer.kind) == (DRAWER, "prismatic")
     assert drawer.pivot_world is not None
-    np.testing.assert_allclose(drawer.pivot_world, LEAF.world_from_front.translation, atol=1e-6)  # its own middle
+    np.testing.assert_allclose(drawer.pivot_world, LEAF.world_from_front.translation, atol=1e-6)  # its own centre
     assert drawer.largest == pytest.approx(0.3, abs=0.006)
 
 
@@ -176,6 +176,6 @@ def test_a_leaf_opens_no_further_than_to_the_floor() -> None:
     def widest(floor_m: float | None) -> float:
         return float(next(one for one in hypotheses(LEAF, floor_m) if one.way == "bottom").states[-1])
 
-    assert widest(None) == pytest.approx(np.deg2rad(117.0))  # the last of the steps that are tried
+    assert widest(None) == pytest.approx(np.deg2rad(117.0))  # the last of the tested steps
     bottom = float(LEAF.world_from_front.translation[2]) - LEAF.half_m[1]
     assert np.pi / 2 < widest(bottom - 0.1) < widest(bottom - 0.2) < widest(None)

@@ -32,7 +32,7 @@ def proposals(steps: list[tuple[float, tuple[Proposal, ...]]]) -> tuple[Proposal
 
 
 def name_of(proposal: Proposal, truth: Truth) -> str | None:
-    """The true thing it overlaps by half."""
+    """The true object that it overlaps by at least half."""
     outline = unpack_mask(proposal.outline)
     names = [name for name, masks in truth.items() if mask_iou(outline, masks[proposal.click.frame]) > 0.5]
     return names[0] if names else None
@@ -148,6 +148,6 @@ def test_size_names_a_thing(extent: tuple[float, float, float], base: float, cat
 def test_what_stands_needs_no_edge_at_its_foot_and_a_front_needs_all_four(monkeypatch: pytest.MonkeyPatch) -> None:
     """A refrigerator's foot lies in shadow: the network sees no edge there."""
     monkeypatch.setattr(panels, "edge_strengths", lambda _: (0.96, 0.97, 0.98, 0.12))
-    front = cast(Front, None)  # of which only the edges are asked
+    front = cast(Front, None)  # only the edges of the front are evaluated
     assert panels.outlined(front, stands=True) == 0.96
     assert panels.outlined(front) == 0.12

@@ -1,4 +1,4 @@
-"""Edges that do not show, taken from fronts in line."""
+"""Invisible edges taken from fronts in line."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ LOW = Cell(280, 90, 360, 300)
 
 
 def topped(cuts: tuple[Cell, ...], shown: int, cut: Cell) -> float:
-    """The upper edge of a white front before a white wall, where only one front's, `shown`, stands out."""
+    """The upper edge of a white front before a white wall, where only one front's, `shown`, is visible."""
     image = np.full((340, 380, 3), WHITE, np.uint8)
     for cell in cuts:
         image[round(cell.top) : 300, round(cell.left) : round(cell.left) + 1] = SHADE
@@ -28,7 +28,7 @@ def topped(cuts: tuple[Cell, ...], shown: int, cut: Cell) -> float:
 @pytest.mark.parametrize("shown", [0, 2])
 def test_a_top_that_does_not_show_is_level_with_the_nearest_that_does(shown: int) -> None:
     assert topped(CUTS, shown, CUTS[1]) == pytest.approx(40, abs=1.5)
-    assert topped(CUTS, shown, CUTS[2 - shown]) == pytest.approx(40, abs=1.5)  # across one that does not show either
+    assert topped(CUTS, shown, CUTS[2 - shown]) == pytest.approx(40, abs=1.5)  # across another invisible one
 
 
 def test_a_front_that_was_cut_lower_than_depth_ends_short_keeps_its_top() -> None:

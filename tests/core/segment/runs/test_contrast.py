@@ -1,4 +1,4 @@
-"""How far a panel's edges stand out on a mosaic: by a gap, or by what is beside them."""
+"""Contrast of a panel's edges on a mosaic: from a gap, or from the surroundings."""
 
 import cv2
 import numpy as np
@@ -13,7 +13,7 @@ SIDES = ("left", "right", "upper", "lower")
 
 
 def mosaic(fill: tuple[int, int, int], gap: str | None = None) -> np.ndarray:
-    """A panel before a wall, with a gap at one of its edges, as blurred as mosaics are."""
+    """A panel before a wall, with a gap at one of its edges, blurred like a mosaic."""
     image = np.full((360, 320, 3), WALL, np.uint8)
     corners = [(60, 60), (260, 60), (260, 300), (60, 300)]
     cv2.rectangle(image, corners[0], corners[2], fill, -1)

@@ -1,4 +1,4 @@
-"""Fronts inset in a face frame, told from panels sunk in a front: the gaps round the front end before its rails and stiles."""
+"""Inset fronts in a face frame versus recessed panels in a front: the gaps around the front end before its rails and stiles."""
 
 from collections.abc import Sequence
 
@@ -19,9 +19,9 @@ CLOSE = 1.5  # cells: 4 mm
 
 
 def mosaic(*gaps: Cell, dark: int = 90, worktop: int = 0, grain: Sequence[Cell] = ()) -> Contrast:
-    """Lightness of one paint with outlines of gaps, one cell wide, as blurred as mosaics are, with a little noise.
+    """Lightness of uniform paint with outlines of gaps, one cell wide, blurred like a mosaic, with a little noise.
 
-    A worktop is over all of it, and its shadow ends at a row. Outlines of grain are fainter than gaps.
+    A worktop above casts a shadow that ends at a row. Outlines of grain are fainter than gaps.
     """
     light = np.full((360, 320), 170, np.uint8)
     light[:worktop], light[max(worktop - 3, 0) : worktop] = 110, 80
@@ -33,13 +33,13 @@ def mosaic(*gaps: Cell, dark: int = 90, worktop: int = 0, grain: Sequence[Cell] 
 
 
 def odds(edge: float = -2.0) -> PanelOdds:
-    """All of it a front, to the network, with no edge likely anywhere, and none ruled out."""
+    """Log-odds of the network: all of it a front, no edge likely anywhere, and none ruled out."""
     none = np.full((180, 160), edge, np.float32)
     return PanelOdds(upright=none, level=none, handle=np.full_like(none, -4.0), front=np.full_like(none, 4.0))
 
 
 def relief(behind_m: float = 0.0, within: Cell = FRONT) -> Relief:
-    """In one plane, but for what lies that far behind it, to a millimetre a point."""
+    """Relief of a single plane except for a region that far behind it, to a millimetre per point."""
     level = np.random.default_rng(1).normal(0, 0.001, (180, 160))
     left, top, right, bottom = (round(edge / STEP) for edge in edges(within))
     level[top:bottom, left:right] -= behind_m
@@ -68,7 +68,7 @@ def test_grain_where_the_network_rules_edges_out_is_no_gap() -> None:
     cut, lowest = grown(left=2 * RAIL, top=RAIL, right=2 * RAIL), Cell(FRONT.left, FRONT.bottom, FRONT.right, FRONT.bottom)
     grain = mosaic(lowest, grain=[FRONT])
     assert inset_fronts(grain, relief(), odds(-4.0), [cut], CELL_M) == [cut]
-    assert inset_fronts(grain, relief(), odds(), [cut], CELL_M) != [cut]  # possible, it would be a gap
+    assert inset_fronts(grain, relief(), odds(), [cut], CELL_M) != [cut]  # where edges are possible it counts as a gap
 
 
 @pytest.mark.parametrize("cut", [grown(top=RAIL), grown(top=RAIL, right=RAIL)])
@@ -124,7 +124,7 @@ def test_the_gaps_of_a_front_end_before_a_rail_and_go_on_beside_its_own() -> Non
     _, strip, _ = strips(FRONT)
     assert is_rail(mosaic(FRONT), FRONT, strip, axis=1)
     assert not is_rail(mosaic(FRONT, grown(top=8)), FRONT, strip, axis=1)
-    assert not is_rail(mosaic(), FRONT, strip, axis=1)  # nothing shows
+    assert not is_rail(mosaic(), FRONT, strip, axis=1)  # nothing is visible
 
 
 def test_an_edge_refined_past_a_rail_stays_where_it_was_cut() -> None:
@@ -132,5 +132,5 @@ def test_an_edge_refined_past_a_rail_stays_where_it_was_cut() -> None:
     assert edges(clear_of_rails(mosaic(FRONT), refined, FRONT, strips(FRONT), CELL_M)) == edges(FRONT)
     near = grown(top=2)
     assert edges(clear_of_rails(mosaic(FRONT), near, FRONT, strips(FRONT), CELL_M)) == edges(near)
-    own = mosaic(FRONT, grown(top=8))  # the front's borders go on: what was cut is its frame's inner line
+    own = mosaic(FRONT, grown(top=8))  # the front's borders continue: its frame's inner line was cut
     assert edges(clear_of_rails(own, refined, FRONT, strips(FRONT), CELL_M)) == edges(refined)

@@ -1,4 +1,4 @@
-"""One panel under several clicks: cut so that each has a part, by the likeliest seams together."""
+"""Cut of one panel under several clicks so that each has a part, by the jointly likeliest seams."""
 
 import numpy as np
 
@@ -31,7 +31,7 @@ STACK = [at(50, 20), at(50, 70), at(50, 120), at(150, 30)]  # three drawers, and
 
 def test_a_faint_seam_between_stacks_comes_before_sure_ones_that_end_at_it() -> None:
     level, upright = unseen()
-    upright[:, 100] = -1.0  # hardly seen
+    upright[:, 100] = -1.0  # faint
     level[45:47, :100] = level[93:95, :100] = 5.0
     parts = parted(field_of(level, upright), PANEL, STACK).parts
     assert len(parts) == 4

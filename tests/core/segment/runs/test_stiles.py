@@ -1,4 +1,4 @@
-"""Strips beside panels: stiles of their frames, or of the frame of the cupboard."""
+"""Strips beside panels: stiles of the panel's own frame, or of the cupboard's face frame."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ CUT, BESIDE = Cell(110, 20, 280, 320), Cell(0, 20, 110, 320)  # at the panel's l
 
 
 def odds(front_from: int) -> PanelOdds:
-    """Of a door whose left edge is as likely as not, and of fronts from a column on."""
+    """Log-odds of a door whose left edge is undecided, with fronts from a column on."""
     upright, level, handle, front = (np.full((160, 160), -4.0, np.float32) for _ in range(4))
     front[10:160, front_from // 2 :] = 4
     upright[10:160, 40] = 0.5
@@ -41,7 +41,7 @@ def lines(upright: list[float], level: list[float]) -> tuple[Evidence, Evidence]
 
 
 def cut_anew(session: GeometricSession) -> Run | None:
-    """The first run of the boxes, of as few frames as show all of it, whatever is kept of it."""
+    """The first run of the boxes, cut from as few frames as show all of it, ignoring any cache."""
     return make_run(session.planes[0], session.scene, session.config.cell_m, frame_count=4)
 
 
@@ -58,14 +58,14 @@ def test_a_strip_as_wide_as_the_opposite_stile_belongs_to_the_door() -> None:
     cells = whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), BLANK, FLAT)
     door = door_of(cells)
     assert (door.left, door.top, door.right, door.bottom) == pytest.approx((80, 20, 280, 320), abs=2)
-    assert sum(cell.width * cell.height for cell in cells) == pytest.approx(280 * 300)  # they tile what they did
+    assert sum(cell.width * cell.height for cell in cells) == pytest.approx(280 * 300)  # they tile the same area
 
 
 @pytest.mark.parametrize(
     ("upright", "level"),
     [
-        ([110, 140, 250], [50, 290]),  # its own panel begins within: the strip is the cupboard's face frame
-        ([110], [50, 290]),  # nothing opposite
+        ([110, 140, 250], [50, 290]),  # another panel begins within: the strip is the cupboard's face frame
+        ([110], [50, 290]),  # no line on the opposite side
         ([110, 250], [290]),  # no upper rail
         ([], []),  # slab
     ],

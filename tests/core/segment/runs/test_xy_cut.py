@@ -1,4 +1,4 @@
-"""Cutting a run from log-odds of edges alone: what is a cut, and where a line is when somebody says that there is one."""
+"""XY-cut of a run from log-odds of edges alone: cuts, and the position of a line when one is known to exist."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +15,7 @@ from r2c2r_core.segment.runs.xy_cut import LineField
 
 CELL_M = 0.0025
 SEEN = (400, 400)  # rows and columns of a grid that all of these fit in
-Line = tuple[int, int, int]  # position, and from where to where it runs, in cells
+Line = tuple[int, int, int]  # position, start and end, in cells
 
 
 def odds(
@@ -26,7 +26,7 @@ def odds(
     sure: float = 3.0,
     handles: list[tuple[int, int]] | None = None,
 ) -> PanelOdds:
-    """Nothing but fronts, with lines at positions, each over a part of the grid, and handles at columns and rows."""
+    """Log-odds of fronts only, with lines at positions, each over a part of the grid, and handles at columns and rows."""
     across = [np.full((height // 2, width // 2), -4.0, np.float32) for _ in range(2)]
     for layer, lines in ((across[0], upright), (across[1].T, level)):
         for position, start, stop in lines:
@@ -43,7 +43,7 @@ def cut(width: int, height: int, upright: list[Line], level: list[Line]) -> list
 
 def test_a_line_that_shows_over_most_of_its_span_is_a_cut_and_one_over_the_half_is_not() -> None:
     assert len(cut(240, 288, [], [(144, 0, 240)])) == 2
-    assert len(cut(240, 288, [], [(144, 0, 100), (144, 160, 240)])) == 2  # a handle hangs over it
+    assert len(cut(240, 288, [], [(144, 0, 100), (144, 160, 240)])) == 2  # a handle is across the line
     assert len(cut(240, 288, [], [(144, 60, 180)])) == 1
 
 
@@ -156,7 +156,7 @@ def test_an_oven_of_black_glass_is_parted_from_the_drawer_below_it() -> None:
 
 
 def door_under_a_rail(uprights_from: int) -> PanelOdds:
-    """A door from column 80 to 280, cut at its sides from a row on; at row 44 is a line as likely as not."""
+    """A door from column 80 to 280, cut at its sides from a row on; at row 44 is an undecided line."""
     field = odds(360, 320, [(80, uprights_from, 320), (280, uprights_from, 320)], [(20, 0, 360)])
     field.level[22, 40:140] = 0.5
     return field
@@ -174,7 +174,7 @@ def test_a_front_ends_where_both_lines_at_its_sides_do() -> None:
 def test_a_line_too_faint_for_one_front_cuts_a_row_of_them() -> None:
     seams = [(160 * k, 0, 320) for k in range(1, 4)]
     row = odds(640, 320, [(2, 0, 320), *seams], [])
-    row.level[22] = 0.8  # below what one drawer as low as this needs
+    row.level[22] = 0.8  # below what one drawer of this height needs
     one = odds(160, 320, [], [])
     one.level[22] = 0.8
     assert len(cut_panels(one, Cell(0, 0, 160, 320), CELL_M)) == 1

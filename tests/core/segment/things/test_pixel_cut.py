@@ -31,13 +31,13 @@ def test_a_learned_model_tells_the_things_colours_from_those_around_it() -> None
     assert (odds[:, :20] > 1).all()
     assert (odds[:, 20:] < -1).all()
     unseen = model.odds(np.full((1, 1, 3), 20, np.uint8))
-    assert abs(float(unseen[0, 0])) < 0.1  # a colour that neither showed says nothing
+    assert abs(float(unseen[0, 0])) < 0.1  # a colour seen in neither is uninformative
 
 
 def test_colours_that_mix_at_a_border_decide_nothing_there_and_all_within() -> None:
     odds = np.full((9, 12), -2.0, np.float32)
     odds[:, 6:] = 2.5
-    odds[:, 6] = 1.0  # a mixture that looks more like the thing
+    odds[:, 6] = 1.0  # a mixture closer to the object
     said = unmixed(odds)
     assert (said[:, 5:7] == 0).all()
     assert (said[:, :5] == -2.0).all()

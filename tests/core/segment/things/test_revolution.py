@@ -1,4 +1,4 @@
-"""A bottle before a wall with a dark patch of its colours: its axis, width and height, from clicks on its body and its neck."""
+"""A bottle before a wall with a dark patch of its colours: axis, width and height, from clicks on its body and its neck."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ FRAME = 70
 
 @dataclass(frozen=True)
 class WithoutNeck:
-    """The same images; depth has holes where the bottle is thin, and in one frame it is that of the wall behind."""
+    """The same images, with depth holes where the bottle is thin, and in one frame the depth of the wall behind."""
 
     capture: Capture
     masks: dict[int, np.ndarray]
@@ -98,7 +98,7 @@ def test_a_neck_of_a_colour_that_nothing_else_has_is_told_by_its_likeness_from_a
     """Neither depth nor colours learned elsewhere say anything of it."""
     views, levels, cells, radius = 12, 20, 24, 8
     rng = np.random.default_rng(0)
-    lab = rng.integers(40, 220, (views, levels, 2 * cells, 3), dtype=np.uint8)  # a pattern that every view shows elsewhere
+    lab = rng.integers(40, 220, (views, levels, 2 * cells, 3), dtype=np.uint8)  # a background that differs in every view
     neck = (slice(None), slice(0, 15), slice(cells - radius, cells + radius))
     lab[neck] = 90 + rng.integers(0, 6, lab[neck].shape)
     nothing = np.zeros(lab.shape[:3])
@@ -115,7 +115,7 @@ def test_the_profile_keeps_to_edges_where_odds_go_on_beyond_and_ends_where_nothi
     levels, cells, radius, top = 40, 24, 10, 30
     odds = np.full((levels, cells), -2.0)
     odds[:top, :radius] = 2.0
-    odds[:15, radius:18] = 0.8  # what looks the same beside its foot
+    odds[:15, radius:18] = 0.8  # similar surface beside its base
     across, along = np.full((levels, cells), 1.0), np.full((levels, cells), 1.0)
     across[:top, radius] = 15.0
     along[top, :radius] = 15.0

@@ -1,4 +1,4 @@
-"""Outlines of small things take the same work at any resolution of the photos, and lie on the photos' own edges."""
+"""Outlines of small things: the same effort at any photo resolution, at the photos' own edges."""
 
 import dataclasses
 
@@ -20,7 +20,7 @@ TIMES = 8  # a carton of 350 x 600 px
 
 
 class Enlarged:
-    """The same pictures at a phone's resolution; depth stays as coarse."""
+    """The same pictures at a phone's resolution; depth stays coarse."""
 
     def __init__(self, capture: Capture) -> None:
         self._of = capture.images
@@ -62,4 +62,4 @@ def test_an_outline_covers_the_pixels_that_points_cover_by_half(radius_px: float
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     rings = [share * radius_px * np.column_stack([np.cos(angle), np.sin(angle)]) for share in np.linspace(0, 1, 60)]
     mask = splat(np.concatenate(rings) + 32.4, (64, 64), 1.0)
-    assert mask.sum() == pytest.approx(np.pi * radius_px**2, rel=0.08)  # every pixel touched: 12 to 17 % more
+    assert mask.sum() == pytest.approx(np.pi * radius_px**2, rel=0.08)  # every touched pixel counts: 12 to 17 % more

@@ -1,4 +1,4 @@
-"""Chairs and tables are found whole, down to the floor; what stands on a table is not the table."""
+"""Chairs and tables are segmented completely, down to the floor, without the objects on a table."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def test_what_stands_on_a_table_is_not_the_table(room: Scene) -> None:
 
 
 def _below(capture: Capture, frame_index: int, height_m: float) -> np.ndarray:
-    """The pixels whose depth lies below a height."""
+    """The pixels whose depth is below a height."""
     frame = capture.frame(frame_index)
     camera = frame.rgb_camera
     depth = np.kron(capture.images.depth(frame_index).metres, np.ones((2, 2)))

@@ -1,4 +1,4 @@
-"""A small thing's visual hull and silhouettes, and the support it stands on, in a kitchen of boxes whose carton is known."""
+"""Visual hull and silhouettes of a small thing, and its support, in a kitchen of boxes with a known carton."""
 
 import dataclasses
 
@@ -41,8 +41,8 @@ def test_the_hull_is_the_carton_to_a_centimetre_and_stands_on_the_worktop(hull: 
     low, high = hull.vertices.min(axis=0), hull.vertices.max(axis=0)
     np.testing.assert_allclose(low[[0, 2]], LOW[[0, 2]], atol=0.012)
     np.testing.assert_allclose(high[[0, 2]], HIGH[[0, 2]], atol=0.012)
-    assert low[1] == pytest.approx(LOW[1], abs=0.03)  # carving spares 22 mm before what coarse depth shows
-    assert high[1] < LOW[1] + 1.5 * (HIGH[0] - LOW[0])  # no camera sees its back: no deeper than wide, and the slack
+    assert low[1] == pytest.approx(LOW[1], abs=0.03)  # carving keeps 22 mm before coarse depth
+    assert high[1] < LOW[1] + 1.5 * (HIGH[0] - LOW[0])  # no camera sees its back: no deeper than wide, plus the slack
     assert hull.support_z_m == pytest.approx(0.90, abs=0.005)
 
 
@@ -133,4 +133,4 @@ def test_the_same_error_of_poses_is_borne_by_a_wide_thing_and_not_by_a_narrow_on
     assert wide is not None
     assert narrow is not None
     assert wide.pose_error_m < 0.03  # carved
-    assert narrow.pose_error_m > 0.03  # looked for frame by frame
+    assert narrow.pose_error_m > 0.03  # searched for frame by frame
