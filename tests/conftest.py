@@ -1,4 +1,4 @@
-"""Array shapes are checked while the tests run; production pays nothing for them."""
+"""Shared fixtures, and runtime checks of array shapes that are active only in tests."""
 
 import os
 from pathlib import Path
@@ -21,7 +21,7 @@ if os.environ.get("R2C2R_SHAPES", "1") == "1":
 
 @pytest.fixture(scope="session")
 def kitchen_bundle(tmp_path_factory: pytest.TempPathFactory) -> "tuple[Path, Certificate]":
-    """A small kitchen as the exporter writes it, one of its objects made from the scan; the zip, and its folder beside it."""
+    """Bundle of a small kitchen as exported, with one object made from the scan: the zip, its folder next to it."""
     from r2c2r_core.export.stage import ExportConfig, write_bundle
     from tests.core.export.kitchen import CREATED, reconstruction
 

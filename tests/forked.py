@@ -1,4 +1,4 @@
-"""Servers in processes forked from one that has imported the app: each starts in a tenth of the time."""
+"""Servers forked from a process that has already imported the app: each starts in a tenth of the time."""
 
 import multiprocessing
 import os
@@ -14,7 +14,7 @@ _CONTEXT.set_forkserver_preload(["tests.preloaded"])
 
 
 class Forked:
-    """A function of a module, run in a process of its own in today's environment; what it prints is read line by line."""
+    """A module's function in its own process with the current environment; its output is read line by line."""
 
     def __init__(self, run: Callable[..., None], *args: Any, **kwargs: Any) -> None:
         reader, writer = _CONTEXT.Pipe(duplex=False)
@@ -26,22 +26,22 @@ class Forked:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Process id."""
         assert self.process.pid is not None
         return self.process.pid
 
     def readline(self) -> str:
-        """The next line; nothing when it has ended."""
+        """The next line of output; empty once the process has ended."""
         return self._printed.readline()
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill the process."""
         self.process.kill()
         self.process.join()
         self._printed.close()
 
     def end(self) -> int:
-        """Ask it to end; one that does not is killed. Returns its exit code."""
+        """Terminate the process, or kill it if it does not end; return its exit code."""
         self.process.terminate()
         self.process.join(PATIENCE_S)
         code = self.process.exitcode
@@ -51,7 +51,7 @@ class Forked:
 
 @contextmanager
 def forked(run: Callable[..., None], *args: Any, **kwargs: Any) -> Iterator[Forked]:
-    """A function in a process of its own, which is asked to end with the block."""
+    """Run a function in its own process, which is terminated when the block ends."""
     process = Forked(run, *args, **kwargs)
     try:
         yield process

@@ -1,4 +1,4 @@
-"""What a served app takes long to import and to build, made at import: servers are forked from a process that has it."""
+"""Slow imports and set-up of a served app, done at import: servers are forked from a process that has imported this."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

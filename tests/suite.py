@@ -13,12 +13,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     path = config.getoption("failures")
-    if path and not hasattr(config, "workerinput"):  # a worker of xdist reports to the one who writes
+    if path and not hasattr(config, "workerinput"):  # a worker of xdist reports to the process that writes the file
         config.pluginmanager.register(Failures(path))
 
 
 class Failures:
-    """Writes failed tests down as they fail, so that a run that is ended still has them."""
+    """Writer of failed tests as they fail, so that an interrupted run keeps them."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -1,4 +1,4 @@
-"""The house: contracts that import-linter cannot say, and documents that must stay true."""
+"""Architecture rules that import-linter cannot express, and consistency checks of documents."""
 
 import argparse
 import ast
@@ -58,7 +58,7 @@ def test_a_circle_of_imports_is_found_across_packages(tmp_path: Path) -> None:
 
 
 def import_graph(root: Path, *packages: str) -> dict[str, set[str]]:
-    """By module of these packages: the modules of them that it imports."""
+    """Imports among the modules of these packages, by module."""
     paths = {path: path.relative_to(root).with_suffix("").parts for name in packages for path in (root / name).rglob("*.py")}
     modules = {".".join(parts[:-1] if parts[-1] == "__init__" else parts): path for path, parts in paths.items()}
     graph = {}
@@ -102,7 +102,7 @@ def test_import_levels_are_counted_through_functions_and_relative_imports(tmp_pa
 
 
 def import_levels(room: Path) -> dict[str, int]:
-    """By module of a package: how many of its modules the longest chain of imports from it passes, itself counted."""
+    """Level of each module of a package: number of modules in the longest import chain from it within the package."""
     modules = {path.stem: ast.parse(path.read_text()) for path in room.glob("*.py") if path.stem != "__init__"}
     package = ".".join(room.parts[room.parts.index("r2c2r_core") :])
     named = {name: _imported(tree, package) for name, tree in modules.items()}
@@ -114,7 +114,7 @@ def import_levels(room: Path) -> dict[str, int]:
 
 
 def _imported(tree: ast.Module, package: str) -> set[str]:
-    """Every name that a module of `package` may import, wherever in it the import stands."""
+    """Every name that a module of `package` may import, anywhere in the module."""
     found = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -128,7 +128,7 @@ def _imported(tree: ast.Module, package: str) -> set[str]:
 @pytest.mark.parametrize("module", ["r2c2r_core.cli", "r2c2r_core.pipeline", "app.main, app.work"])
 def test_importing_costs_nothing_heavy(module: str) -> None:
     heavy = ["open3d", "mujoco", "scene_synthesizer", "torch", "transformers", "pybullet", "viser", "trimesh"]
-    heavy += ["opentelemetry.sdk", "opentelemetry.exporter"]  # traces are taken where a setting says so
+    heavy += ["opentelemetry.sdk", "opentelemetry.exporter"]  # imported only if a setting turns traces on
     code = f"import sys, {module}; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
@@ -167,13 +167,13 @@ def test_alembic_folder_does_not_shadow_the_library() -> None:
 
 def test_no_large_file_is_tracked() -> None:
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False).stdout.decode().split("\0")
-    most = {".onnx": 5_000_000}  # weights that come with the code
+    most = {".onnx": 5_000_000}  # weights shipped with the code
     sizes = {name: (ROOT / name).stat().st_size for name in listed if name and (ROOT / name).exists()}
     assert [name for name, size in sizes.items() if size > most.get(Path(name).suffix, 1_000_000)] == []
 
 
 HURRIED = re.compile(r"time\.sleep\(|wait_for_timeout\(|\btimeout=[\d.]*[1-9]|\.(wait|join|result)\(\d")
-"""A wait of a chosen length, or a limit of one's own: no number is right on every machine. A timeout of 0 is no wait."""
+"""A fixed wait, or a separate time limit: no number is right on every machine. A timeout of 0 is not a wait."""
 MAY_HURRY = {
     "waiting.py": "the one wait that is of a length",
     "app/fakes/live.py": "takes its time as slow work does",
@@ -197,18 +197,18 @@ def test_no_test_is_in_a_hurry() -> None:
         if HURRIED.search(line)
     ]
     assert [found for found in hurried if found[0] not in MAY_HURRY] == []
-    assert MAY_HURRY.keys() - {path for path, *_ in hurried} == set()  # a reason goes with what it was for
+    assert MAY_HURRY.keys() - {path for path, *_ in hurried} == set()  # exceptions are removed with the code that needed them
 
 
 def test_the_readme_names_every_command_and_stays_short() -> None:
     readme = (ROOT / "README.md").read_text()
     commands = next(action.choices for action in build_parser()._actions if isinstance(action, argparse._SubParsersAction))
     assert [command for command in commands if f"`r2c2r {command}`" not in readme] == []
-    assert len(readme.splitlines()) <= 150  # it is for users: the rest lives in docs/
+    assert len(readme.splitlines()) <= 150  # it is for users: all else is in docs/
 
 
 MAX_CORE_LINES, MAX_PARAMS = 65_223, 1_293
-"""Of r2c2r_core. A change that needs more raises the number here, in its own commit, and says why."""
+"""Limits of r2c2r_core. A change that needs more raises the number here, in its own commit, with the reason."""
 
 
 def test_the_core_and_its_tuned_numbers_do_not_grow() -> None:

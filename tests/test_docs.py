@@ -1,4 +1,4 @@
-"""The documentation builds from the checkout, without the network and without a warning, and says what the code is."""
+"""The documentation builds from the checkout, without network access and warnings, and agrees with the code."""
 
 import html
 import importlib.util
@@ -21,7 +21,7 @@ SHOWN = re.compile(r'^ *--8<-- "([^":]+)(?::(\w+))?"$', re.MULTILINE)
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """As `make docs` builds it, where no proxy and no host answers."""
+    """The site as `make docs` builds it, without network access."""
     out = tmp_path_factory.mktemp("site")
     unreachable = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
     done = subprocess.run(

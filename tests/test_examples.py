@@ -1,4 +1,4 @@
-"""Every file of examples/ runs, on a sample so small that its pictures say little."""
+"""Every file of examples/ runs, on a sample too small for meaningful results."""
 
 import runpy
 import sys
@@ -22,7 +22,7 @@ Run = Callable[..., str]
 
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """An example as its first line says, with arguments; what it printed."""
+    """Run an example with arguments; return its output."""
 
     def ran(name: str, *arguments: object) -> str:
         monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
@@ -93,7 +93,7 @@ def test_opening_is_learnt(run: Run, tmp_path: Path) -> None:
 
 @pytest.fixture
 def address(tmp_path: Path) -> Iterator[str]:
-    """A server on a free port whose workers obey the tests; the address it would print."""
+    """A server on a free port with stand-in workers; the address it would print."""
     settings = Settings(data_dir=tmp_path, host="127.0.0.1", min_free_bytes=0, job_memory_bytes=0)
     with served(create_app(settings, commands=FAKE_COMMANDS)) as port:
         yield f"http://127.0.0.1:{port}/?token={settings.launch_token}"

@@ -1,4 +1,4 @@
-"""Packages of other people, installed as their metadata and files on the path: used by the code of the command line."""
+"""Third-party plugin packages, installed as metadata and files on the path and used by the command line's code."""
 
 import sys
 import tomllib
@@ -37,7 +37,7 @@ Install = Callable[..., Path]
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """Put a package of one module on the path, with its entry points; answers the module's file."""
+    """Put a one-module package with entry points on the path; return the module's file."""
     monkeypatch.syspath_prepend(tmp_path)
     loaded = set(sys.modules)
 
@@ -120,14 +120,14 @@ OWN_PACKAGE = Path(__file__).resolve().parent.parent / "examples" / "own_package
 
 
 def own_entry(group: str) -> tuple[str, str, str]:
-    """Module, entry point and code of the example package, as its pyproject.toml says."""
+    """Module, entry point and code of the example package, from its pyproject.toml."""
     ((name, target),) = tomllib.loads((OWN_PACKAGE / "pyproject.toml").read_text())["project"]["entry-points"][group].items()
     module = target.partition(":")[0]
     return module, f"{name} = {target}", (OWN_PACKAGE / f"{module}.py").read_text()
 
 
 def write_numpy_scan(scan: Path, frames: int) -> list[Rigid3]:
-    """A wall 2 m away with a box 0.4 m before it, from places 0.1 m apart; the cameras' poses."""
+    """A wall 2 m away with a box 0.4 m before it, filmed from places 0.1 m apart; returns the camera poses."""
     scan.mkdir()
     towards_y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     camera = np.array([[80.0, 0.0, 48.0], [0.0, 80.0, 36.0], [0.0, 0.0, 1.0]])
@@ -168,7 +168,7 @@ def test_a_recording_of_another_packages_format_is_read(install: Install, tmp_pa
         stood = (capture.world_from_capture @ pose).matrix
         np.testing.assert_allclose(frame.world_from_camera.matrix, stood, atol=5e-3)  # 5 mm: poses may be refined
         depth = capture.images.depth(frame.index).metres
-        assert depth[36, 80] == pytest.approx(2.0, abs=1e-3)  # the store's step is 0.25 mm
+        assert depth[36, 80] == pytest.approx(2.0, abs=1e-3)  # quantisation step of the store: 0.25 mm
         assert depth[36, 40] == pytest.approx(1.6, abs=1e-3)
     (tmp_path / "scan" / "frame_1.npz").write_bytes(b"PK")
     with pytest.raises(CaptureError, match=r"frame_1\.npz"):
@@ -256,7 +256,7 @@ def test_an_output_format_of_another_package_is_written_checked_and_described(in
     found = {finding.rule for finding in lint(folder)}
     (folder / "scene.count").write_text("many")
     assert {finding.where for finding in lint(folder) if finding.rule == "format"} == {"scene.count"}
-    (folder / "scene.count").unlink()  # made where that package was not: no finding
+    (folder / "scene.count").unlink()  # as made without that package: no finding
     assert {finding.rule for finding in lint(folder)} == found
 
 

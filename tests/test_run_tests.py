@@ -1,4 +1,4 @@
-"""The suite's own runner: a test that fails is run once more, alone, and only that decides."""
+"""The test runner: a failed test is rerun once, alone, and only the rerun counts."""
 
 import importlib.util
 import os
@@ -25,7 +25,7 @@ def test_once():
 
 @pytest.fixture
 def runner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """`scripts/run_tests.py` over an empty project."""
+    """`scripts/run_tests.py` for an empty project."""
     spec = importlib.util.spec_from_file_location("run_tests", ROOT / "scripts" / "run_tests.py")
     assert spec is not None
     assert spec.loader is not None

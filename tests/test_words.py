@@ -1,4 +1,4 @@
-"""No page says words again that stopped people who used it."""
+"""Words that confused users appear on no page."""
 
 from pathlib import Path
 
@@ -35,5 +35,5 @@ def test_words_that_stopped_people_are_gone(words: str) -> None:
 
 
 def quoted(text: str) -> list[str]:
-    """Lines with something in quotes: a docstring may use any word."""
+    """Lines with a quoted text: docstrings may use any word."""
     return [line for line in text.splitlines() if '"' in line or "`" in line]

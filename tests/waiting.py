@@ -1,4 +1,4 @@
-"""How long tests wait: one patience for every limit, stretched by R2C2R_PATIENCE on a slow machine."""
+"""Time limits of tests: one patience for all, scaled by R2C2R_PATIENCE on slow machines."""
 
 import os
 import threading
@@ -12,13 +12,13 @@ FACTOR = float(os.environ.get("R2C2R_PATIENCE", "1"))
 PATIENCE_S = 180 * FACTOR
 """Seconds until a test gives up waiting for what should happen: nothing that works comes near it."""
 PATIENCE_MS = 1000 * PATIENCE_S
-LOOK_S = 0.02  # between two looks at a condition, at least
-LONGEST_S = 0.5  # and at most
-REST = 3  # times as long as a look took: what is waited for needs the processor more than who waits
+LOOK_S = 0.02  # minimum interval between two checks of a condition
+LONGEST_S = 0.5  # maximum interval
+REST = 3  # interval as a multiple of the check's duration, to leave the CPU to the code under test
 
 
 def until(condition: Callable[[], object], said: str = "what was waited for did not happen") -> None:
-    """Wait until the condition holds; fails after `PATIENCE_S`."""
+    """Poll until the condition holds; fails after `PATIENCE_S`."""
     began = time.monotonic()
     deadline = began + PATIENCE_S
     while not condition():
@@ -29,7 +29,7 @@ def until(condition: Callable[[], object], said: str = "what was waited for did 
 
 
 def gone(process: psutil.Process) -> bool:
-    """Whether a process has ended, be it unknown to its parent yet; it may end between two questions."""
+    """Whether a process has ended, possibly as a zombie; it may end between two checks."""
     try:
         return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
     except psutil.NoSuchProcess:
@@ -38,7 +38,7 @@ def gone(process: psutil.Process) -> bool:
 
 @contextmanager
 def held() -> Iterator[threading.Event]:
-    """An event that what is held waits for; set at the latest when the block ends, so that no thread outlives its test."""
+    """An event that blocked code waits for; set at the latest when the block ends, so that no thread outlives its test."""
     released = threading.Event()
     try:
         yield released
