@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 RIGHT = {
-    "mask": "its IoU with the truth",
-    "edge": "the front ends within 10 mm of there",
-    "seam": "the front holds some of the next one",
-    "hinge": "the door is hinged there",
+    "mask": "IoU with the true mask",
+    "edge": "the front's true edge is within 10 mm",
+    "seam": "the front includes part of its neighbour",
+    "hinge": "the door is hinged on that side",
 }
 
 

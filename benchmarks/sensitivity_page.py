@@ -12,24 +12,25 @@ MOVES = {"-25": 0.75, "+25": 1.25}
 SHOWN = 40
 
 BETTER = {
-    "segment.appliances.faces.patch_m": "the length over which this recording's depth errs alike",
+    "segment.appliances.faces.patch_m": "the correlation length of the recording's depth noise",
     "segment.appliances.box.front_m": "the recording's depth noise",
-    "segment.things.visual_hull.inside": "hull and cylinder both made, and the one kept that silhouettes agree with more",
-    "segment.things.visual_hull.pose_share": "the same: a hull that fails by a hair becomes a cylinder",
-    "segment.things.pixel_cut.smooth": "contrast across the borders that are sure in the same recording",
-    "segment.planes.cell_m": "the spacing of the fused surface",
-    "generate.lathe.bitten": "the likelihood of a profile under depth and masks, neck and body apart",
-    "generate.boxed.looked_at": "every frame that shows the front, weighted by what it adds",
-    "generate.consistency.judges": "every frame that sees the object, weighted by what it adds",
+    "segment.things.visual_hull.inside": "fit both a hull and a cylinder, and keep the one with the better silhouette IoU",
+    "segment.things.visual_hull.pose_share": "the same: a hull just below the threshold is replaced by a cylinder",
+    "segment.things.pixel_cut.smooth": "the contrast across the certain borders of the same recording",
+    "segment.planes.cell_m": "the vertex spacing of the fused surface",
+    "generate.lathe.bitten": "the likelihood of a profile given depth and masks, separately for neck and body",
+    "generate.boxed.looked_at": "all frames that show the front, weighted by their information",
+    "generate.consistency.judges": "all frames that show the object, weighted by their information",
 }
 """By number: the estimator that would stand in its place."""
 
 WHY = (
-    "`segment.appliances.faces.gap_m` and `patch_m` were one limit told twice (12.5 and 9.5 of loss): with a patch longer than",
-    "the gap, every patch was the last one. Told beyond a patch's length, the gap moves nothing, and the patch 0.1.",
-    "`generate.lathe.bitten` above 1 called every mask bitten; it is bounded below 1 now.",
+    "`segment.appliances.faces.gap_m` and `patch_m` used to define the same limit (effects of 12.5 and 9.5 on the loss): if a",
+    "patch was longer than the gap, every patch counted as the last one. The gap is now added to the patch length; it has",
+    "no effect any more, and the patch length changes the loss by 0.1.",
+    "`generate.lathe.bitten` above 1 classified every mask as cut off; its upper bound is now 1.",
     "`segment.things.visual_hull.inside` and `pose_share` choose between a hull and a cylinder for one bottle, and",
-    "`generate.consistency.judges` below 8 chooses another candidate; each stands where the choice is the right one.",
+    "`generate.consistency.judges` below 8 selects another candidate; the current values make the right choice in both cases.",
 )
 """Of those with the largest effects: what they decide."""
 
@@ -92,18 +93,18 @@ def table(document: Mapping[str, Any]) -> str:
     )
     return "\n".join(
         [
-            "# Which numbers matter",
+            "# Sensitivity to tuned numbers",
             "",
-            "`benchmarks/sensitivity.py` moves each tuned number by a quarter either way, alone, on one object of each kind",
-            "whose steps read it, and compares what comes out with the truth of the recordings below. The loss adds the mean",
-            "error of the sizes in percent, 100 (1 - mask IoU) and 100 (1 - share of right joints). Below 0 is better than as",
-            "it is.",
+            "`benchmarks/sensitivity.py` changes each tuned number alone by -25 % and +25 %, on one object of each kind whose",
+            "stages read it, and compares the result with the ground truth of the recordings below. The loss is the sum of the",
+            "mean size error in percent, 100 (1 - mask IoU) and 100 (1 - share of correct joints). The table shows the change",
+            "of the loss; negative values are better.",
             "",
             *(_run_line(run) for run in document["runs"]),
             "",
             "![Change of the loss by number](sensitivity.svg)",
             "",
-            "| number | -25 % | +25 % | what would estimate it |",
+            "| number | -25 % | +25 % | possible estimator |",
             "|---|---:|---:|---|",
             *(
                 f"| `{name}` | {down:+.3f} | {up:+.3f} | {BETTER.get(name.partition('[')[0], '')} |"
@@ -111,25 +112,25 @@ def table(document: Mapping[str, Any]) -> str:
                 if max(abs(down), abs(up)) > 0.0
             ),
             "",
-            "## The largest effects",
+            "## Largest effects",
             "",
             *WHY,
             "",
-            f"## Moved, and not a byte of any step was another ({len(same)})",
+            f"## No effect on the output of any stage ({len(same)})",
             "",
             _listed(sorted(same)),
             "",
-            f"## Moved without effect on sizes, masks and joints ({len(still)})",
+            f"## No effect on sizes, masks and joints ({len(still)})",
             "",
-            "How much room boards and fronts leave shows in contacts, and how fine a mesh or a texture is in pictures, which",
-            "are not scored here.",
+            "Gaps between boards and fronts affect contacts, and mesh and texture resolution affect images; neither is scored",
+            "here.",
             "",
             _listed(still),
             "",
-            *([f"## Ended in an error ({len(broken)})", "", _listed(broken), ""] if broken else []),
-            f"## Not read by the steps that were repeated ({len(untouched)})",
+            *([f"## Errors ({len(broken)})", "", _listed(broken), ""] if broken else []),
+            f"## Not read by the stages that were run ({len(untouched)})",
             "",
-            "Other kitchens, other recordings and other backends read them.",
+            "Other kitchens, recordings and backends read them.",
             "",
             _listed(untouched),
             "",

@@ -1,4 +1,4 @@
-"""Pages made from the code while the site is built: every setting of a run, every option of every command."""
+"""Tables generated at build time: all settings of a run, all options of all commands."""
 
 import argparse
 from collections.abc import Iterator
@@ -13,16 +13,16 @@ _SETTINGS, _COMMANDS = "<!-- every setting -->", "<!-- every command -->"
 
 
 def on_config(config: Any) -> Any:
-    """Pages that the navigation does not name stand at its end: none is lost."""
+    """Append the pages that the navigation does not list."""
     named = str(config["nav"])
     further = sorted(page.name for page in Path(config["docs_dir"]).glob("*.md") if page.name not in named)
     if further:
-        config["nav"].append({"Run it for others": further})
+        config["nav"].append({"Further pages": further})
     return config
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """The page with the tables where it asks for them."""
+    """Replace the page's markers by the generated tables."""
     for mark, made in ((_SETTINGS, tables), (_COMMANDS, commands)):
         if mark in markdown:
             markdown = markdown.replace(mark, made())
