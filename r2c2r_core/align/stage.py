@@ -1,4 +1,4 @@
-"""Placement of a candidate in the scan (paper §4.3, corrected by method.md rows 1-7): refinement of a known pose or search.
+"""Placement of a candidate in the scan (paper §4.3, corrected by method.md rows 1-7): by search, or at a known pose.
 
 The search: geometry proposes (all rotations of the mesh's box onto the measured box), features add proposals, and one score
 decides: rendered masks, depth and colours against the photos. It uses only the mesh's surface and texture.

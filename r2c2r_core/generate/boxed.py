@@ -41,7 +41,7 @@ class Params:
     block_error: float = param(0.25, "ratio", "Error assigned to a handle drawn as a solid block, relative to its protrusion")
 
 
-def box_hypotheses(evidence: Evidence, front: FrontPanel) -> tuple[Hypothesis, ...]:
+def front_hypotheses(evidence: Evidence, front: FrontPanel) -> tuple[Hypothesis, ...]:
     """A measured front extruded to each candidate depth, with its handle and without; frame `front`."""
     depths = _depths(evidence, front)
     relief = cache(partial(measure_relief, front))  # the guesses of one draw share it

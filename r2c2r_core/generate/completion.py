@@ -10,7 +10,7 @@ import numpy as np
 from r2c2r_core.errors import GenerationFailed
 from r2c2r_core.generate.asset import centred, shape_metrics
 from r2c2r_core.generate.bake import bake
-from r2c2r_core.generate.boxed import box_hypotheses
+from r2c2r_core.generate.boxed import front_hypotheses
 from r2c2r_core.generate.charts import Atlas, planar_atlas, unwrapped_atlas
 from r2c2r_core.generate.consistency import Params as ConsistencyParams
 from r2c2r_core.generate.consistency import self_consistency
@@ -146,7 +146,7 @@ def _hypotheses_of(evidence: Evidence, everything: Variation) -> tuple[Hypothesi
     """Hypotheses by the segmenter's kind of object; a front or appliance without measurements is treated as a free object."""
     track = evidence.track
     if track.kind != "thing" and track.front is not None:
-        return box_hypotheses(evidence, track.front)
+        return front_hypotheses(evidence, track.front)
     return thing_hypotheses(evidence, everything)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from r2c2r_core.generate.boxed import box_hypotheses
+from r2c2r_core.generate.boxed import front_hypotheses
 from r2c2r_core.generate.lathe import lathe_mesh
 from r2c2r_core.generate.symmetry import Revolution
 from r2c2r_core.generate.things import thing_hypotheses
@@ -193,7 +193,7 @@ def carton_scene(size, *, arc_deg, elevation_deg, yaw_rad, wall_gap_m=0.05, seed
 
 def box_shape(evidence, variation):
     """The shape of the likeliest hypothesis about a front or an appliance."""
-    return box_hypotheses(evidence, evidence.track.front)[0].shape(variation)
+    return front_hypotheses(evidence, evidence.track.front)[0].shape(variation)
 
 
 def best_thing(evidence, variation=None):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from r2c2r_core.generate.boxed import box_hypotheses
+from r2c2r_core.generate.boxed import front_hypotheses
 from r2c2r_core.generate.completion import Completion
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.variation import draw_variation
@@ -92,5 +92,5 @@ def test_only_an_observed_depth_is_a_candidate(appliance_scene):
     for seen in (True, False):
         box = replace(track.box, dimensions_m=np.array([0.46, 0.28, 0.28]), depth_seen=seen)
         evidence = gather_evidence(capture, replace(track, box=box), 10)
-        told = [hypothesis.assumes for hypothesis in box_hypotheses(evidence, track.front)]
+        told = [hypothesis.assumes for hypothesis in front_hypotheses(evidence, track.front)]
         assert any("its box was measured" in each for each in told) == seen
