@@ -20,7 +20,7 @@ def spiked() -> tuple[Surface, int]:
     return Surface(vertices, np.concatenate([faces, [[0, len(flat), len(flat) + 1]]]), np.zeros_like(vertices)), len(faces)
 
 
-def test_statistical_outliers_leave_the_surface_they_hang_on():
+def test_statistical_outliers_attached_to_a_surface_are_removed():
     surface, flat_faces = spiked()
     cleaned = drop_outliers(surface, 20)
     assert cleaned.vertices[:, 2].max() == 0.0
@@ -28,7 +28,7 @@ def test_statistical_outliers_leave_the_surface_they_hang_on():
     assert drop_crumbs(surface, 0.01).vertices[:, 2].max() == 0.9  # connected, so not a crumb
 
 
-def test_a_floating_crumb_goes():
+def test_a_small_disconnected_fragment_is_removed():
     flat, faces = patch()
     vertices = np.concatenate([flat, [[0, 0, 1.0], [0.02, 0, 1.0], [0, 0.02, 1.0]]])
     floating = np.concatenate([faces, [[len(flat), len(flat) + 1, len(flat) + 2]]])

@@ -26,7 +26,7 @@ def grid():
 
 
 @pytest.mark.parametrize(("near", "far"), [(1.0, 1.6), (1.5, 2.1), (2.5, 3.3)])
-def test_pixels_between_two_surfaces_go_and_the_surfaces_stay(near, far):
+def test_flying_pixels_between_surfaces_are_removed_and_surfaces_are_kept(near, far):
     y, x = grid()
     depth = mixed(scene(far, near, x + 0.35 * y < 560))
     between = (depth > near + 0.05) & (depth < far - 0.08)
@@ -37,7 +37,7 @@ def test_pixels_between_two_surfaces_go_and_the_surfaces_stay(near, far):
 
 
 @pytest.mark.parametrize("distance", [0.8, 1.2, 1.8])
-def test_a_bar_handle_12_mm_thick_stays(distance):
+def test_a_12_mm_bar_handle_is_not_removed_as_flying_pixels(distance):
     _, x = grid()
     bar = np.abs(x - 380) < 0.006 / distance * 193 * 4
     depth = mixed(scene(distance, distance - 0.04, bar))
@@ -47,7 +47,7 @@ def test_a_bar_handle_12_mm_thick_stays(distance):
 
 
 @pytest.mark.parametrize("width_m", [0.02, 0.028])
-def test_a_bottles_neck_stays_though_the_sensor_is_unsure_of_it(width_m):
+def test_a_thin_bottle_neck_keeps_its_medium_confidence_depth(width_m):
     """A phone's LiDAR gives medium confidence to each pixel near a step: of a neck 28 mm wide, to all of them."""
     _, x = grid()
     neck = np.abs(x - 380) < width_m / 2 / 1.4 * 193 * 4
@@ -58,14 +58,14 @@ def test_a_bottles_neck_stays_though_the_sensor_is_unsure_of_it(width_m):
     assert ((usable > 0) & (usable < 1.6)).any(axis=1).mean() > 0.95
 
 
-def test_the_edge_of_what_is_wide_is_no_ridge():
+def test_the_edge_of_a_wide_object_is_not_a_ridge():
     """There the sensor's doubt is about where the edge is, and a sure pixel beside it shows the surface."""
     _, x = grid()
     depth = mixed(scene(2.0, 1.4, x < 380))
     assert ridges(depth).mean() < 1e-3
 
 
-def test_a_chair_leg_before_a_far_wall_stays():
+def test_a_chair_leg_in_front_of_a_far_wall_is_kept():
     _, x = grid()
     leg = np.abs(x - 381) < 0.02 / 1.4 * 193 * 4
     depth = mixed(scene(2.6, 1.4, leg))
@@ -74,7 +74,7 @@ def test_a_chair_leg_before_a_far_wall_stays():
     assert (flying_pixels(depth, CAMERA) & core).sum() < 0.02 * core.sum()
 
 
-def test_a_worktop_seen_flatly_stays_until_it_cannot_be_measured():
+def test_a_worktop_at_grazing_angles_of_15_degrees_or_more_is_kept():
     y, _ = grid()
     slope = (y / 4 - 128) / 193  # a level plane 0.6 m below the camera
     fine = np.where(slope > 0.1, 0.6 / np.maximum(slope, 0.1), 0).astype(np.float32)
@@ -84,7 +84,7 @@ def test_a_worktop_seen_flatly_stays_until_it_cannot_be_measured():
     assert rejected[seen_at_15_deg_or_steeper].mean() < 0.01
 
 
-def test_unknown_unsure_and_out_of_range_pixels_become_zero():
+def test_invalid_low_confidence_and_out_of_range_pixels_become_zero():
     metres = np.full((256, 192), 1.5, np.float32)
     metres[0, :5] = (np.nan, np.inf, -np.inf, 0.01, 20.0)
     confidence = np.full(metres.shape, 2, np.uint8)
@@ -103,7 +103,7 @@ def test_stored_depth_is_exact_to_an_eighth_of_a_millimetre():
     assert np.abs(back - depth).max() < 0.000126
 
 
-def test_filling_takes_the_nearest_known_value_and_keeps_the_known():
+def test_hole_filling_uses_the_nearest_known_depth_and_keeps_known_values():
     depth = np.zeros((9, 9), np.float32)
     depth[:, 0], depth[:, 8] = 1.0, 2.0
     filled = fill_for_display(depth)

@@ -86,7 +86,7 @@ class Darker:
         return self.images.depth(index)
 
 
-def test_a_good_recording_is_good(report):
+def test_a_good_recording_gets_the_verdict_good(report):
     assert report.verdict == "good", report.reasons
     assert report.reasons == ()
     assert report.convention is None
@@ -120,14 +120,14 @@ def test_a_good_recording_is_good(report):
         "zero confidence",
     ],
 )
-def test_a_corrupted_recording_is_told_by_its_cause(name, corrupted):
+def test_a_corrupted_recording_is_reported_with_its_cause(name, corrupted):
     report = corrupted(name)
     assert report.verdict != "good"
     assert report.remarks[0].cause in named(name).causes, report.reasons
 
 
 @pytest.mark.parametrize("factor", [1000.0, pytest.param(10.0, marks=pytest.mark.slow), 0.1])
-def test_depth_in_another_unit_is_named_with_the_option_that_mends_it(factor, scan, tmp_path):
+def test_depth_in_a_wrong_unit_is_reported_with_the_correcting_option(factor, scan, tmp_path):
     other = Corruption(name="unit", depth=lambda depth, _: depth * np.float32(factor))
     bad = corrupt_r3d(other, scan, tmp_path / "unit.r3d")
     report = examine(read_capture(bad, tmp_path / "store", CONFIG), open_recording(bad))
@@ -138,7 +138,7 @@ def test_depth_in_another_unit_is_named_with_the_option_that_mends_it(factor, sc
 
 
 @pytest.mark.parametrize("name", ["all poses NaN", "all LZFSE truncated"])
-def test_a_hopeless_recording_is_refused_in_one_line(name, corrupted):
+def test_an_unusable_recording_is_rejected_with_an_error_report(name, corrupted):
     with pytest.raises(CaptureError, match=named(name).refusal) as problem:
         corrupted(name)
     document = refusal_to_json(problem.value)
@@ -156,14 +156,14 @@ def test_a_wrong_scale_and_focal_length_are_measured(corrupted):
     assert corrupted("focal length x1.1").scale.factor == pytest.approx(1 / 1.1, rel=0.03)
 
 
-def test_images_turned_against_their_poses_and_shifted_frames_are_told(capture):
+def test_images_rotated_against_their_poses_are_reported(capture):
     turned = examine(
         with_frames(capture, lambda _, f: posed(f, f.world_from_camera @ Rigid3(rotation_about_z(np.pi / 2), np.zeros(3))))
     )
     assert turned.remarks[0].cause == "image_rotated"
 
 
-def test_images_under_the_pose_of_the_next_frame_are_told(folder):
+def test_images_with_the_pose_of_the_next_frame_are_reported(folder):
     quick = TinyRoom(count=9)  # with so few frames each step is large
     capture = read_capture(write_r3d(folder / "quick.r3d", quick), folder / "quick", CONFIG)
     poses = [f.world_from_camera for f in capture.frames]
@@ -171,7 +171,7 @@ def test_images_under_the_pose_of_the_next_frame_are_told(folder):
     assert report.remarks[0].cause == "frames_shifted", report.reasons
 
 
-def test_colour_elsewhere_than_its_calibration_says_is_told(capture):
+def test_wrong_colour_focal_length_or_centre_is_reported(capture):
     camera = capture.frames[0].rgb_camera
     longer = replace(camera, fx=1.1 * camera.fx, fy=1.1 * camera.fy)
     report = examine(with_frames(capture, lambda _, f: replace(f, rgb_camera=longer)))
@@ -189,7 +189,7 @@ def test_colour_elsewhere_than_its_calibration_says_is_told(capture):
     assert report.verdict == "unusable"
 
 
-def test_depth_a_few_pixels_beside_its_colour_is_used_with_care(report):
+def test_depth_misaligned_by_a_few_pixels_is_usable_with_care(report):
     slight = replace(report.registration, off_px=2.4, limit_px=2.0, edge_px=2.0, edge_best_px=1.5, focal_only=False)
     remarks = judge(report.figures, None, None, slight)
     assert ("usable with care", "unregistered") in {(r.verdict, r.cause) for r in remarks}
@@ -203,12 +203,12 @@ def test_depth_a_few_pixels_beside_its_colour_is_used_with_care(report):
         ([1_000_003 * n + n * n for n in range(24)], 0.0),  # timestamps instead of numbers
     ],
 )
-def test_only_gaps_in_regular_numbers_are_dropped_frames(capture, numbers, missing):
+def test_only_gaps_in_regular_frame_numbers_count_as_dropped_frames(capture, numbers, missing):
     numbered = replace(capture, frames=tuple(replace(f, index=n) for f, n in zip(capture.frames, numbers, strict=False)))
     assert measure_timing(None, numbered.frames).missing_share == pytest.approx(missing)
 
 
-def test_a_jump_of_the_tracking_is_told(capture):
+def test_a_tracking_jump_is_reported(capture):
     def jump(k, frame):
         pose = frame.world_from_camera
         return posed(frame, Rigid3(pose.rotation, pose.translation + np.array([0.5, 0, 0]) * (k >= 12)))
@@ -219,7 +219,7 @@ def test_a_jump_of_the_tracking_is_told(capture):
     assert any(r.cause == "pose_jumps" for r in report.remarks)
 
 
-def test_drift_is_measured_where_the_same_surface_is_seen_again(capture):
+def test_drift_is_measured_where_a_surface_is_observed_again(capture):
     def drift(k, frame):
         share, pose = k / 23, frame.world_from_camera
         turn = Rotation.from_rotvec([0, 0, np.radians(3.0) * share]).as_matrix()
@@ -230,7 +230,7 @@ def test_drift_is_measured_where_the_same_surface_is_seen_again(capture):
     assert any(r.cause == "drift" for r in drifting.remarks), drifting.reasons
 
 
-def test_few_frames_no_floor_and_a_guessed_up_are_told(capture):
+def test_few_frames_missing_floor_and_assumed_up_are_reported(capture):
     poor = replace(capture, frames=capture.frames[:3], room=replace(capture.room, floor_found=False, up_source="assumed"))
     report = examine(poor)
     assert report.verdict == "unusable"
@@ -239,7 +239,7 @@ def test_few_frames_no_floor_and_a_guessed_up_are_told(capture):
     assert examine(replace(capture, frames=capture.frames[:1])).verdict == "unusable"
 
 
-def test_a_gravity_that_is_off_is_said_first_with_its_angle(capture):
+def test_a_gravity_error_is_reported_first_with_its_angle(capture):
     def report(off, corrected):
         room = replace(capture.room, up_file_off_deg=off, up_corrected=corrected, floor_found=False)
         return examine(replace(capture, room=room, frames=capture.frames[:4]))  # too few: unusable for another reason
@@ -252,27 +252,27 @@ def test_a_gravity_that_is_off_is_said_first_with_its_angle(capture):
         assert found.verdict == "unusable"
 
 
-def test_up_in_doubt_is_told_with_the_direction_that_would_mend_it(capture):
+def test_an_ambiguous_up_is_reported_with_the_alternative_direction(capture):
     room = replace(capture.room, up_rival_capture=np.array([1.0, 0.0, 0.0]))
     reasons = examine(replace(capture, room=room)).reasons
     assert any("may lie on their side" in r and "[1, 0, 0]" in r for r in reasons)
 
 
 @pytest.mark.parametrize(("factor", "told"), [(0.72, "28% too small"), (1.0, None), (1.4, "24% too large")])
-def test_furniture_of_no_usual_height_is_a_hint_of_a_wrong_scale(factor, told, report):
+def test_unusual_furniture_height_is_a_hint_of_a_wrong_scale(factor, told, report):
     figures = replace(report.figures, level_heights_m=(0.2, 0.9 * factor if factor < 1 else 0.8 * factor))
     hints = [r for r in judge(figures, None, None, None) if r.cause == "furniture_height"]
     assert [told in hint.line for hint in hints] == ([True] if told else [])
     assert all(hint.verdict == "good" for hint in hints)
 
 
-def test_blur_and_flicker_are_told(capture):
+def test_blur_and_flicker_are_reported(capture):
     blurred = examine(with_frames(capture, lambda k, f: replace(f, sharpness=1.0 if k % 3 == 0 else 100.0)))
     assert any(r.cause == "blur" for r in blurred.remarks)
     assert any(r.cause == "flicker" for r in examine(replace(capture, images=Darker(capture.images))).remarks)
 
 
-def test_a_floor_at_the_wrong_height_is_told(capture):
+def test_a_floor_at_the_wrong_height_is_reported(capture):
     high = with_frames(
         capture,
         lambda _, f: posed(f, Rigid3(f.world_from_camera.rotation, f.world_from_camera.translation + np.array([0, 0, 2]))),
@@ -280,14 +280,14 @@ def test_a_floor_at_the_wrong_height_is_told(capture):
     assert any(r.cause == "camera_height" for r in examine(high).remarks)
 
 
-def test_the_report_is_json(report):
+def test_the_report_is_serialisable_as_json(report):
     document = json.loads(json.dumps(report.to_json()))
     assert document["version"] == 2
     assert document["verdict"] == "good"
     assert document["figures"]["frames"] == 24
 
 
-def test_the_pictures_show_the_surface_and_the_path(capture):
+def test_the_scan_images_show_the_surface_and_the_camera_path(capture):
     plan, view = draw_scan(capture, (240, 160))
     for picture in (plan, view):
         assert picture.shape == (160, 240, 4)

@@ -42,11 +42,11 @@ def balance(capture: Capture, images):
     return balance_exposure(plain, images, surface.vertices_world, surface.faces, capture.depth_noise, rng)
 
 
-def test_an_evenly_exposed_recording_is_left_as_filmed(capture):
+def test_constant_exposure_is_left_unchanged(capture):
     assert {f.gain for f in capture.frames} == {NO_GAIN}
 
 
-def test_changing_exposure_and_white_balance_are_taken_out(capture):
+def test_changing_exposure_and_white_balance_are_compensated(capture):
     time = np.linspace(0, 3 * np.pi, ROOM.count)
     shone = np.stack([0.85 + 0.2 * np.sin(time), 0.9 + 0.1 * np.cos(time), 0.8 + 0.25 * np.sin(time + 1)], axis=1)
     images = Exposed(capture, shone)
@@ -61,7 +61,7 @@ def test_changing_exposure_and_white_balance_are_taken_out(capture):
     assert spread(looks, np.log(gains)) < 0.5 * spread(looks, np.zeros_like(gains))
 
 
-def test_highlights_and_what_moved_do_not_pull_a_frames_gain():
+def test_outlier_points_do_not_bias_the_frame_gains():
     rng = np.random.default_rng(0)
     true = rng.normal(0, 0.2, (12, 3))
     colour = rng.uniform(3.5, 5.0, (300, 3))
@@ -74,7 +74,7 @@ def test_highlights_and_what_moved_do_not_pull_a_frames_gain():
     assert np.abs(error - np.median(error, axis=0)).max() < 0.03
 
 
-def test_a_frame_that_shows_too_little_keeps_its_light():
+def test_a_frame_with_too_few_points_keeps_its_exposure():
     point, frame = (part.ravel() for part in np.meshgrid(np.arange(300), np.arange(3)))
     keep = (frame < 2) | (point < 20)
     log_rgb = np.full((len(point), 3), 4.0) + 0.3 * (frame == 2)[:, None]
@@ -82,7 +82,7 @@ def test_a_frame_that_shows_too_little_keeps_its_light():
     assert np.allclose(solve_gains(looks, 3)[2], 0.0)
 
 
-def test_white_stays_white_and_order_is_kept():
+def test_gain_keeps_white_at_255_and_is_monotonic():
     ramp = np.repeat(np.arange(256, dtype=np.uint8), 3).reshape(1, 256, 3)
     for gain in ((0.5, 0.6, 0.7), (1.5, 1.2, 1.8)):
         out = balanced(ramp, gain)[0].astype(int)

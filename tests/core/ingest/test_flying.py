@@ -35,19 +35,19 @@ def flying(frames, images, position: int) -> np.ndarray:
     return flying_in_others(frames[position], read_depths(frames[position], images), judges)
 
 
-def test_what_one_frame_alone_sees_hanging_goes(stored):
+def test_flying_pixels_observed_by_one_frame_only_are_detected(stored):
     found = flying(*stored, 5)
     assert found[HALO].mean() > 0.95
     assert found.sum() == found[HALO].sum()
 
 
-def test_the_edges_of_a_box_that_all_frames_see_stay(stored):
+def test_box_edges_observed_by_all_frames_are_kept(stored):
     frames, images = stored
     for position in (0, 3, 8, 11):
         assert flying(frames, images, position).sum() <= 3
 
 
-def test_the_stored_depth_is_cleared_and_nothing_else_changes(stored):
+def test_only_flying_pixels_are_cleared_in_stored_depth(stored):
     frames, images = stored
     before = images.depth(5).metres.copy()
     count = drop_flying(frames, images, images.store)
@@ -58,7 +58,7 @@ def test_the_stored_depth_is_cleared_and_nothing_else_changes(stored):
     assert np.array_equal(after[kept], before[kept])
 
 
-def test_without_others_that_look_from_aside_nothing_goes(stored):
+def test_without_other_viewpoints_no_pixels_are_removed(stored):
     frames, images = stored
     assert judges_of(frames[:1], 0) == []
     assert not flying_in_others(frames[5], read_depths(frames[5], images), []).any()

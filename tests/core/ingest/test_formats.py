@@ -33,7 +33,7 @@ SMALL = replace(ROOM, count=4)
 # ARKitScenes
 
 
-def test_arkitscenes_images_between_poses_are_left_out(tmp_path):
+def test_arkitscenes_images_without_a_pose_are_skipped(tmp_path):
     recording = open_recording(write_arkitscenes(tmp_path / "a", ROOM))
     assert [f.index for f in recording.frames] == list(range(0, 24, 2))
     assert told(recording, "12 a pose missing")
@@ -43,7 +43,7 @@ def test_arkitscenes_images_between_poses_are_left_out(tmp_path):
 # Arti4D
 
 
-def test_a_sequence_of_arti4d_that_was_filmed_upside_down_is_turned_back(tmp_path):
+def test_an_upside_down_arti4d_sequence_is_rotated_upright(tmp_path):
     recording = open_recording(write_arti4d(tmp_path / "a", SMALL, flipped=True))
     assert told(recording, "camera upside down")
     for frame, pose in zip(recording.frames, SMALL.poses(), strict=True):
@@ -51,7 +51,7 @@ def test_a_sequence_of_arti4d_that_was_filmed_upside_down_is_turned_back(tmp_pat
     assert not open_recording(write_arti4d(tmp_path / "b", SMALL)).notices
 
 
-def test_arti4d_without_its_calibration_says_which_file_is_missing(tmp_path):
+def test_arti4d_without_calibration_reports_the_missing_file(tmp_path):
     with pytest.raises(CaptureError, match=r"tf\*\.json") as caught:
         open_recording(write_arti4d(tmp_path / "a", SMALL, tf=False))
     assert "azure_tf.json" in caught.value.hint
@@ -60,13 +60,13 @@ def test_arti4d_without_its_calibration_says_which_file_is_missing(tmp_path):
 # ScanNet
 
 
-def test_scannets_lost_poses_are_dropped(tmp_path):
+def test_scannet_frames_with_lost_tracking_are_dropped(tmp_path):
     recording = open_recording(write_scannet(tmp_path / "s", ROOM, lost=(3, 4)))
     assert not {3, 4} & {f.index for f in recording.frames}
     assert told(recording, "2 frames have no usable pose")
 
 
-def test_scannets_calibration_follows_images_that_were_made_smaller(tmp_path):
+def test_scannet_calibration_is_scaled_to_downsized_images(tmp_path):
     room = replace(SMALL, rgb_size=(324, 242), depth_size=(160, 120), focal=290.0)  # a quarter of the sensor's 1296x968
     folder = write_scannet(tmp_path / "s", room)
     full = np.eye(4)
@@ -80,19 +80,19 @@ def test_scannets_calibration_follows_images_that_were_made_smaller(tmp_path):
 # ScanNet++
 
 
-def test_scannetpps_frames_that_were_not_extracted_are_no_loss(tmp_path):
+def test_scannetpp_frames_not_extracted_are_not_reported_as_missing(tmp_path):
     recording = open_recording(write_scannetpp(tmp_path / "s", SMALL))
     assert [f.index for f in recording.frames] == [0, 10, 20, 30]
     assert not told(recording, "left out")
 
 
-def test_scannetpp_that_was_not_aligned_is_opened_without_poses(tmp_path):
+def test_unaligned_scannetpp_recordings_are_opened_without_poses(tmp_path):
     recording = open_recording(write_scannetpp(tmp_path / "s", SMALL, aligned=False))
     assert [frame.capture_from_camera for frame in recording.frames] == [None] * 4
     assert told(recording, "none of 4 poses")
 
 
-def test_scannetpps_cameras_without_numbers_are_named_with_what_was_expected(tmp_path):
+def test_invalid_scannetpp_intrinsics_report_the_expected_format(tmp_path):
     folder = write_scannetpp(tmp_path / "s", SMALL)
     (folder / "pose_intrinsic_imu.json").write_text('{"frame_000000": {"intrinsic": [[1, 0], 2]}}')
     with pytest.raises(CaptureError, match="'intrinsic' of 3x3 numbers"):
@@ -102,7 +102,7 @@ def test_scannetpps_cameras_without_numbers_are_named_with_what_was_expected(tmp
 # 3DMatch and 7-Scenes
 
 
-def test_3dmatch_reads_one_sequence_and_names_the_choice(tmp_path):
+def test_3dmatch_reads_the_first_sequence_with_a_notice(tmp_path):
     recording = open_recording(write_threedmatch(tmp_path / "m", SMALL, sequences=2))
     assert len(recording.frames) == 4
     assert {f.rgb_name.split("/")[0] for f in recording.frames} == {"seq-01"}
@@ -110,7 +110,7 @@ def test_3dmatch_reads_one_sequence_and_names_the_choice(tmp_path):
     assert open_recording(tmp_path / "m" / "seq-02").frames[0].rgb_name.startswith("frame-")
 
 
-def test_7scenes_without_calibration_is_told_to_be_unregistered(tmp_path):
+def test_7scenes_without_calibration_is_reported_as_unregistered(tmp_path):
     room = replace(SMALL, rgb_size=(640, 480))
     recording = open_recording(write_threedmatch(tmp_path / "m", room, intrinsics=False))
     frame = recording.frames[0]
@@ -121,7 +121,7 @@ def test_7scenes_without_calibration_is_told_to_be_unregistered(tmp_path):
 # Redwood / Open3D
 
 
-def test_redwood_images_counted_from_one_find_their_poses(tmp_path):
+def test_redwood_images_numbered_from_one_match_their_poses(tmp_path):
     recording = open_recording(write_redwood(tmp_path / "r", ROOM, first=1))
     zero = open_recording(write_redwood(tmp_path / "z", ROOM))
     assert [f.index for f in recording.frames] == list(range(1, 13))
@@ -130,7 +130,7 @@ def test_redwood_images_counted_from_one_find_their_poses(tmp_path):
         assert np.array_equal(a.capture_from_camera.matrix, b.capture_from_camera.matrix)
 
 
-def test_redwood_without_a_camera_is_a_primesense(tmp_path):
+def test_redwood_without_calibration_uses_primesense_defaults(tmp_path):
     room = replace(SMALL, rgb_size=(640, 480))
     recording = open_recording(write_redwood(tmp_path / "r", room, calibrated=False))
     assert (recording.frames[0].rgb_camera.fx, recording.frames[0].rgb_camera.cy) == (525.0, 240.0)
@@ -141,7 +141,7 @@ def test_redwood_without_a_camera_is_a_primesense(tmp_path):
     ("said", "metres_per_unit"),
     [(4000.0, 0.00025), (0.0001, 0.0001), (3999.999810010195, 0.00025), (1.0, 0.001), ("?", 0.001), (-1, 0.001)],
 )
-def test_depth_that_open3d_saved_of_a_film_is_read_in_the_unit_its_calibration_names(said, metres_per_unit, tmp_path):
+def test_open3d_depth_is_scaled_by_the_unit_of_its_calibration(said, metres_per_unit, tmp_path):
     folder = write_redwood(tmp_path / "r", SMALL)
     (folder / "trajectory.log").unlink()
     camera = json.loads((folder / "camera.json").read_text()) | {"depth_scale": said, "device_name": "Intel RealSense L515"}
@@ -156,7 +156,7 @@ def test_depth_that_open3d_saved_of_a_film_is_read_in_the_unit_its_calibration_n
 # nerfstudio
 
 
-def test_nerfstudio_depth_may_be_an_array_or_in_other_units(tmp_path):
+def test_nerfstudio_depth_is_read_from_npy_and_in_custom_units(tmp_path):
     for k, options in enumerate(({"npy": True}, {"depth_unit_scale_factor": 0.002})):
         recording = open_recording(write_nerfstudio(tmp_path / str(k), SMALL, **options))
         frame = recording.frames[2]
@@ -164,12 +164,12 @@ def test_nerfstudio_depth_may_be_an_array_or_in_other_units(tmp_path):
         assert np.abs(recording.depth_of(frame).metres - exact).max() < 0.0011
 
 
-def test_nerfstudio_without_depth_says_so(tmp_path):
+def test_nerfstudio_without_depth_raises_a_clear_error(tmp_path):
     with pytest.raises(CaptureError, match="0 of 4 frames name a depth image"):
         open_recording(write_nerfstudio(tmp_path / "n", SMALL, depth=False))
 
 
-def test_nerfstudios_distortion_is_taken_out(tmp_path):
+def test_nerfstudio_lens_distortion_is_corrected(tmp_path):
     room = replace(SMALL, rgb_size=(192, 256), depth_size=(192, 256), focal=184.0)
     lens = {"k1": 0.35, "k2": -0.1, "p1": 0.002, "p2": -0.001}
     folder = write_nerfstudio(tmp_path / "n", room, **lens)
@@ -186,7 +186,7 @@ def test_nerfstudios_distortion_is_taken_out(tmp_path):
     assert np.abs(seen - clean).mean() < 3.0 < 0.5 * np.abs(distorted.astype(int) - clean).mean()
 
 
-def test_nerfstudios_black_mask_hides_depth(tmp_path):
+def test_nerfstudio_depth_is_removed_where_the_mask_is_black(tmp_path):
     folder = write_nerfstudio(tmp_path / "n", SMALL)
     document = json.loads((folder / "transforms.json").read_text())
     mask = np.full(ROOM.rgb_size[::-1], 255, np.uint8)
@@ -202,7 +202,7 @@ def test_nerfstudios_black_mask_hides_depth(tmp_path):
     assert "mask.png" in recording.names
 
 
-def test_nerfstudio_fisheyes_are_refused_and_colmaps_world_has_no_up(tmp_path):
+def test_nerfstudio_rejects_fisheye_and_has_no_up_in_colmap_worlds(tmp_path):
     with pytest.raises(CaptureError, match="camera model OPENCV_FISHEYE"):
         open_recording(write_nerfstudio(tmp_path / "f", SMALL, camera_model="OPENCV_FISHEYE"))
     folder = write_nerfstudio(tmp_path / "c", SMALL)
@@ -212,7 +212,7 @@ def test_nerfstudio_fisheyes_are_refused_and_colmaps_world_has_no_up(tmp_path):
     assert open_recording(folder).up_capture is None
 
 
-def test_transforms_beside_folders_of_rgb_and_depth_are_read_with_their_poses_and_unit(tmp_path):
+def test_nerfcapture_exports_are_read_with_their_poses_and_depth_unit(tmp_path):
     """As NeRFCapture writes it: `depth_path`, in steps of integer_depth_scale."""
     folder = write_nerfstudio(tmp_path / "n", SMALL, integer_depth_scale=1e-3)
     document = json.loads((folder / "transforms.json").read_text())
@@ -235,7 +235,7 @@ def test_transforms_beside_folders_of_rgb_and_depth_are_read_with_their_poses_an
 # TUM RGB-D
 
 
-def test_tums_sequence_is_known_by_the_comments_that_head_its_lists(tmp_path):
+def test_tum_calibration_is_selected_from_comments_or_folder_name(tmp_path):
     folder = write_tum(tmp_path / "t", replace(SMALL, rgb_size=(640, 480), focal=535.0))
     (folder / "settings.yaml").unlink()
     assert told(open_recording(folder), "generic Kinect")
@@ -267,7 +267,7 @@ def _associated(folder, line):
 
 
 @pytest.mark.parametrize("line", ["{rgb} {depth}", "{depth} {rgb}"])
-def test_tums_two_lists_may_be_one_in_either_order(line, tmp_path):
+def test_tum_associations_in_either_column_order_are_read(line, tmp_path):
     as_lists = open_recording(write_tum(tmp_path / "t", SMALL))
     folder = write_tum(tmp_path / "a", SMALL)
     _associated(folder, line)
@@ -278,7 +278,7 @@ def test_tums_two_lists_may_be_one_in_either_order(line, tmp_path):
         assert np.allclose(found.capture_from_camera.matrix, expected.capture_from_camera.matrix)
 
 
-def test_icl_nuims_poses_are_read_and_do_not_tell_which_way_is_up(tmp_path):
+def test_icl_nuim_poses_are_read_without_an_up_direction(tmp_path):
     folder = write_tum(tmp_path / "t", SMALL)
     _associated(folder, "{depth} {rgb}")
     (folder / "groundtruth.txt").rename(folder / "livingRoom0.gt.freiburg")
@@ -287,7 +287,7 @@ def test_icl_nuims_poses_are_read_and_do_not_tell_which_way_is_up(tmp_path):
     assert recording.up_capture is None
 
 
-def test_an_associations_file_of_other_columns_is_named_with_what_was_expected(tmp_path):
+def test_invalid_associations_columns_report_the_expected_format(tmp_path):
     folder = write_tum(tmp_path / "t", SMALL)
     _associated(folder, "{rgb}")
     with pytest.raises(CaptureError, match=r"associations\.txt: line") as caught:
@@ -299,7 +299,7 @@ def test_an_associations_file_of_other_columns_is_named_with_what_was_expected(t
 
 
 @pytest.mark.parametrize(("by_id", "of_camera"), [(True, True), (False, False), (True, False)])
-def test_rtabmaps_files_are_named_by_node_or_time_and_its_poses_are_of_the_camera_or_the_device(by_id, of_camera, tmp_path):
+def test_rtabmap_file_naming_and_pose_variants_give_the_same_frames(by_id, of_camera, tmp_path):
     expected = open_recording(write_rtabmap(tmp_path / "e", SMALL))
     found = open_recording(write_rtabmap(tmp_path / "f", SMALL, by_id=by_id, of_camera=of_camera))
     assert [frame.index for frame in found.frames] == [0, 5, 10, 15]
@@ -308,7 +308,7 @@ def test_rtabmaps_files_are_named_by_node_or_time_and_its_poses_are_of_the_camer
         assert (one.rgb_camera, one.depth_camera) == (same.rgb_camera, same.depth_camera)
 
 
-def test_rtabmaps_poses_of_another_format_are_named_with_what_was_expected(tmp_path):
+def test_rtabmap_poses_in_a_wrong_format_report_the_expected_format(tmp_path):
     folder = write_rtabmap(tmp_path / "r", SMALL)
     (folder / "kitchen_camera_poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
     with pytest.raises(CaptureError, match="time x y z qx qy qz qw") as caught:
@@ -319,7 +319,7 @@ def test_rtabmaps_poses_of_another_format_are_named_with_what_was_expected(tmp_p
 # All formats
 
 
-def test_a_zip_that_windows_packed_is_read_like_the_folder(tmp_path):
+def test_a_zip_with_backslash_paths_is_read_like_the_folder(tmp_path):
     folder = write_polycam(tmp_path / "p", SMALL)
     for top in ("", "2026-11-02 kitchen/"):
         packed = tmp_path / f"{len(top)}.zip"
@@ -336,7 +336,7 @@ def test_a_zip_that_windows_packed_is_read_like_the_folder(tmp_path):
 
 
 @pytest.mark.parametrize("worth", [np.full(12, np.nan), np.zeros(12)])
-def test_a_recording_whose_poses_are_all_useless_is_opened_without_poses(worth, tmp_path):
+def test_a_recording_with_only_invalid_poses_is_opened_without_poses(worth, tmp_path):
     folder = write_polycam(tmp_path / "p", SMALL)
     for path in (folder / "keyframes").glob("*cameras/*.json"):
         camera = json.loads(path.read_text())
@@ -347,7 +347,7 @@ def test_a_recording_whose_poses_are_all_useless_is_opened_without_poses(worth, 
     assert told(recording, "none of 4 poses")
 
 
-def test_an_unknown_folder_is_told_the_two_nearest_formats_and_what_each_lacks(tmp_path):
+def test_an_unknown_folder_reports_the_two_closest_formats(tmp_path):
     folder = write_redwood(tmp_path / "r", SMALL)
     for name in ("trajectory.log", "camera.json"):
         (folder / name).unlink()
@@ -374,7 +374,7 @@ def test_an_unknown_folder_is_told_the_two_nearest_formats_and_what_each_lacks(t
         ("IMG_0042.HEIC", "a picture", "with depth"),
     ],
 )
-def test_a_file_that_is_no_recording_is_told_what_it_is_and_what_to_bring(name, what, bring, tmp_path):
+def test_an_unsupported_file_is_identified_with_a_hint_on_what_to_provide(name, what, bring, tmp_path):
     (tmp_path / "alone").mkdir()
     alone = tmp_path / "alone" / name
     alone.write_bytes(b"x")
@@ -390,7 +390,7 @@ def test_a_file_that_is_no_recording_is_told_what_it_is_and_what_to_bring(name, 
         assert bring in caught.value.hint
 
 
-def test_a_model_that_an_app_packed_beside_its_recording_does_not_stop_the_recording(tmp_path):
+def test_an_extra_3d_model_file_does_not_affect_reading_a_recording(tmp_path):
     folder = write_polycam(tmp_path / "p", SMALL)
     (folder / "raw.glb").write_bytes(b"glTF")
     assert open_recording(folder).format == "Polycam raw export"
@@ -404,7 +404,7 @@ def test_a_model_that_an_app_packed_beside_its_recording_does_not_stop_the_recor
         (write_threedmatch, "camera-intrinsics.txt", "seq-01"),
     ],
 )
-def test_a_calibration_one_folder_up_is_taken_and_told(write, name, top, tmp_path):
+def test_calibration_in_the_parent_folder_is_used_with_a_notice(write, name, top, tmp_path):
     folder = write(tmp_path / "scene" / "made", SMALL)
     (folder / name).rename(tmp_path / "scene" / name)
     source = folder / top
@@ -423,7 +423,7 @@ def test_a_calibration_one_folder_up_is_taken_and_told(write, name, top, tmp_pat
         assert open_recording(zipped).frames[0].rgb_camera == ROOM.camera
 
 
-def test_of_two_calibrations_one_folder_up_none_is_taken(tmp_path):
+def test_ambiguous_calibrations_in_the_parent_folder_are_ignored(tmp_path):
     folder = write_tum(tmp_path / "scene" / "made", replace(SMALL, rgb_size=(640, 480), focal=535.0))
     (folder / "settings.yaml").rename(tmp_path / "scene" / "TUM1.yaml")
     (tmp_path / "scene" / "TUM3.yaml").write_bytes((tmp_path / "scene" / "TUM1.yaml").read_bytes())
@@ -440,7 +440,7 @@ def test_of_two_calibrations_one_folder_up_none_is_taken(tmp_path):
         (write_threedmatch, "seq-01/*.pose.txt"),
     ],
 )
-def test_a_recording_without_any_pose_is_opened_without_poses(write, poses, tmp_path):
+def test_a_recording_without_pose_files_is_opened_without_poses(write, poses, tmp_path):
     folder = write(tmp_path / "made", SMALL)
     for path in list(folder.glob(poses)):
         path.unlink()
@@ -448,7 +448,7 @@ def test_a_recording_without_any_pose_is_opened_without_poses(write, poses, tmp_
     assert [f.capture_from_camera for f in recording.frames] == [None] * 4
 
 
-def test_files_whose_endings_are_in_capitals_are_read(tmp_path):
+def test_uppercase_file_extensions_are_read(tmp_path):
     folder = write_redwood(tmp_path / "r", SMALL)
     for path in [*(folder / "color").iterdir(), *(folder / "depth").iterdir()]:
         path.rename(path.with_suffix(path.suffix.upper()))
@@ -456,7 +456,7 @@ def test_files_whose_endings_are_in_capitals_are_read(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["color/0.jpg", "depth/0.png", "intrinsic/intrinsic_color.txt"])
-def test_a_pointer_of_git_lfs_in_the_place_of_a_file_is_named(name, tmp_path):
+def test_a_git_lfs_pointer_instead_of_a_file_is_reported(name, tmp_path):
     folder = write_scannet(tmp_path / "s", SMALL)
     (folder / name).write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
     for source in (folder, zip_folder(folder, tmp_path / "s.zip", top="s/")):
@@ -465,7 +465,7 @@ def test_a_pointer_of_git_lfs_in_the_place_of_a_file_is_named(name, tmp_path):
         assert "git lfs pull" in caught.value.hint
 
 
-def test_a_zip_packed_by_a_method_that_is_not_read_says_how_to_pack_it(tmp_path):
+def test_an_unsupported_zip_compression_method_is_reported_with_a_hint(tmp_path):
     """Windows packs large folders by Deflate64."""
     zipped = zip_folder(write_scannet(tmp_path / "s", SMALL), tmp_path / "s.zip", top="s/")
     content = bytearray(zipped.read_bytes())
@@ -480,7 +480,7 @@ def test_a_zip_packed_by_a_method_that_is_not_read_says_how_to_pack_it(tmp_path)
     assert "method Deflate" in caught.value.hint
 
 
-def test_depth_of_eight_bits_is_told_what_was_expected(tmp_path):
+def test_eight_bit_depth_reports_that_16_bit_is_expected(tmp_path):
     folder = write_redwood(tmp_path / "r", SMALL)
     for path in (folder / "depth").iterdir():
         cv2.imwrite(str(path), (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) // 16).astype(np.uint8))
@@ -489,20 +489,20 @@ def test_depth_of_eight_bits_is_told_what_was_expected(tmp_path):
         recording.depth_of(recording.frames[0])
 
 
-def test_lone_outer_folders_are_looked_through(tmp_path):
+def test_nested_wrapper_folders_in_a_zip_are_skipped(tmp_path):
     folder = write_polycam(tmp_path / "p", SMALL)
     zipped = zip_folder(folder, tmp_path / "p.zip", top="export/2026-11-21/kitchen/")
     assert open_recording(zipped).format == "Polycam raw export"
 
 
-def test_a_calibration_of_another_image_size_is_refused(tmp_path):
+def test_a_calibration_for_another_image_size_is_rejected(tmp_path):
     folder = write_seven_scenes(tmp_path / "k", SMALL)
     np.savetxt(folder / "intrinsics_color.txt", integer_centred(ROOM.camera.resized(960, 1280)))
     with pytest.raises(CaptureError, match="do not belong to 96x128 pixels"):
         open_recording(folder)
 
 
-def test_a_frame_a_kilometre_away_is_left_out(tmp_path):
+def test_a_frame_with_a_pose_over_a_kilometre_away_is_skipped(tmp_path):
     folder = write_seven_scenes(tmp_path / "k", SMALL)
     pose = np.eye(4)
     pose[0, 3] = 1e12
@@ -512,7 +512,7 @@ def test_a_frame_a_kilometre_away_is_left_out(tmp_path):
     assert told(recording, "more than a kilometre")
 
 
-def test_tum_poses_by_line_stay_with_their_images_when_one_is_missing(tmp_path):
+def test_tum_poses_matched_by_line_stay_aligned_when_an_image_is_missing(tmp_path):
     folder = write_tum(tmp_path / "t", ROOM, pose_clock_offset_s=0.006)
     rows = [line.split() for line in (folder / "groundtruth.txt").read_text().splitlines()[1:]]
     images = [line for line in (folder / "rgb.txt").read_text().splitlines() if not line.startswith("#")]
@@ -525,7 +525,7 @@ def test_tum_poses_by_line_stay_with_their_images_when_one_is_missing(tmp_path):
         assert np.allclose(frame.capture_from_camera.translation, [float(n) for n in rows[frame.index][1:4]])
 
 
-def test_an_archive_inside_is_named(tmp_path):
+def test_a_folder_that_contains_an_archive_reports_its_name(tmp_path):
     from .tiny import write_r3d
 
     (tmp_path / "scans").mkdir()
@@ -535,7 +535,7 @@ def test_an_archive_inside_is_named(tmp_path):
     assert "choose" in caught.value.hint
 
 
-def test_of_several_recordings_the_first_is_read_and_named(tmp_path):
+def test_the_first_of_several_recordings_is_read_with_a_notice(tmp_path):
     for name in ("monday", "tuesday"):
         write_scannet(tmp_path / "scans" / name, SMALL)
     recording = open_recording(tmp_path / "scans")

@@ -68,7 +68,7 @@ def levelled(euler_deg, file_up=None, overrides=None, yaw_deg=17.0):
 
 
 @pytest.mark.parametrize("euler_deg", TILTS)
-def test_up_and_floor_come_from_the_planes_when_the_file_knows_nothing(euler_deg):
+def test_up_and_floor_are_estimated_from_planes_without_gravity_data(euler_deg):
     result, world, error_deg = levelled(euler_deg)
     assert result.room.up_source == "floor"
     assert error_deg < 0.1
@@ -77,7 +77,7 @@ def test_up_and_floor_come_from_the_planes_when_the_file_knows_nothing(euler_deg
 
 
 @pytest.mark.parametrize("off", [1.8, 2.4, 5.0, 8.0, 20.0])
-def test_a_files_gravity_gives_way_to_many_planes_that_agree(off):
+def test_gravity_in_the_file_is_corrected_where_many_planes_agree(off):
     result, _, error_deg = levelled((90, 0, 0), file_up=off)
     assert error_deg < 0.1
     assert result.room.up_corrected
@@ -85,7 +85,7 @@ def test_a_files_gravity_gives_way_to_many_planes_that_agree(off):
     assert any("corrected by" in notice for notice in result.notices)
 
 
-def test_a_files_gravity_is_kept_against_one_plane_and_that_is_known():
+def test_a_single_conflicting_plane_does_not_override_the_files_gravity():
     rng = np.random.default_rng(0)
     points = np.column_stack([rng.random((4000, 2)) * 2, rng.normal(0, 0.003, 4000)])  # could be a ramp
     ramp = SurfaceSample(points=points, normals=np.tile([0.0, 0.0, 1.0], (4000, 1)), area_each_m2=1e-3)
@@ -97,7 +97,7 @@ def test_a_files_gravity_is_kept_against_one_plane_and_that_is_known():
 
 
 @pytest.mark.parametrize("first", [0, 1, 2])
-def test_of_two_readings_of_a_files_gravity_the_planes_choose(first):
+def test_planes_select_among_ambiguous_gravity_directions(first):
     readings = [np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 0.87]), np.array([0.0, -0.64, 0.77])]
     ordered = [readings[first], *(r for r in readings if r is not readings[first])]
     result = level_room(kitchen(), cameras(), ordered[0], None, np.random.default_rng(0), other_ups=ordered[1:])
@@ -117,27 +117,27 @@ def walk() -> list[Rigid3]:
 
 
 @pytest.mark.parametrize("quarters", [0, 1, 2, 3])
-def test_images_stored_sideways_without_gravity_do_not_turn_the_room(quarters):
+def test_images_stored_sideways_without_gravity_do_not_rotate_the_room(quarters):
     result = level_room(kitchen(), turned(walk(), quarters), None, None, np.random.default_rng(0))
     assert (result.world_from_capture.rotation @ [0.0, 0.0, 1.0])[2] > 0.9999
     assert any(("lie on their side" in n) == (quarters in (1, 3)) for n in result.notices)
     assert (result.room.up_rival_capture is not None) == (quarters in (1, 3))  # reported as doubtful
 
 
-def test_up_is_in_doubt_where_the_camera_hardly_moved():
+def test_up_is_ambiguous_without_gravity_where_the_camera_hardly_moved():
     still = cameras()[2:3]  # facing a wall
     room = level_room(kitchen(), still, None, None, np.random.default_rng(0)).room
     assert abs(room.up_rival_capture[2]) < 0.01  # portrait and landscape are equally possible
     assert level_room(kitchen(), still, np.array([0.0, 0.0, 1.0]), None, np.random.default_rng(0)).room.up_rival_capture is None
 
 
-def test_a_phones_gravity_is_kept_as_it_is():
+def test_correct_gravity_in_the_file_is_unchanged():
     result, _, error_deg = levelled((90, 0, 0), file_up=0.0)
     assert error_deg < 1e-6
     assert result.notices == ()
 
 
-def test_yaw_is_that_of_the_walls_modulo_a_quarter_turn():
+def test_yaw_matches_the_walls_modulo_90_degrees():
     for yaw_deg in (3.0, 31.0, 88.0):
         result, world, _ = levelled((90, 0, 0), file_up=0.0, yaw_deg=yaw_deg)
         axis = (result.world_from_capture.rotation @ world.rotation)[:, 0]
@@ -146,7 +146,7 @@ def test_yaw_is_that_of_the_walls_modulo_a_quarter_turn():
         assert abs(np.degrees(off)) < 0.15
 
 
-def test_walls_are_found_and_face_the_room_and_fronts_are_no_walls():
+def test_walls_face_into_the_room_and_cabinet_fronts_are_not_walls():
     result, world, _ = levelled((90, 0, 0), file_up=0.0)
     here = result.world_from_capture @ world
     assert len(result.room.walls) == 2
@@ -157,7 +157,7 @@ def test_walls_are_found_and_face_the_room_and_fronts_are_no_walls():
         assert wall.normal @ place == pytest.approx(wall.offset_m, abs=0.005)
 
 
-def test_what_a_person_says_is_taken():
+def test_user_overrides_of_up_floor_and_yaw_are_applied():
     up = Rotation.from_euler("x", 90, degrees=True).as_matrix() @ np.array([0.05, 0.0, 1.0])
     overrides = Overrides(objects={}, up_capture=up, floor_m=0.25, manhattan_yaw_rad=0.4)
     result, _, _ = levelled((90, 0, 0), file_up=0.0, overrides=overrides)
@@ -169,7 +169,7 @@ def test_what_a_person_says_is_taken():
     assert result.world_from_capture.apply(on_floor[None])[0, 2] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_what_a_person_says_names_them_and_keeps_the_surfaces_verdict():
+def test_user_overrides_set_the_source_and_keep_the_measured_spread():
     up = Rotation.from_euler("x", 90, degrees=True).as_matrix() @ np.array([0.0, np.sin(0.02), np.cos(0.02)])
     walls = (np.array([0.0, -2.0, -5.0]),)
     overrides = Overrides(objects={}, up_capture=up, floor_m=0.25, manhattan_yaw_rad=0.4, walls=walls)
@@ -180,7 +180,7 @@ def test_what_a_person_says_names_them_and_keeps_the_surfaces_verdict():
     assert room.walls[0].offset_m == pytest.approx(-2.5)
 
 
-def test_a_clean_room_is_sure_of_itself():
+def test_a_clean_room_has_small_uncertainties():
     room = levelled((90, 0, 0), file_up=0.0)[0].room
     assert (room.floor_source, room.yaw_source, room.walls_source) == ("surface",) * 3
     assert room.up_spread_deg < 0.2
@@ -189,7 +189,7 @@ def test_a_clean_room_is_sure_of_itself():
     assert all(w.spread_m == pytest.approx(0.004, abs=0.001) for w in room.walls)
 
 
-def test_what_lines_a_wall_is_a_wall_as_far_as_it_reaches():
+def test_a_wall_lining_is_a_separate_wall_with_its_own_extent():
     rng = np.random.default_rng(0)
     room = level_room(kitchen(0.004, LINING), cameras(), np.array([0.0, 0.0, 1.0]), None, rng).room
     (lining,) = [wall for wall in room.walls if wall.span_m is not None]
@@ -198,7 +198,7 @@ def test_what_lines_a_wall_is_a_wall_as_far_as_it_reaches():
     assert lining.span_m == pytest.approx((0.9, 2.2), abs=0.05)
 
 
-def test_a_wall_without_a_direction_is_refused():
+def test_a_wall_override_with_a_zero_normal_is_rejected():
     with pytest.raises(OverrideError, match="no direction"):
         levelled((90, 0, 0), file_up=0.0, overrides=Overrides(objects={}, walls=(np.zeros(3),)))
 
@@ -213,7 +213,7 @@ def test_a_table_top_alone_is_not_taken_for_the_floor():
     assert any("no floor" in n for n in result.notices)
 
 
-def test_without_planes_up_is_assumed_and_told():
+def test_without_planes_up_and_yaw_are_marked_as_assumed():
     sample = SurfaceSample(points=np.zeros((0, 3)), normals=np.zeros((0, 3)), area_each_m2=0.0)
     result = level_room(sample, cameras(), None, None, np.random.default_rng(0))
     assert result.room.up_source == "assumed"
@@ -222,6 +222,6 @@ def test_without_planes_up_is_assumed_and_told():
     assert result.room.walls == ()
 
 
-def test_planes_come_back_with_their_area():
+def test_detected_planes_have_the_correct_area():
     planes = find_planes(kitchen(), np.random.default_rng(0))
     assert [round(p.area_m2, 1) for p in planes] == pytest.approx([7.5, 6.6, 5.5, 1.8, 1.2], abs=0.3)

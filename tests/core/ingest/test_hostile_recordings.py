@@ -35,7 +35,7 @@ HLS = b"#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nsecret.mp4\n#EXT-X-ENDLIST
 
 
 @pytest.mark.parametrize("forged", [CONCAT, SDP, HLS, b""], ids=["concat", "sdp", "hls", "empty"])
-def test_a_video_that_names_other_files_is_refused(forged: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_playlist_disguised_as_mp4_is_rejected(forged: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copy(HEVC, tmp_path / "secret.mp4")
     monkeypatch.chdir(tmp_path)
     folder = write_stray(tmp_path / "scan", ROOM)
@@ -44,7 +44,7 @@ def test_a_video_that_names_other_files_is_refused(forged: bytes, tmp_path: Path
         open_recording(folder)
 
 
-def test_ffmpeg_itself_knows_no_format_that_names_other_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ffmpeg_is_restricted_to_formats_without_external_references(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copy(HEVC, tmp_path / "secret.mp4")
     monkeypatch.chdir(tmp_path)
     opened = {
@@ -56,7 +56,7 @@ def test_ffmpeg_itself_knows_no_format_that_names_other_files(tmp_path: Path, mo
     assert decoder.OPENED is not None
 
 
-def test_a_damaged_video_in_a_zip_ends_its_decoder_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_video_decoder_crash_is_isolated_and_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What OpenCV reads from Python may fail there, at the end of a member with another checksum: it dereferences NULL then."""
     monkeypatch.setattr(tempfile, "tempdir", None)
     monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
@@ -71,7 +71,7 @@ def test_a_damaged_video_in_a_zip_ends_its_decoder_alone(tmp_path: Path, monkeyp
     assert not list((tmp_path / "temporary").iterdir())
 
 
-def test_a_decoder_that_dies_in_the_middle_is_a_damaged_video() -> None:
+def test_a_decoder_killed_midway_raises_a_capture_error() -> None:
     before = children()
     film = video.Video(FolderFiles(HEVC.parent), HEVC.name)
     film.frame(3)
@@ -85,7 +85,7 @@ def children() -> set[psutil.Process]:
     return set(psutil.Process().children(recursive=True))
 
 
-def test_a_decoder_ends_with_its_video_and_with_whoever_asked(tmp_path: Path) -> None:
+def test_the_decoder_process_ends_with_its_video_and_its_parent(tmp_path: Path) -> None:
     before = children()
     film = video.Video(FolderFiles(HEVC.parent), HEVC.name)
     (ours,) = children() - before
@@ -106,7 +106,7 @@ signal.raise_signal(signal.SIGKILL)
         psutil.Process(int(said.stdout)).wait(timeout=PATIENCE_S)
 
 
-def test_only_jpeg_and_png_reach_a_decoder() -> None:
+def test_only_jpeg_and_png_images_are_decoded() -> None:
     picture = np.zeros((4, 5, 3), np.uint8)
     assert image_size(jpeg(picture), "a.jpg") == (5, 4)
     assert image_size(cv2.imencode(".png", picture)[1].tobytes(), "a.png") == (5, 4)
@@ -116,7 +116,7 @@ def test_only_jpeg_and_png_reach_a_decoder() -> None:
             image_size(foreign, "a.jpg")
 
 
-def test_a_pipe_is_no_recording(tmp_path: Path) -> None:
+def test_a_named_pipe_is_rejected_as_a_recording(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "scan.r3d")
     with pytest.raises(CaptureError, match="a pipe"):
         open_recording(tmp_path / "scan.r3d")
@@ -130,13 +130,13 @@ def renamed(source: Path, target: Path, name: Callable[[str], str]) -> Path:
 
 
 @pytest.mark.parametrize("number", ["1000000000000", "9" * 250, "9" * 5000], ids=["10^12", "250 digits", "5000 digits"])
-def test_a_frame_number_that_no_recording_reaches_is_no_frame(number: str, tmp_path: Path) -> None:
+def test_an_absurdly_large_frame_number_is_ignored(number: str, tmp_path: Path) -> None:
     whole = write_r3d(tmp_path / "whole.r3d", ROOM)
     scan = renamed(whole, tmp_path / "scan.r3d", lambda name: name.replace("rgbd/2.", f"rgbd/{number}."))
     assert [frame.index for frame in open_recording(scan).frames] == [0, 1]
 
 
-def test_frames_far_apart_are_counted_without_counting_to_them(tmp_path: Path) -> None:
+def test_huge_gaps_in_frame_numbers_are_counted_as_missing_frames(tmp_path: Path) -> None:
     whole = write_r3d(tmp_path / "whole.r3d", ROOM)
     scan = renamed(whole, tmp_path / "scan.r3d", lambda name: name.replace("rgbd/2.", "rgbd/9999999."))
     recording = open_recording(scan)
@@ -151,14 +151,14 @@ def test_frames_far_apart_are_counted_without_counting_to_them(tmp_path: Path) -
     ],
     ids=["doubled column", "long field"],
 )
-def test_a_damaged_odometry_is_explained(damage: Callable[[str], str], says: str, tmp_path: Path) -> None:
+def test_a_damaged_odometry_file_raises_a_clear_error(damage: Callable[[str], str], says: str, tmp_path: Path) -> None:
     folder = write_stray(tmp_path / "scan", ROOM)
     (folder / "odometry.csv").write_text(damage((folder / "odometry.csv").read_text()))
     with pytest.raises(CaptureError, match=says):
         open_recording(folder)
 
 
-def test_a_doubled_column_leaves_the_others_where_they_are(tmp_path: Path) -> None:
+def test_a_duplicate_odometry_column_does_not_shift_the_others(tmp_path: Path) -> None:
     folder = write_stray(tmp_path / "scan", ROOM)
     expected = [frame.capture_from_camera.translation for frame in open_recording(folder).frames]
     lines = (folder / "odometry.csv").read_text().splitlines()
@@ -186,7 +186,7 @@ def array_file(header: str, body: bytes = b"") -> bytes:
         array_file("(" * 3000),
     ],
 )
-def test_a_bad_depth_array_is_explained(content: bytes, tmp_path: Path) -> None:
+def test_an_invalid_npy_depth_array_raises_a_clear_error(content: bytes, tmp_path: Path) -> None:
     folder = write_nerfstudio(tmp_path / "scan", ROOM, npy=True)
     arrays = sorted((folder / "depths").glob("*.npy"))
     arrays[0].write_bytes(content)
@@ -199,7 +199,7 @@ def test_a_bad_depth_array_is_explained(content: bytes, tmp_path: Path) -> None:
         open_recording(folder)
 
 
-def test_a_zip_whose_member_names_itself_in_no_encoding_is_one_line(tmp_path: Path) -> None:
+def test_a_zip_member_with_an_undecodable_name_raises_a_capture_error(tmp_path: Path) -> None:
     path = tmp_path / "scan.r3d"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("metadata", b"{}")
@@ -212,7 +212,7 @@ def test_a_zip_whose_member_names_itself_in_no_encoding_is_one_line(tmp_path: Pa
 
 
 @pytest.mark.parametrize("down", ["0 0 0", "nan 0 0", "1e200 1e200 1"])
-def test_a_gravity_without_a_direction_is_refused(down: str, tmp_path: Path) -> None:
+def test_a_gravity_vector_without_a_direction_is_rejected(down: str, tmp_path: Path) -> None:
     folder = write_seven_scenes(tmp_path / "scan", ROOM)
     (folder / "gravity-direction.txt").write_text(down)
     with pytest.raises(CaptureError, match="three numbers pointing down"), np.errstate(over="ignore"):

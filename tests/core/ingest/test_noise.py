@@ -38,18 +38,18 @@ def _frames(count: int) -> list[Frame]:
 
 
 @pytest.mark.parametrize(("floor_m", "per_m"), [(0.004, 0.003), (0.0, 0.006), (0.01, 0.0)])
-def test_noise_is_found_again(floor_m: float, per_m: float) -> None:
+def test_the_depth_noise_model_is_recovered_from_simulated_frames(floor_m: float, per_m: float) -> None:
     true = DepthNoise(floor_m=floor_m, per_m=per_m)
     found = estimate_depth_noise(_frames(6), _Noisy(true), RAMP, FACES)
     z = np.array([1.8, 2.5, 3.2])
     np.testing.assert_allclose(found.sigma(z), true.sigma(z), rtol=0.05)  # six frames of 12,000 pixels
 
 
-def test_what_moved_before_the_camera_does_not_count_as_noise() -> None:
+def test_moving_objects_do_not_bias_the_depth_noise_estimate() -> None:
     true = DepthNoise()
     found = estimate_depth_noise(_frames(6), _Noisy(true, wrong_share=0.2), RAMP, FACES)
     np.testing.assert_allclose(found.sigma(2.5), true.sigma(2.5), rtol=0.05)
 
 
-def test_a_scan_without_surface_keeps_the_usual_phones_noise() -> None:
+def test_a_scan_without_a_surface_keeps_the_default_depth_noise() -> None:
     assert estimate_depth_noise(_frames(2), _Noisy(DepthNoise()), np.zeros((0, 3)), np.zeros((0, 3), int)) == DepthNoise()

@@ -62,7 +62,7 @@ def tracked(views: Views):
     return estimate_poses(frames(len(views.poses)), views, most_keyframes=40, far_m=5.0)
 
 
-def test_poses_are_found_within_a_centimetre_of_a_walk_of_a_metre():
+def test_odometry_is_accurate_to_a_centimetre_on_a_one_metre_walk():
     truth = ROOM.poses()
     result = tracked(Views(truth))
     assert result.evidence.source == "odometry"
@@ -76,18 +76,18 @@ def test_poses_are_found_within_a_centimetre_of_a_walk_of_a_metre():
     assert any("no poses" in n for n in result.notices)
 
 
-def test_a_break_cuts_the_recording_to_its_longest_stretch():
+def test_a_tracking_break_reduces_the_recording_to_its_longest_segment():
     result = tracked(Views(ROOM.poses(), blind={3}))
     assert [f.index for f in result.frames] == list(range(4, 14))
     assert any("frames 4 to 13" in n and "10 of 14" in n for n in result.notices)
 
 
-def test_a_recording_that_cannot_be_tracked_is_refused():
+def test_a_recording_that_cannot_be_tracked_is_rejected():
     with pytest.raises(CaptureError, match="tracked continuously"):
         tracked(Views(ROOM.poses(), blind={2, 5, 8, 11}))
 
 
-def test_a_recording_without_poses_becomes_a_levelled_capture(tmp_path, monkeypatch):
+def test_a_recording_without_poses_is_tracked_and_levelled(tmp_path, monkeypatch):
     class Spotted(TinyRoom):
         def image(self, pose, camera):
             return textured(self, pose)

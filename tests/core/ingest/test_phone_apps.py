@@ -31,12 +31,12 @@ SMALL = replace(ROOM, count=4)
 # Stray Scanner
 
 
-def test_stray_older_files_take_their_camera_from_the_matrix(tmp_path):
+def test_older_stray_exports_use_the_camera_matrix_file(tmp_path):
     recording = open_recording(write_stray(tmp_path / "s", ROOM, per_frame=False))
     assert recording.frames[5].rgb_camera.fx == pytest.approx(ROOM.focal)
 
 
-def test_stray_frames_without_depth_are_left_out_and_the_film_stays_in_step(tmp_path):
+def test_stray_frames_without_depth_are_skipped_and_video_stays_in_sync(tmp_path):
     recording = open_recording(write_stray(tmp_path / "s", ROOM, skip=(1, 6)))
     assert [f.index for f in recording.frames] == [0, 2, 3, 4, 5, 7, 8, 9, 10, 11]
     assert told(recording, "2 of 12 frames were left out: 2 a depth image missing")
@@ -44,7 +44,7 @@ def test_stray_frames_without_depth_are_left_out_and_the_film_stays_in_step(tmp_
     assert np.abs(recording.colour_of(recording.frames[5]) - picture).mean() < 6.0
 
 
-def test_strays_older_versions_store_depth_as_arrays(tmp_path):
+def test_older_stray_exports_with_npy_depth_are_read(tmp_path):
     expected = open_recording(write_stray(tmp_path / "png", SMALL))
     folder = write_stray(tmp_path / "npy", SMALL)
     for path in list((folder / "depth").iterdir()):
@@ -58,14 +58,14 @@ def test_strays_older_versions_store_depth_as_arrays(tmp_path):
         recording.depth_of(recording.frames[2])
 
 
-def test_stray_without_its_camera_is_named_as_the_nearest_miss(tmp_path):
+def test_a_stray_export_without_camera_matrix_reports_the_missing_file(tmp_path):
     (write_stray(tmp_path / "s", SMALL) / "camera_matrix.csv").unlink()
     with pytest.raises(CaptureError, match=r"looks like Stray Scanner, but camera_matrix\.csv is missing") as caught:
         open_recording(tmp_path / "s")
     assert "odometry.csv" in caught.value.hint
 
 
-def test_stray_columns_go_by_name(tmp_path):
+def test_stray_odometry_columns_are_read_by_name(tmp_path):
     folder = write_stray(tmp_path / "s", ROOM)
     expected = open_recording(folder).frames[3]
     rows = [line.split(", ") for line in (folder / "odometry.csv").read_text().split("\n")]
@@ -105,7 +105,7 @@ def test_the_real_odometry_and_matrix_of_a_phone_are_read(real, tmp_path):
 # Film
 
 
-def test_a_film_can_be_asked_backwards(tmp_path):
+def test_video_frames_can_be_read_in_any_order(tmp_path):
     video = Video(FolderFiles(HEVC.parent), HEVC.name)
     pictures = sensor_images(ROOM)
     for number in (8, 9, 9, 2, 11, 0):
@@ -123,7 +123,7 @@ def test_a_film_can_be_asked_backwards(tmp_path):
         (lambda c: c.replace(b"hvc1", b"zzzz"), r"cannot decode the codec|not a readable video"),
     ],
 )
-def test_a_film_that_cannot_be_decoded_is_one_clear_line(change, found, tmp_path):
+def test_an_undecodable_video_raises_a_clear_error_with_its_name(change, found, tmp_path):
     folder = write_stray(tmp_path / "s", SMALL)
     (folder / "rgb.mp4").write_bytes(change(HEVC.read_bytes()))
     with pytest.raises(CaptureError, match=found) as caught:
@@ -131,7 +131,7 @@ def test_a_film_that_cannot_be_decoded_is_one_clear_line(change, found, tmp_path
     assert "rgb.mp4" in str(caught.value)
 
 
-def test_a_film_damaged_inside_costs_frames_only(tmp_path):
+def test_a_partly_damaged_video_loses_only_frames(tmp_path):
     folder = write_stray(tmp_path / "s", ROOM)
     content = bytearray(HEVC.read_bytes())
     middle = content.index(b"mdat") + 6000
@@ -148,7 +148,7 @@ def test_a_film_damaged_inside_costs_frames_only(tmp_path):
 # Polycam
 
 
-def test_polycams_photo_mode_is_told_to_be_without_depth(tmp_path):
+def test_a_polycam_photo_mode_export_is_rejected_for_missing_depth(tmp_path):
     folder = write_polycam(tmp_path / "p", SMALL)
     for name in ("depth", "confidence"):
         shutil.rmtree(folder / "keyframes" / name)
@@ -165,7 +165,7 @@ def test_polycams_confidence_has_three_levels(tmp_path):
     assert levels == [{0}, {1}, {2}]
 
 
-def test_polycam_without_corrected_images_uses_the_others(tmp_path):
+def test_polycam_without_corrected_images_uses_the_uncorrected_images(tmp_path):
     recording = open_recording(write_polycam(tmp_path / "p", SMALL, corrected=False))
     assert recording.frames[0].rgb_camera == ROOM.camera
     assert "keyframes/images/" in recording.frames[0].rgb_name
@@ -174,7 +174,7 @@ def test_polycam_without_corrected_images_uses_the_others(tmp_path):
     assert corrected.frames[1].timestamp_s == pytest.approx(0.25)
 
 
-def test_polycams_corrected_cameras_without_a_size_have_that_of_their_image(tmp_path):
+def test_polycam_corrected_cameras_without_a_size_use_their_image_size(tmp_path):
     """Exports since 2025."""
     folder = write_polycam(tmp_path / "p", SMALL)
     for path in (folder / "keyframes" / "corrected_cameras").iterdir():
@@ -186,7 +186,7 @@ def test_polycams_corrected_cameras_without_a_size_have_that_of_their_image(tmp_
     assert all(frame.capture_from_camera is not None for frame in recording.frames)
 
 
-def test_polycams_frames_are_matched_by_time(tmp_path):
+def test_polycam_frames_are_matched_by_timestamp(tmp_path):
     folder = write_polycam(tmp_path / "p", SMALL)
     sorted((folder / "keyframes" / "depth").iterdir())[1].unlink()
     recording = open_recording(folder)
@@ -198,7 +198,7 @@ def test_polycams_frames_are_matched_by_time(tmp_path):
 # 3D Scanner App
 
 
-def test_scanner_apps_frames_without_a_photo_are_left_out_and_told(tmp_path):
+def test_scanner_app_frames_without_a_photo_are_skipped_with_a_notice(tmp_path):
     recording = open_recording(write_scanner_app(tmp_path / "s", SMALL, without_photo=(0, 2)))
     assert [f.index for f in recording.frames] == [1, 3]
     assert told(recording, "2 of 4 frames were left out: 2 a colour image missing")
@@ -216,7 +216,7 @@ def test_scanner_apps_frames_without_a_photo_are_left_out_and_told(tmp_path):
         {"intrinsics": None},
     ],
 )
-def test_a_camera_file_of_scanner_app_that_holds_no_camera_costs_its_frame_only(damage, tmp_path):
+def test_an_invalid_scanner_app_camera_file_skips_only_its_frame(damage, tmp_path):
     folder = write_scanner_app(tmp_path / "s", SMALL)
     file = folder / "frame_00001.json"
     file.write_text(json.dumps(json.loads(file.read_text()) | damage))
@@ -225,7 +225,7 @@ def test_a_camera_file_of_scanner_app_that_holds_no_camera_costs_its_frame_only(
     assert told(recording, "1 frames have no usable pose")
 
 
-def test_the_real_chair_of_scanner_app_is_read_by_number(real):
+def test_the_real_scanner_app_chair_is_read_with_matching_frame_numbers(real):
     recording = open_recording(real("3d-scanner-app-chair"))
     assert [f.index for f in recording.frames] == list(range(0, 70, 3))
     assert told(recording, "46 of 70 frames were left out: 46 a colour image missing")

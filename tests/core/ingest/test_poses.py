@@ -65,7 +65,7 @@ def refined(frames, views):
     return refine_poses(frames, views, most_keyframes=40, far_m=6.0)
 
 
-def test_drift_of_3_cm_is_taken_out_and_told(walk):
+def test_drift_of_3_cm_is_corrected_with_a_notice(walk):
     frames, views = walk
     bent = drifted(frames, 0.03, 1.5)
     result = refined(bent, views)
@@ -76,7 +76,7 @@ def test_drift_of_3_cm_is_taken_out_and_told(walk):
     assert np.allclose(result.evidence.given, [f.world_from_camera.matrix for f in bent])
 
 
-def test_refining_turns_the_room_as_a_whole_by_nothing(walk):
+def test_pose_refinement_does_not_rotate_the_whole_room(walk):
     frames, views = walk
     bent = drifted(frames, 0.03, 1.5)
     result = refined(bent, views)
@@ -85,14 +85,14 @@ def test_refining_turns_the_room_as_a_whole_by_nothing(walk):
     assert np.degrees(mean) < 0.02
 
 
-def test_frames_between_the_keyframes_move_along(walk):
+def test_frames_between_keyframes_are_corrected_too(walk):
     frames, views = walk
     bent = drifted(frames, 0.03, 1.5)
     result = refine_poses(bent, views, most_keyframes=24, far_m=6.0)
     assert error_m(result.frames, views.poses) < 0.005
 
 
-def test_right_poses_stay_exactly_as_they_are(walk):
+def test_correct_poses_are_unchanged(walk):
     frames, views = walk
     result = refined(frames, views)
     assert result.evidence.source == "file"
@@ -100,7 +100,7 @@ def test_right_poses_stay_exactly_as_they_are(walk):
     assert all(a is b for a, b in zip(result.frames, frames, strict=True))
 
 
-def test_a_wrong_convention_is_no_drift(walk):
+def test_a_wrong_pose_convention_is_not_treated_as_drift(walk):
     frames, views = walk
     wrong = [
         replace(
@@ -113,7 +113,7 @@ def test_a_wrong_convention_is_no_drift(walk):
     assert result.evidence.given_gap_m is None or result.evidence.given_gap_m > 0.015
 
 
-def test_a_recording_that_sees_no_place_twice_keeps_its_poses(walk):
+def test_a_recording_without_loop_closure_keeps_its_poses(walk):
     frames, views = walk
     result = refined(drifted(frames, 0.03, 1.5)[:6], views)
     assert result.evidence.source == "file"

@@ -92,7 +92,7 @@ def test_every_format_gives_the_same_cameras_poses_and_depth(kind, tmp_path):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_format_gives_each_frame_its_own_upright_picture(kind, tmp_path):
+def test_every_format_pairs_each_frame_with_its_upright_image(kind, tmp_path):
     recording = open_recording(write(kind, tmp_path))
     stride = recording.frames[1].index
     pictures = [ROOM.image(pose, ROOM.camera)[..., ::-1].astype(int) for pose in ROOM.poses()]
@@ -115,13 +115,13 @@ def world_of(recording: Recording) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in KNOW_NO_GRAVITY])
-def test_a_format_that_knows_gravity_says_so(kind, tmp_path):
+def test_formats_with_gravity_provide_the_correct_up_direction(kind, tmp_path):
     recording = open_recording(write(kind, tmp_path))
     up_world = world_of(recording)[:3, :3] @ recording.up_capture
     assert np.degrees(np.arccos(np.clip(up_world[2], -1, 1))) < 0.02
 
 
-def test_a_gl_camera_looks_along_plus_z_afterwards(tmp_path):
+def test_opengl_cameras_are_converted_to_look_along_plus_z(tmp_path):
     recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM))
     forward = recording.frames[0].capture_from_camera.rotation[:, 2]
     assert np.allclose(forward, YUP_FROM_ZUP @ ROOM.poses()[0].rotation[:, 2], atol=1e-9)
@@ -135,7 +135,7 @@ def test_frames_are_matched_to_poses_by_number_not_by_position(tmp_path):
     assert any("missing" in n for n in recording.notices)
 
 
-def test_calibration_per_frame_is_preferred(tmp_path):
+def test_per_frame_calibration_is_preferred(tmp_path):
     rows = [[90.0 + k, 91.0 + k, 48.0, 62.0] for k in range(ROOM.count)]
     recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, perFrameIntrinsicCoeffs=rows))
     frame = recording.frames[7]
@@ -158,26 +158,26 @@ def test_an_older_app_without_depth_size_and_gravity_is_read(tmp_path):
     assert np.allclose(moved.matrix, (poses[0].inverse @ poses[5]).matrix, atol=1e-9)
 
 
-def test_init_pose_turns_gravity_into_the_recordings_own_world(tmp_path):
+def test_init_pose_rotates_gravity_into_the_recordings_world(tmp_path):
     turn = Rotation.from_euler("x", 40, degrees=True)
     recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, initPose=[*turn.as_quat(), 0, 0, 0]))
     assert np.allclose(turn.apply(recording.up_capture), [0, 1, 0])
     assert np.allclose(recording.other_ups, [[0, 1, 0], turn.apply([0, 1, 0])])  # other possible conventions
 
 
-def test_images_are_not_turned_while_initpose_can_be_read_in_two_ways(tmp_path):
+def test_images_are_not_rotated_while_initpose_is_ambiguous(tmp_path):
     turn = Rotation.from_euler("z", 90, degrees=True)
     recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, initPose=[*turn.as_quat(), 0, 0, 0]))
     assert (recording.frames[0].rgb_camera.width, recording.frames[0].rgb_camera.height) == ROOM.rgb_size
 
 
-def test_depth_may_be_stored_raw(tmp_path):
+def test_uncompressed_depth_is_read(tmp_path):
     recording = open_recording(write_r3d(tmp_path / "raw.r3d", ROOM, raw=True))
     exact = ROOM.depth(ROOM.poses()[2], ROOM.depth_camera)
     assert np.array_equal(recording.depth_of(recording.frames[2]).metres, exact)
 
 
-def test_an_empty_confidence_is_none(tmp_path):
+def test_empty_or_missing_confidence_is_none(tmp_path):
     import zipfile
 
     whole = write_r3d(tmp_path / "whole.r3d", ROOM, conf=None)
@@ -205,14 +205,14 @@ def test_the_real_repacked_r3d_equals_its_exr_export(real):
     assert shared == 4
 
 
-def test_clocks_that_share_nothing_are_matched_by_line_and_told(real):
+def test_poses_with_unrelated_clocks_are_matched_by_line_with_a_notice(real):
     recording = open_recording(real("cabinet-tum-fr3-58"))
     assert len(recording.frames) == 58
     assert any("by line" in n for n in recording.notices)
     assert recording.frames[0].rgb_camera.cx == pytest.approx(320.6)
 
 
-def test_a_frame_without_a_finite_pose_is_left_out(tmp_path):
+def test_a_frame_without_a_finite_pose_is_skipped(tmp_path):
     folder = write_seven_scenes(tmp_path / "k", ROOM)
     (folder / "pose" / "000015.txt").write_text("\n".join(["-inf -inf -inf -inf"] * 4))
     recording = open_recording(folder)
@@ -227,7 +227,7 @@ def test_more_frames_than_poses_is_an_error(tmp_path):
 
 
 @pytest.mark.parametrize(("depth_size", "raw"), [((480, 640), False), ((720, 960), True), ((192, 256), False)])
-def test_face_id_and_lidar_depth_sizes_are_inferred_where_the_app_does_not_say(depth_size, raw, tmp_path):
+def test_missing_face_id_and_lidar_depth_sizes_are_inferred(depth_size, raw, tmp_path):
     room = replace(ROOM, count=1, rgb_size=(720, 960), depth_size=depth_size, focal=690.0)
     missing = {"dw": None, "dh": None, "frameTimestamps": None, "initPose": None, "cameraType": None}
     recording = open_recording(write_r3d(tmp_path / "scan.r3d", room, raw=raw, conf=None, **missing))
@@ -237,14 +237,14 @@ def test_face_id_and_lidar_depth_sizes_are_inferred_where_the_app_does_not_say(d
     assert np.abs(depth.metres - room.depth(room.poses()[0], room.depth_camera)).max() < 1e-6
 
 
-def test_calibration_follows_images_larger_than_the_metadata_says(tmp_path):
+def test_calibration_is_scaled_to_images_larger_than_the_metadata_size(tmp_path):
     half = ROOM.camera.resized(48, 64)
     matrix = [half.fx, 0, 0, 0, half.fy, 0, half.cx - 0.5, half.cy - 0.5, 1]
     recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, w=48, h=64, K=matrix))
     assert recording.frames[3].rgb_camera == ROOM.camera
 
 
-def test_too_few_cameras_per_frame_fall_back_to_the_common_one(tmp_path):
+def test_incomplete_per_frame_calibration_falls_back_to_the_shared_one(tmp_path):
     for rows in ([], [[90.0, 91.0, 48.0, 62.0]]):
         recording = open_recording(write_r3d(tmp_path / "scan.r3d", ROOM, perFrameIntrinsicCoeffs=rows))
         assert recording.frames[7].rgb_camera == ROOM.camera

@@ -34,7 +34,7 @@ def read_frames(source, numbers, folder):
 
 
 @pytest.mark.slow
-def test_held_out_frames_lie_on_the_fused_kitchen(real, tmp_path):
+def test_held_out_frames_are_within_10_mm_of_the_fused_kitchen(real, tmp_path):
     kitchen = read_frames(real("kitchen-7scenes-redkitchen-seq01"), range(0, 1000, 25), tmp_path)
     surface, _ = fuse_frames([f for k, f in enumerate(kitchen.frames) if k % 5 != 2], kitchen.images, most_frames=32, **FUSION)
     tree = cKDTree(surface.vertices)
@@ -46,7 +46,7 @@ def test_held_out_frames_lie_on_the_fused_kitchen(real, tmp_path):
     assert np.median(np.concatenate(distances)) < 0.010
 
 
-def test_the_kitchens_table_and_seats_have_the_height_of_furniture(kitchen):
+def test_the_kitchens_table_and_chairs_have_their_measured_heights(kitchen):
     """Table 0.73 m, chair seat 0.46 m above the floor, by the doors' own level surfaces."""
     vertices, faces = kitchen.surface.vertices_world, kitchen.surface.faces
     a, b, c = (vertices[faces[:, i]] for i in range(3))
@@ -64,14 +64,14 @@ def test_the_kitchens_table_and_seats_have_the_height_of_furniture(kitchen):
     assert mode(0.36, 0.56) == pytest.approx(0.46, abs=0.02)
 
 
-def test_the_kitchen_is_good_and_its_back_wall_is_found(kitchen):
+def test_the_kitchen_gets_the_verdict_good_and_a_back_wall(kitchen):
     report = examine(kitchen)
     assert report.verdict == "good", report.reasons
     assert report.figures.pair_error_mm < 20
     assert any(w.normal[1] < -0.95 for w in kitchen.room.walls)
 
 
-def test_the_kitchens_pictures_agree_better_on_its_colours_than_as_filmed(kitchen):
+def test_exposure_compensation_reduces_the_kitchens_colour_spread(kitchen):
     """Automatic exposure: the same red door is filmed as red, dark red and purple."""
     points = kitchen.surface.vertices_world[::40]
     looks = see(kitchen.frames, kitchen.images, points, kitchen.depth_noise)
@@ -100,7 +100,7 @@ def test_the_cabinet_has_its_measured_size_and_yaw(real, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_doors_frames_agree_within_8_mm(real, tmp_path):
+def test_the_door_recordings_frames_agree_within_8_mm(real, tmp_path):
     capture = read_capture(
         real("record3d-exr-door-handle/derived/door-handle-repacked.r3d"), tmp_path / "store", IngestConfig()
     )
@@ -113,20 +113,20 @@ def test_the_doors_frames_agree_within_8_mm(real, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_chairs_frames_agree_within_8_mm_and_their_scale_is_no_reason_to_refuse_them(real, tmp_path):
+def test_the_chair_recording_agrees_within_8_mm_and_is_not_rejected(real, tmp_path):
     capture = read_capture(real("3d-scanner-app-chair"), tmp_path / "store", IngestConfig())
     report = examine(capture)
     assert report.figures.pair_error_mm < 8
     assert report.verdict == "usable with care", report.reasons  # 5 % of scale at 7 mm: less than a LiDAR's noise
 
 
-def test_redwoods_five_frames_agree_within_8_mm(real, tmp_path):
+def test_the_five_redwood_frames_agree_within_8_mm(real, tmp_path):
     capture = read_capture(real("open3d-rgbd-5frames-synthetic"), tmp_path / "store", IngestConfig(finest_voxel_m=0.02))
     assert capture.format == "Redwood / Open3D"
     assert examine(capture).figures.pair_error_mm < 8
 
 
-def test_the_kitchen_laid_out_as_3dmatch_is_the_same_kitchen(real, tmp_path):
+def test_the_kitchen_in_3dmatch_layout_gives_the_same_frames(real, tmp_path):
     source, sequence = real("kitchen-7scenes-redkitchen-seq01"), tmp_path / "scene" / "seq-01"
     sequence.mkdir(parents=True)
     for number in range(100, 130, 5):

@@ -35,7 +35,7 @@ def errors_m(capture) -> np.ndarray:
     return np.concatenate(errors)
 
 
-def test_depth_beside_colour_is_moved_there_by_the_fit_when_asked(scan, tmp_path):
+def test_misaligned_depth_is_registered_to_colour_on_request(scan, tmp_path):
     beside = corrupt_r3d(BESIDE, scan, tmp_path / "beside.r3d")
     before = read_capture(beside, tmp_path / "before", CONFIG)
     after = read_capture(beside, tmp_path / "after", ASKED)
@@ -51,7 +51,7 @@ def test_depth_beside_colour_is_moved_there_by_the_fit_when_asked(scan, tmp_path
         assert frame.depth_camera == frame.rgb_camera.resized(*ROOM.depth_size)
 
 
-def test_registered_depth_is_left_as_it_is_and_told(scan, tmp_path):
+def test_already_registered_depth_is_unchanged_with_a_notice(scan, tmp_path):
     asked, plain = (read_capture(scan, tmp_path / str(k), config) for k, config in enumerate((ASKED, CONFIG)))
     assert asked.notices[0].startswith("depth was not changed")
     for frame, other in zip(asked.frames, plain.frames, strict=True):
@@ -59,7 +59,7 @@ def test_registered_depth_is_left_as_it_is_and_told(scan, tmp_path):
         assert np.array_equal(asked.images.depth(frame.index).metres, plain.images.depth(frame.index).metres)
 
 
-def test_redrawn_depth_is_what_the_other_camera_measures():
+def test_reprojected_depth_matches_depth_rendered_in_the_target_camera():
     """A slanted plane seen by a camera of 1.15 x the focal length, 40 mm aside, turned by nothing."""
     source = Intrinsics(fx=200.0, fy=200.0, cx=80.0, cy=60.0, width=160, height=120)
     target = Intrinsics(fx=230.0, fy=230.0, cx=83.0, cy=58.0, width=160, height=120)
@@ -77,7 +77,7 @@ def test_redrawn_depth_is_what_the_other_camera_measures():
     assert np.abs(drawn - plane(target, at))[inner].max() < 0.004  # half a pixel of the slope
 
 
-def test_of_two_surfaces_the_nearer_hides_the_other():
+def test_the_nearer_surface_occludes_the_farther_one_when_reprojected():
     camera = Intrinsics(fx=100.0, fy=100.0, cx=50.0, cy=20.0, width=100, height=40)
     depth = np.full((40, 100), 2.0, np.float32)
     depth[:, 40:60] = 1.0

@@ -56,7 +56,7 @@ def once(written, tmp_path_factory):
     return read_capture(written, tmp_path_factory.mktemp("once") / "store", QUICK)
 
 
-def test_the_capture_is_level_stands_on_the_floor_and_has_the_rooms_yaw(once):
+def test_the_capture_is_levelled_on_the_floor_with_the_rooms_yaw(once):
     capture = once
     assert capture.name == "scan"
     assert len(capture.frames) == ROOM.count
@@ -74,7 +74,7 @@ def test_the_capture_is_level_stands_on_the_floor_and_has_the_rooms_yaw(once):
     assert heights[0] == pytest.approx(0.0, abs=0.02)
 
 
-def test_without_gravity_in_the_file_the_room_itself_tells_up(tmp_path):
+def test_without_gravity_in_the_file_up_is_found_from_the_floor(tmp_path):
     capture = read(write_seven_scenes(tmp_path / "kitchen", ROOM, gravity=False), tmp_path)
     assert capture.room.up_source == "floor"
     expected = ROOM.poses()[3].rotation[2]
@@ -95,13 +95,13 @@ def test_every_format_gives_the_same_surface(write, once, tmp_path):
     assert np.median(distance) < 0.02
 
 
-def test_the_recordings_jpegs_are_stored_untouched(scan, tmp_path):
+def test_original_jpegs_are_stored_byte_identical(scan, tmp_path):
     read(scan, tmp_path)
     original = zipfile.ZipFile(scan).read("rgbd/7.jpg")
     assert (tmp_path / "store" / "rgb" / "000007.jpg").read_bytes() == original
 
 
-def test_images_can_be_opened_again_and_are_shared_read_only(scan, tmp_path):
+def test_stored_images_can_be_reopened_and_are_read_only(scan, tmp_path):
     capture = read(scan, tmp_path)
     images = open_images(tmp_path / "store", capture.frames)
     depth = images.depth(5)
@@ -116,7 +116,7 @@ def test_images_can_be_opened_again_and_are_shared_read_only(scan, tmp_path):
         open_images(tmp_path / "store", capture.frames)
 
 
-def test_colours_are_red_green_blue(tmp_path):
+def test_images_and_surface_colours_are_rgb(tmp_path):
     folder = write_seven_scenes(tmp_path / "kitchen", ROOM)
     for path in (folder / "color").iterdir():
         cv2.imwrite(str(path), np.full((*ROOM.rgb_size[::-1], 3), (20, 60, 220), np.uint8))  # OpenCV writes BGR: red
@@ -125,7 +125,7 @@ def test_colours_are_red_green_blue(tmp_path):
     assert np.median(capture.surface.colours, axis=0) == pytest.approx([220, 60, 20], abs=12)
 
 
-def test_low_confidence_is_dropped_but_on_what_is_a_few_pixels_wide(tmp_path):
+def test_low_confidence_depth_is_dropped_except_on_thin_structures(tmp_path):
     def half(depth):
         confidence = np.full(depth.shape, 2)
         confidence[:, :24] = 1
@@ -139,7 +139,7 @@ def test_low_confidence_is_dropped_but_on_what_is_a_few_pixels_wide(tmp_path):
     assert valid[:, 30:].mean() > 0.9
 
 
-def test_medium_confidence_is_accepted_with_a_notice_when_little_else_is_left(tmp_path):
+def test_medium_confidence_is_used_with_a_notice_if_high_is_scarce(tmp_path):
     def mostly_medium(depth):
         confidence = np.ones(depth.shape)
         confidence[:5], confidence[-5:] = 2, 0
@@ -152,14 +152,14 @@ def test_medium_confidence_is_accepted_with_a_notice_when_little_else_is_left(tm
     assert not valid[-5:].any()
 
 
-def test_nan_is_unknown(tmp_path):
+def test_nan_depth_is_invalid(tmp_path):
     capture = read(write_r3d(tmp_path / "scan.r3d", ROOM, nan=True), tmp_path)
     depth = capture.images.depth(2)
     assert not depth.valid[:4, :4].any()
     assert np.isfinite(depth.metres).all()
 
 
-def test_the_identity_follows_the_content(tmp_path):
+def test_the_hash_depends_only_on_the_recordings_files(tmp_path):
     folder = write_exr(tmp_path / "export", ROOM)
     first = read_capture(folder, tmp_path / "a", QUICK).sha256
     (folder / "notes.txt").write_text("not part of the recording")
@@ -168,20 +168,20 @@ def test_the_identity_follows_the_content(tmp_path):
     assert read_capture(folder, tmp_path / "a", QUICK).sha256 != first
 
 
-def test_reading_twice_gives_the_same(once, scan, tmp_path):
+def test_reading_twice_gives_identical_captures(once, scan, tmp_path):
     a, b = once, read_capture(scan, tmp_path / "b", QUICK)
     assert np.array_equal(a.surface.vertices_world, b.surface.vertices_world)
     assert np.array_equal(a.world_from_capture.matrix, b.world_from_capture.matrix)
     assert a.sha256 == b.sha256
 
 
-def test_long_recordings_are_thinned_and_keep_their_numbers(scan, tmp_path):
+def test_long_recordings_are_subsampled_and_keep_their_frame_numbers(scan, tmp_path):
     capture = read_capture(scan, tmp_path / "store", IngestConfig(most_frames=5, finest_voxel_m=0.03, coarsest_voxel_m=0.03))
     assert [f.index for f in capture.frames] == [0, 3, 6, 9]
     assert any("one in 3" in n for n in capture.notices)
 
 
-def test_a_zip_of_a_folder_is_the_folder(tmp_path):
+def test_a_zip_of_an_export_folder_is_read_like_the_folder(tmp_path):
     folder = write_exr(tmp_path / "EXR_RGBD", ROOM)
     capture = read(zip_folder(folder, tmp_path / "export.zip", top="EXR_RGBD/"), tmp_path)
     assert capture.format == "Record3D EXR+JPG"
@@ -208,7 +208,7 @@ DEPTH_BOMB = 200 * lzfse.compress(bytes(2**20))[:-4] + b"bvx$"  # blocks of 1 MB
         ("rgbd/{}.depth", DEPTH_BOMB, "209715200 bytes of float32, 48x64 needs 12288"),
     ],
 )
-def test_too_many_damaged_frames_are_an_error_that_names_the_first(name, broken, found, scan, tmp_path):
+def test_too_many_damaged_frames_raise_an_error_with_the_first_file(name, broken, found, scan, tmp_path):
     bad = {name.format(k) for k in (2, 3, 7, 9)}
     damaged = rewritten(scan, tmp_path / "d.r3d", lambda n, c: broken if n in bad else c)
     with pytest.raises(CaptureError, match=found) as caught:
@@ -217,7 +217,7 @@ def test_too_many_damaged_frames_are_an_error_that_names_the_first(name, broken,
     assert caught.value.hint
 
 
-def test_an_error_leaves_the_earlier_store_alone_and_nothing_half_written(scan, tmp_path):
+def test_an_error_keeps_the_earlier_store_and_leaves_no_partial_files(scan, tmp_path):
     capture = read(scan, tmp_path)
     bad = rewritten(scan, tmp_path / "d.r3d", lambda n, c: b"x" if n.endswith(".jpg") and "icon" not in n else c)
     with pytest.raises(CaptureError):
@@ -227,14 +227,14 @@ def test_an_error_leaves_the_earlier_store_alone_and_nothing_half_written(scan, 
     assert not list(tmp_path.glob("store?*"))
 
 
-def test_cancelling_leaves_nothing_behind(scan, tmp_path):
+def test_cancelling_leaves_no_files(scan, tmp_path):
     calls = iter(range(1000))
     with pytest.raises(Cancelled):
         read(scan, tmp_path, progress=Progress(is_cancelled=lambda: next(calls) > 5))
     assert not list(tmp_path.glob("store*"))
 
 
-def test_a_full_disk_is_said_to_be_one(scan, tmp_path, monkeypatch):
+def test_a_full_disk_raises_an_environment_problem(scan, tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -366,7 +366,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_ends_in_one_clear_line(case, tmp_path):
+def test_bad_input_raises_a_clear_one_line_error(case, tmp_path):
     write, found = BAD[case]
     source = write(tmp_path)
     with pytest.raises(CaptureError, match=found) as caught:
@@ -378,12 +378,12 @@ def test_bad_input_ends_in_one_clear_line(case, tmp_path):
     assert not (tmp_path / "store" / "rgb").exists()
 
 
-def test_the_real_recording_without_frames_says_so(real, tmp_path):
+def test_a_recording_without_frames_raises_a_clear_error(real, tmp_path):
     with pytest.raises(CaptureError, match="49 frames but no rgbd"):
         read(real("record3d-r3d-metadata-only/data.r3d"), tmp_path)
 
 
-def test_a_member_that_fails_its_checksum_costs_its_frame_only(scan, tmp_path):
+def test_a_zip_member_with_a_bad_checksum_loses_only_its_frame(scan, tmp_path):
     content = bytearray(scan.read_bytes())
     with zipfile.ZipFile(scan) as archive:
         info = archive.getinfo("rgbd/6.depth")
@@ -402,7 +402,7 @@ def test_metadata_with_a_wrong_type_is_an_error_not_a_crash(scan, tmp_path):
             read(broken, tmp_path)
 
 
-def test_a_scale_multiplies_every_length_alike_and_is_noticed(once, scan, tmp_path):
+def test_the_scale_option_multiplies_all_lengths_with_a_notice(once, scan, tmp_path):
     larger = read_capture(scan, tmp_path / "larger", replace(QUICK, scale=1.25))
     for one, other in zip(once.frames, larger.frames, strict=True):
         assert np.allclose(other.world_from_camera.translation, 1.25 * one.world_from_camera.translation, atol=0.01)

@@ -6,7 +6,7 @@ from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.ingest.readers.trajectory import Trajectory
 
 
-def test_between_two_poses_it_is_the_one_between() -> None:
+def test_a_pose_between_two_samples_is_interpolated() -> None:
     path = Trajectory(np.array([0.0, 1.0]), (Rigid3(), Rigid3(rotation_about_z(0.2), np.array([1.0, 0.0, 0.0]))))
     found = path.at(0.5, apart_s=1.0, gap_s=2.0)
     assert found is not None
@@ -14,7 +14,7 @@ def test_between_two_poses_it_is_the_one_between() -> None:
     np.testing.assert_allclose(found.translation, [0.5, 0.0, 0.0])
 
 
-def test_beside_a_pose_that_is_none_it_is_the_nearer_one() -> None:
+def test_next_to_an_invalid_pose_the_nearest_valid_pose_is_used() -> None:
     broken = Rigid3(np.full((3, 3), np.nan), np.zeros(3))
     path = Trajectory(np.array([0.0, 1.0]), (Rigid3(), broken))
     found = path.at(0.2, apart_s=1.0, gap_s=2.0)

@@ -44,7 +44,7 @@ def degrees_between(a: np.ndarray, b: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_planes_give_back_the_way_up_of_a_room_turned_any_way(seed: int) -> None:
+def test_planes_recover_the_up_direction_of_a_rotated_room(seed: int) -> None:
     rotation = Rotation.random(random_state=seed).as_matrix()
     found = find_up(turned(ROOM, rotation), rotation @ tilted(7.0), 10.0)
     assert found is not None
@@ -52,7 +52,7 @@ def test_planes_give_back_the_way_up_of_a_room_turned_any_way(seed: int) -> None
     assert found[1] < 0.01
 
 
-def test_walls_that_face_one_way_settle_nothing() -> None:
+def test_parallel_walls_do_not_determine_up() -> None:
     assert find_up([NORTH, plane((0, 1, 0), 3.0)], tilted(3.0), 10.0) is None
     assert find_up([], Z, 10.0) is None
     corner = find_up([NORTH, EAST], tilted(3.0), 10.0)  # two planes that face differently determine it: the line they share
@@ -61,7 +61,7 @@ def test_walls_that_face_one_way_settle_nothing() -> None:
 
 
 @pytest.mark.parametrize(("said_deg", "planes", "kept"), [(0.5, ROOM, True), (2.0, ROOM, False), (2.0, (NORTH, EAST), True)])
-def test_a_files_gravity_stays_unless_a_level_surface_and_walls_agree_on_another(
+def test_the_files_gravity_is_kept_unless_floor_and_walls_contradict_it(
     said_deg: float, planes: tuple[Plane, ...], kept: bool
 ) -> None:
     """Half a degree is what a phone is off itself; without anything level nothing is corrected."""
@@ -73,7 +73,7 @@ def test_a_files_gravity_stays_unless_a_level_surface_and_walls_agree_on_another
     assert (up.notices == ()) == kept
 
 
-def test_only_many_planes_outweigh_a_file_that_is_far_off() -> None:
+def test_only_many_planes_override_a_large_gravity_error() -> None:
     few = choose_up([plane((0, 0, 1), 0.6), NORTH], (), [tilted(8.0)], None)
     assert not few.corrected
     assert degrees_between(few.direction, tilted(8.0)) < 1e-6
@@ -83,14 +83,14 @@ def test_only_many_planes_outweigh_a_file_that_is_far_off() -> None:
     assert degrees_between(many.direction, Z) < 0.05
 
 
-def test_of_two_readings_of_a_file_the_planes_choose() -> None:
+def test_planes_select_between_two_gravity_candidates() -> None:
     wrong = np.array([0.6, 0.8, 0.0])
     assert degrees_between(choose_up(ROOM, (), [wrong, Z], None).direction, Z) < 0.05
     assert degrees_between(choose_up(ROOM, (), [Z, wrong], None).direction, Z) < 0.05
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_without_gravity_planes_and_the_way_people_film_tell(seed: int) -> None:
+def test_without_gravity_up_is_found_from_planes_and_camera_poses(seed: int) -> None:
     rotation = Rotation.random(random_state=seed).as_matrix()
     up = choose_up(turned(ROOM, rotation), walking(rotation), (), None)
     assert up.source == "floor"
@@ -98,14 +98,14 @@ def test_without_gravity_planes_and_the_way_people_film_tell(seed: int) -> None:
     assert "has no gravity" in up.notices[0]
 
 
-def test_without_gravity_and_planes_up_is_the_cameras_and_said_to_be_assumed() -> None:
+def test_without_gravity_and_planes_up_is_assumed_from_the_cameras() -> None:
     up = choose_up((), walking(np.eye(3)), (), None)
     assert up.source == "assumed"
     assert degrees_between(up.direction, Z) < 1e-6
     assert "check it" in up.notices[0]
 
 
-def test_a_person_is_believed_and_asked_for_a_direction() -> None:
+def test_a_user_up_direction_is_used_and_zero_or_nan_is_rejected() -> None:
     up = choose_up(ROOM, (), [Z], np.array([0.0, 2.0, 0.0]))
     assert up.source == "person"
     np.testing.assert_allclose(up.direction, [0, 1, 0])

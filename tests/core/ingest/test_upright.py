@@ -54,7 +54,7 @@ def world_points(made: Recording, position: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("roll_deg", [0.0, 90.0, 180.0, 270.0, 75.0, 200.0])
-def test_turning_moves_no_point_and_makes_up_up(roll_deg, tmp_path):
+def test_rotating_images_upright_keeps_all_world_points(roll_deg, tmp_path):
     made = recording(tmp_path, [roll_deg] * 3)
     turned = upright(made)
     frame = turned.frames[1]
@@ -64,7 +64,7 @@ def test_turning_moves_no_point_and_makes_up_up(roll_deg, tmp_path):
     assert (turned is made) == (roll_deg == 0.0)
 
 
-def test_a_colour_pixel_keeps_its_direction(tmp_path):
+def test_a_rotated_colour_pixel_keeps_its_world_ray(tmp_path):
     made = recording(tmp_path, [90.0])
     turned = upright(made)
     for one in (made, turned):
@@ -76,13 +76,13 @@ def test_a_colour_pixel_keeps_its_direction(tmp_path):
         assert np.allclose(seen, made.frames[0].capture_from_camera.rotation @ np.array([10.5 / 50, -9 / 60, 1.0]))
 
 
-def test_only_what_most_frames_need_is_done(tmp_path):
+def test_images_are_rotated_only_by_majority(tmp_path):
     assert upright(recording(tmp_path, [90, 90, 90, 90, 0])).frames[0].rgb_camera.width == 30
     undecided = recording(tmp_path, [90, 90, 0, 0, 180])
     assert upright(undecided) is undecided
 
 
-def test_without_gravity_or_poses_nothing_is_turned(tmp_path):
+def test_without_gravity_or_poses_no_image_is_rotated(tmp_path):
     unknown = recording(tmp_path, [90.0] * 3, up=None)
     assert upright(unknown) is unknown
     lost = recording(tmp_path, [90.0] * 3)

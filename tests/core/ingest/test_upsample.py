@@ -22,7 +22,7 @@ def view(near: float, far: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(("near", "far"), [(1.0, 1.5), (1.5, 3.0), (2.0, 2.3)])
-def test_edges_follow_the_picture_and_nothing_hangs_between(near, far):
+def test_upsampled_edges_follow_the_image_without_flying_pixels(near, far):
     truth, picture, sensor = view(near, far)
     fine = upsample_depth(sensor, picture)
     wrong = np.abs(fine - truth) > 0.05
@@ -35,7 +35,7 @@ def test_edges_follow_the_picture_and_nothing_hangs_between(near, far):
     assert ((cubic > low + 0.05) & (cubic < high - 0.05) & (np.abs(cubic - truth) > 0.05)).sum() > 1000
 
 
-def test_planes_stay_planes():
+def test_upsampling_keeps_planar_surfaces_planar():
     truth, picture, sensor = view(1.0, 1.5)
     fine = upsample_depth(sensor, picture)
     inside = np.zeros(FINE, bool)
@@ -43,7 +43,7 @@ def test_planes_stay_planes():
     assert np.abs(fine - truth)[inside].max() < 1e-3
 
 
-def test_what_was_not_measured_stays_unknown():
+def test_unmeasured_depth_stays_unknown():
     _, picture, sensor = view(1.0, 1.5)
     sensor[20:30, 40:60] = 0
     fine = upsample_depth(sensor, picture)
@@ -53,7 +53,7 @@ def test_what_was_not_measured_stays_unknown():
     assert not upsample_depth(np.zeros_like(sensor), picture).any()
 
 
-def test_a_picture_of_the_sensors_size_changes_nothing_but_noise():
+def test_an_image_of_sensor_size_leaves_depth_nearly_unchanged():
     _, picture, sensor = view(1.0, 1.5)
     small = cv2.resize(picture, sensor.shape[::-1], interpolation=cv2.INTER_AREA)
     assert np.abs(upsample_depth(sensor, small) - sensor).max() < 0.02

@@ -42,7 +42,7 @@ def quaternions_reordered(views: Views) -> Views:
         (quaternions_reordered, "quaternion_order"),
     ],
 )
-def test_a_wrong_convention_is_named_and_put_right(damage: Damage, cause: str) -> None:
+def test_a_wrong_pose_convention_is_identified_and_corrected(damage: Damage, cause: str) -> None:
     views = views_of(16)
     finding, mended = find_convention(damage(views), neighbours(views), ())
     assert finding is not None
@@ -52,7 +52,7 @@ def test_a_wrong_convention_is_named_and_put_right(damage: Damage, cause: str) -
     np.testing.assert_allclose(mended.translation, views.translation, atol=1e-9)
 
 
-def test_poses_of_other_frames_are_named_by_how_far_they_are_off() -> None:
+def test_poses_shifted_by_frames_are_reported_with_the_shift() -> None:
     views = views_of(16)
     late = views.posed(np.roll(views.rotation, 3, axis=0), np.roll(views.translation, 3, axis=0))
     finding, _ = find_convention(late, neighbours(views), [(3, (views.rotation, views.translation))])
@@ -61,7 +61,7 @@ def test_poses_of_other_frames_are_named_by_how_far_they_are_off() -> None:
     assert "3 later" in finding.text
 
 
-def test_a_recording_that_was_read_rightly_has_no_finding() -> None:
+def test_a_correctly_interpreted_recording_has_no_finding() -> None:
     views = views_of(16)
     finding, same = find_convention(views, neighbours(views), ())
     assert finding is None
@@ -70,7 +70,7 @@ def test_a_recording_that_was_read_rightly_has_no_finding() -> None:
 
 
 @pytest.mark.parametrize("factor", [0.1, 0.85, 1.18, 5.0])
-def test_depth_of_another_scale_is_named_with_its_factor(factor: float) -> None:
+def test_a_wrong_depth_scale_is_reported_with_its_factor(factor: float) -> None:
     views = views_of(16)
     pairs = far_pairs(views, 12)
     wrong = replace(views, depth_m=views.depth_m / factor, point_z=views.point_z / factor)
@@ -82,7 +82,7 @@ def test_depth_of_another_scale_is_named_with_its_factor(factor: float) -> None:
     assert finding.error_so_mm < 20
 
 
-def test_without_a_wide_baseline_no_scale_is_called_wrong() -> None:
+def test_no_wrong_scale_is_reported_without_a_wide_baseline() -> None:
     views = views_of(16)
     wrong = replace(views, depth_m=views.depth_m / 1.2, point_z=views.point_z / 1.2)
     assert find_scale(wrong, far_pairs(views, 12)[:3]) is None

@@ -10,7 +10,7 @@ from r2c2r_core.ingest.doctor.pairs import angle_deg, compare, far_pairs, neighb
 from tests.core.ingest.doctor.corner import views_of
 
 
-def test_views_of_one_surface_agree_and_less_so_the_farther_they_are_moved() -> None:
+def test_view_agreement_decreases_with_larger_pose_errors() -> None:
     views = views_of()
     pairs = neighbours(views)
     exact = compare(views, pairs)
@@ -24,7 +24,7 @@ def test_views_of_one_surface_agree_and_less_so_the_farther_they_are_moved() -> 
     assert costs[0] < costs[1] < costs[2]
 
 
-def test_a_point_is_found_in_the_pixel_that_sees_it() -> None:
+def test_a_point_projects_to_the_pixel_that_observes_it() -> None:
     views = views_of(2)
     views = views.posed(np.stack([views.rotation[0]] * 2), np.stack([views.translation[0]] * 2))
     views = replace(views, depth_m=np.stack([views.depth_m[0]] * 2))
@@ -35,7 +35,7 @@ def test_a_point_is_found_in_the_pixel_that_sees_it() -> None:
     assert found.seen.all()
 
 
-def test_depth_along_the_ray_agrees_once_it_is_read_so() -> None:
+def test_ray_length_depth_agrees_when_interpreted_along_the_ray() -> None:
     views = views_of()
     rows, columns = views.depth_m.shape[1:]
     u, v = np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5)
@@ -49,7 +49,7 @@ def test_depth_along_the_ray_agrees_once_it_is_read_so() -> None:
     assert right.cost.mean() == pytest.approx(compare(views, pairs).cost.mean(), rel=0.05)
 
 
-def test_points_that_a_view_lacks_say_nothing() -> None:
+def test_points_without_depth_are_not_evaluated() -> None:
     views = views_of()
     blind = replace(views, point_z=np.zeros_like(views.point_z))
     found = compare(blind, neighbours(views))
@@ -59,7 +59,7 @@ def test_points_that_a_view_lacks_say_nothing() -> None:
     assert (found.agreement == 0).all()
 
 
-def test_neighbours_are_later_and_have_moved_on() -> None:
+def test_neighbours_are_later_views_with_sufficient_motion() -> None:
     views = views_of(40)
     pairs = neighbours(views)
     assert (pairs[:, 1] > pairs[:, 0]).all()
@@ -70,7 +70,7 @@ def test_neighbours_are_later_and_have_moved_on() -> None:
         assert moved or turned or b in (a + 6, 39)  # or the last of the six after it
 
 
-def test_pairs_that_tell_a_scale_have_parallax_and_see_the_same() -> None:
+def test_pairs_for_the_scale_check_have_parallax_and_overlap() -> None:
     views = views_of(20)
     pairs = far_pairs(views, 8)
     assert 0 < len(pairs) <= 8
@@ -82,7 +82,7 @@ def test_pairs_that_tell_a_scale_have_parallax_and_see_the_same() -> None:
         assert shares[(a, b)] > 0.2
 
 
-def test_the_most_wanted_pairs_are_spread_over_the_views() -> None:
+def test_selected_pairs_are_spread_evenly_over_the_views() -> None:
     every = np.array([[0, k] for k in range(1, 9)] + [[k, k + 1] for k in range(1, 8)])
     wanted = np.concatenate([np.full(8, 2.0), np.linspace(1.0, 0.5, 7)])
     chosen = spread(every, wanted, 6)
@@ -92,7 +92,7 @@ def test_the_most_wanted_pairs_are_spread_over_the_views() -> None:
 
 
 @pytest.mark.parametrize("deg", [0.0, 3.0, 90.0, 180.0])
-def test_the_angle_between_rotations_is_that_of_the_turn_between_them(deg: float) -> None:
+def test_the_angle_between_rotations_is_their_relative_rotation_angle(deg: float) -> None:
     base = Rotation.random(random_state=4)
     turn = Rotation.from_rotvec(np.radians(deg) * np.array([0.0, 0.6, 0.8]))
     assert angle_deg(base.as_matrix(), (base * turn).as_matrix()) == pytest.approx(deg, abs=1e-5)
