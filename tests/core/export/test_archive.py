@@ -25,14 +25,14 @@ def refused(path: Path) -> str:
     return str(caught.value)
 
 
-def test_a_zip_comes_back_as_the_same_files(good_folder: Path, packed: Path, tmp_path: Path) -> None:
+def test_unpacking_a_zip_restores_identical_files(good_folder: Path, packed: Path, tmp_path: Path) -> None:
     unpack(packed, tmp_path / "out")
     for path in good_folder.rglob("*"):
         if path.is_file():
             assert (tmp_path / "out" / path.relative_to(good_folder)).read_bytes() == path.read_bytes()
 
 
-def test_equal_folders_give_equal_bytes_whatever_their_times(good_folder: Path, packed: Path, tmp_path: Path) -> None:
+def test_zip_bytes_do_not_depend_on_file_modification_times(good_folder: Path, packed: Path, tmp_path: Path) -> None:
     import os
 
     for number, path in enumerate(sorted(good_folder.rglob("*"), reverse=True)):
@@ -41,7 +41,7 @@ def test_equal_folders_give_equal_bytes_whatever_their_times(good_folder: Path, 
     assert (tmp_path / "again.zip").read_bytes() == packed.read_bytes()
 
 
-def test_a_zip_that_holds_the_bundle_in_one_folder_is_accepted(good_folder: Path, tmp_path: Path) -> None:
+def test_a_zip_with_the_bundle_in_a_subfolder_is_accepted(good_folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "wrapped.zip"
     with zipfile.ZipFile(path, "w") as z:
         z.write(good_folder / "scene.urdf", "my_kitchen/scene.urdf")
@@ -50,12 +50,12 @@ def test_a_zip_that_holds_the_bundle_in_one_folder_is_accepted(good_folder: Path
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
-def test_a_truncated_zip_is_refused(packed: Path, share: float) -> None:
+def test_a_truncated_zip_is_rejected(packed: Path, share: float) -> None:
     packed.write_bytes(packed.read_bytes()[: int(share * packed.stat().st_size)])
     assert "not a readable zip" in refused(packed)
 
 
-def test_a_tampered_member_is_refused(packed: Path) -> None:
+def test_a_zip_member_with_a_wrong_crc_is_rejected(packed: Path) -> None:
     content = bytearray(packed.read_bytes())
     with zipfile.ZipFile(packed) as z:
         member = z.getinfo("preview.png")  # stored uncompressed, so one byte stays one byte
@@ -68,7 +68,7 @@ def test_a_tampered_member_is_refused(packed: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["../evil.txt", "/etc/evil.txt", "meshes/../../evil.txt", "C:\\evil.txt", "..\\evil.txt", "C:evil"]
 )
-def test_a_member_outside_the_bundle_is_refused_and_not_written(tmp_path: Path, name: str) -> None:
+def test_path_traversal_members_are_rejected_and_not_written(tmp_path: Path, name: str) -> None:
     path = tmp_path / "slip.zip"
     with zipfile.ZipFile(path, "w") as z:
         z.writestr("scene.urdf", "<robot/>")
@@ -78,7 +78,7 @@ def test_a_member_outside_the_bundle_is_refused_and_not_written(tmp_path: Path, 
     assert {p for p in tmp_path.parent.rglob("*evil*")} == before
 
 
-def test_a_symbolic_link_is_refused(tmp_path: Path) -> None:
+def test_a_symbolic_link_member_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "link.zip"
     entry = zipfile.ZipInfo("meshes")
     entry.create_system = 3
@@ -88,7 +88,7 @@ def test_a_symbolic_link_is_refused(tmp_path: Path) -> None:
     assert "leaves the bundle" in refused(path)
 
 
-def test_two_members_of_one_name_are_refused(tmp_path: Path) -> None:
+def test_duplicate_member_names_are_rejected_case_insensitively(tmp_path: Path) -> None:
     path = tmp_path / "twice.zip"
     with zipfile.ZipFile(path, "w") as z:
         z.writestr("scene.urdf", "<robot/>")
@@ -96,7 +96,7 @@ def test_two_members_of_one_name_are_refused(tmp_path: Path) -> None:
     assert "twice" in refused(path)
 
 
-def test_a_member_that_is_a_file_and_a_folder_is_refused(tmp_path: Path) -> None:
+def test_a_member_that_is_both_file_and_folder_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "both.zip"
     with zipfile.ZipFile(path, "w") as z:
         z.writestr("meshes", "a file")
@@ -104,14 +104,14 @@ def test_a_member_that_is_a_file_and_a_folder_is_refused(tmp_path: Path) -> None
     assert "file and a folder" in refused(path)
 
 
-def test_sizes_are_limited_by_what_comes_out_not_by_what_is_said(packed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unpacked_size_and_member_count_are_limited(packed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(archive, "MOST_BYTES", 1000)
     assert "when unpacked" in refused(packed)
     monkeypatch.setattr(archive, "MOST_MEMBERS", 3)
     assert "members" in refused(packed)
 
 
-def test_foreign_files_are_refused(tmp_path: Path) -> None:
+def test_files_that_are_not_bundles_are_rejected(tmp_path: Path) -> None:
     assert "no such file" in refused(tmp_path / "absent.zip")
     (tmp_path / "text.zip").write_text("hello")
     assert "not a readable zip" in refused(tmp_path / "text.zip")
@@ -122,7 +122,7 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
     assert "no scene.urdf" in refused(tmp_path / "empty")
 
 
-def test_an_encrypted_zip_is_refused(packed: Path) -> None:
+def test_an_encrypted_zip_is_rejected(packed: Path) -> None:
     content = bytearray(packed.read_bytes())
     for start in _signatures(content, b"PK\x01\x02"):
         content[start + 8] |= 1
@@ -140,7 +140,7 @@ def _signatures(content: bytes, signature: bytes) -> list[int]:
     return found
 
 
-def test_a_pipe_in_a_folder_is_not_waited_for(good_folder: Path) -> None:
+def test_a_named_pipe_in_a_folder_is_rejected_without_blocking(good_folder: Path) -> None:
     material = next(good_folder.rglob("*.obj"))
     material.unlink()
     os.mkfifo(material)

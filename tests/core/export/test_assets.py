@@ -26,13 +26,13 @@ def moved_away(good_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     return good_folder
 
 
-def test_every_object_has_an_asset_in_four_formats_that_stores_no_texture_again(good_folder: Path) -> None:
+def test_every_object_has_assets_in_four_formats_without_textures(good_folder: Path) -> None:
     found = {p.relative_to(good_folder).as_posix() for p in (good_folder / "assets").rglob("*") if p.is_file()}
     assert found == {f"assets/{name}/{name}{suffix}" for name in OBJECTS for suffix in (".urdf", ".xml", ".usda", ".glb")}
 
 
 @pytest.mark.parametrize("name", OBJECTS)
-def test_a_mujoco_asset_stands_on_its_origin_and_holds_nothing_of_the_room(moved_away: Path, name: str) -> None:
+def test_a_mujoco_asset_rests_on_its_origin_without_room_elements(moved_away: Path, name: str) -> None:
     model = mujoco.MjModel.from_xml_path(str(moved_away / f"assets/{name}/{name}.xml"))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -48,7 +48,7 @@ def _lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
     return float((corners @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])[:, 2].min())
 
 
-def test_attached_assets_are_the_scene_again(moved_away: Path) -> None:
+def test_attaching_all_assets_reproduces_the_scene(moved_away: Path) -> None:
     whole = mujoco.MjModel.from_xml_path(str(moved_away / "scene.xml"))
     from pxr import Usd, UsdGeom
 
@@ -71,7 +71,7 @@ def test_attached_assets_are_the_scene_again(moved_away: Path) -> None:
         assert model.body(name).mass == pytest.approx(whole.body(name).mass)
 
 
-def test_a_usd_asset_has_no_physics_scene_and_finds_its_textures_through_a_reference(moved_away: Path, tmp_path: Path) -> None:
+def test_a_referenced_usd_asset_resolves_textures_without_physics_scene(moved_away: Path, tmp_path: Path) -> None:
     from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
     far = tmp_path / "far" / "away"
@@ -101,7 +101,7 @@ def test_a_usd_asset_has_no_physics_scene_and_finds_its_textures_through_a_refer
         np.testing.assert_allclose(holder.Transform(joint.GetLocalPos0Attr().Get()), base.ExtractTranslation(), atol=1e-6)
 
 
-def test_one_usdz_file_is_the_whole_scene_with_its_textures(good_folder: Path, tmp_path: Path) -> None:
+def test_the_usdz_contains_the_whole_scene_with_textures(good_folder: Path, tmp_path: Path) -> None:
     from pxr import Usd, UsdShade, UsdUtils
 
     alone = tmp_path / "alone"
@@ -118,7 +118,7 @@ def test_one_usdz_file_is_the_whole_scene_with_its_textures(good_folder: Path, t
 
 
 @pytest.mark.parametrize("name", OBJECTS)
-def test_a_urdf_asset_loads_alone_and_has_the_scenes_joints(moved_away: Path, name: str) -> None:
+def test_a_urdf_asset_loads_standalone_with_the_scenes_joint_limits(moved_away: Path, name: str) -> None:
     path = moved_away / f"assets/{name}/{name}.urdf"
     robot = yourdfpy.URDF.load(str(path), load_meshes=True)
     assert len(robot.scene.geometry) == sum(len(link.visuals) for link in robot.robot.links)
@@ -127,20 +127,20 @@ def test_a_urdf_asset_loads_alone_and_has_the_scenes_joints(moved_away: Path, na
     assert all(joint.limit == scene[joint.name] for joint in read_urdf(path).joints if joint.type != "fixed")
 
 
-def test_a_glb_asset_names_textures_that_are_there(good_folder: Path) -> None:
+def test_a_glb_asset_references_existing_textures(good_folder: Path) -> None:
     document, binary = document_of(good_folder / "assets/cabinet_1/cabinet_1.glb")
     (image,) = document["images"]
     assert (good_folder / "assets/cabinet_1" / image["uri"]).is_file()
     assert document["buffers"][0]["byteLength"] <= len(binary)
 
 
-def test_planners_are_told_which_pairs_never_matter(good_folder: Path) -> None:
+def test_the_srdf_disables_collisions_of_adjacent_links(good_folder: Path) -> None:
     pairs = {(e.get("link1"), e.get("link2")) for e in ET.parse(good_folder / "scene.srdf").getroot()}
     assert ("cabinet_1_base", "cabinet_1_door") in pairs
     assert len(pairs) == 4
 
 
-def test_the_ros_package_names_files_of_the_package_and_has_a_frame_for_each_handle(good_folder: Path) -> None:
+def test_the_ros_package_resolves_its_meshes_and_has_a_handle_link(good_folder: Path) -> None:
     package = ET.parse(good_folder / "package.xml").findtext("name")
     robot = ET.parse(good_folder / "ros/scene.urdf").getroot()
     for mesh in robot.iter("mesh"):
@@ -154,11 +154,11 @@ def test_the_ros_package_names_files_of_the_package_and_has_a_frame_for_each_han
 @pytest.mark.parametrize(
     ("name", "expected"), [("My Kitchen__2", "my_kitchen_2"), ("7", "scene_7"), ("", "scene"), ("a", "scene_a")]
 )
-def test_packages_are_named_as_ros_asks(name: str, expected: str) -> None:
+def test_package_names_follow_the_ros_naming_rules(name: str, expected: str) -> None:
     assert package_name(name) == expected
 
 
-def test_sdf_has_a_model_for_each_object_and_files_that_are_there(good_folder: Path) -> None:
+def test_the_sdf_has_a_model_per_object_and_existing_meshes(good_folder: Path) -> None:
     world = ET.parse(good_folder / "scene.sdf").getroot().find("world")
     assert world is not None
     assert {model.get("name") for model in world.findall("model")} == {"floor", *OBJECTS}
@@ -168,7 +168,7 @@ def test_sdf_has_a_model_for_each_object_and_files_that_are_there(good_folder: P
     assert bottle.find("joint") is None  # it falls when pushed
 
 
-def test_sdf_gives_every_joint_the_dynamics_that_the_format_requires(good_folder: Path) -> None:
+def test_every_sdf_joint_has_zero_spring_reference_and_stiffness(good_folder: Path) -> None:
     dynamics = list(ET.parse(good_folder / "scene.sdf").getroot().iter("dynamics"))
     assert dynamics
     for joint in dynamics:
@@ -178,13 +178,13 @@ def test_sdf_gives_every_joint_the_dynamics_that_the_format_requires(good_folder
 @pytest.mark.parametrize(
     "name", ["assets/cabinet_1/cabinet_1.usda", "assets/cabinet_1/cabinet_1.xml", "assets/cabinet_1/cabinet_1.urdf"]
 )
-def test_an_asset_that_reads_outside_the_bundle_is_given_to_no_loader(good_folder: Path, name: str) -> None:
+def test_an_asset_with_a_path_outside_the_bundle_fails_the_linter(good_folder: Path, name: str) -> None:
     path = good_folder / name
     path.write_text(path.read_text().replace("../../meshes", "../../../../meshes"))
     assert {f.rule for f in lint(good_folder)} == {"asset-path"}
 
 
-def test_an_asset_whose_mesh_is_gone_or_whose_joint_differs_is_found(good_folder: Path) -> None:
+def test_the_linter_reports_missing_unreadable_and_differing_assets(good_folder: Path) -> None:
     path = good_folder / "assets/drawer_1/drawer_1.urdf"
     path.write_text(path.read_text().replace('upper="0.42"', 'upper="0.43"'))
     (good_folder / "assets/cabinet_1/cabinet_1.glb").write_bytes(b"glTF")

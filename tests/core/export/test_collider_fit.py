@@ -26,31 +26,31 @@ def urdf_of(*shapes: UrdfShape) -> Urdf:
     return Urdf(name="one", links=(part,), joints=(), mujoco_compiler=None, malformed=())
 
 
-def test_a_collider_that_is_the_drawing_lies_on_it() -> None:
+def test_a_collider_identical_to_its_visual_has_zero_distance() -> None:
     (fit,) = collider_fits(urdf_of(box("visual", (0.4, 0.02, 0.5)), box("collision", (0.4, 0.02, 0.5))), HERE)
     assert fit.drawn_to_collider.most_m < 1e-5  # Open3D measures in single precision
     assert fit.collider_to_drawn.most_m < 1e-5
 
 
-def test_each_way_says_its_own() -> None:
+def test_both_directions_of_collider_distance_are_measured() -> None:
     """A board drawn 0.4 m wide of which only half collides: what is drawn lies up to 0.2 m off, the collider 5 mm."""
     (fit,) = collider_fits(urdf_of(box("visual", (0.4, 0.02, 0.5)), box("collision", (0.2, 0.01, 0.5), (-0.1, 0.0, 0.0))), HERE)
     assert fit.drawn_to_collider.most_m == pytest.approx(0.2, abs=0.01)
     assert fit.collider_to_drawn.median_m == pytest.approx(0.005, abs=1e-5)
 
 
-def test_what_is_sunk_in_another_collider_is_not_touched() -> None:
+def test_an_enclosed_collider_is_not_measured() -> None:
     drawn = box("visual", (0.4, 0.4, 0.4))
     inside = box("collision", (0.1, 0.1, 0.1))
     (fit,) = collider_fits(urdf_of(drawn, box("collision", (0.4, 0.4, 0.4)), inside), HERE)
     assert fit.collider_to_drawn.most_m < 1e-5
 
 
-def test_a_link_without_a_collider_is_left_out() -> None:
+def test_a_link_without_a_collider_has_no_fit() -> None:
     assert collider_fits(urdf_of(box("visual", (0.4, 0.4, 0.4))), HERE) == ()
 
 
-def test_the_certificate_names_a_collider_far_from_what_is_drawn(tmp_path: Path) -> None:
+def test_the_certificate_warns_of_a_collider_far_from_its_visual(tmp_path: Path) -> None:
     folder = write_folder(kitchen(), tmp_path / "kitchen")
     assert {fit.link for fit in collider_fits(read_urdf(folder / "scene.urdf"), BundleFiles(folder=folder))} >= {
         "cabinet_1_door"

@@ -12,7 +12,7 @@ from r2c2r_core.pool import Pool
 Bundle = tuple[Path, Certificate]
 
 
-def test_two_processes_say_what_one_says(kitchen_bundle: Bundle, tmp_path: Path) -> None:
+def test_one_and_two_workers_give_the_same_gripper_results(kitchen_bundle: Bundle, tmp_path: Path) -> None:
     told = []
     for workers in (1, 2):
         folder = tmp_path / str(workers)
@@ -28,13 +28,13 @@ def test_two_processes_say_what_one_says(kitchen_bundle: Bundle, tmp_path: Path)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_scene_that_mujoco_cannot_load_is_left_untried(tmp_path: Path, workers: int) -> None:
+def test_gripping_returns_none_for_a_scene_mujoco_cannot_load(tmp_path: Path, workers: int) -> None:
     (tmp_path / "scene.xml").write_text("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>")
     with Pool(workers) as pool:
         assert begin_gripping(tmp_path, pool)() is None
 
 
-def test_it_begins_before_it_is_waited_for(kitchen_bundle: Bundle) -> None:
+def test_gripping_starts_before_its_result_is_requested(kitchen_bundle: Bundle) -> None:
     with Pool(2) as pool:
         begin_gripping(kitchen_bundle[0].with_suffix(""), pool)
         assert len(pool._busy) == 2

@@ -39,7 +39,7 @@ def with_handle_size(item: SceneObject, size: list[float]) -> SceneObject:
     return replace(item, links=tuple(replace(x, boxes=tuple(map(resized, x.boxes))) for x in item.links))
 
 
-def test_a_drawers_bar_has_the_frame_of_a_gripper_that_holds_it() -> None:
+def test_a_drawer_handle_frame_matches_a_grasping_gripper() -> None:
     handle = only(planned(drawer("drawer_1")))
     np.testing.assert_allclose(handle.world_from_handle.translation, [0, -0.28 - 0.015, 0.52 + 0.15 + 0.08], atol=1e-9)
     np.testing.assert_allclose(handle.world_from_handle.rotation, [[1, 0, 0], [0, 0, 1], [0, -1, 0]], atol=1e-9)
@@ -49,7 +49,7 @@ def test_a_drawers_bar_has_the_frame_of_a_gripper_that_holds_it() -> None:
     assert handle.kind == "knob"  # solid back to the front
 
 
-def test_a_handle_turns_with_its_cabinet_and_opens_across_its_hinge() -> None:
+def test_a_handle_rotates_with_its_cabinet_and_opens_about_the_hinge() -> None:
     straight, turned = only(planned(cabinet("a"))), only(planned(cabinet("a", yaw=0.7)))
     about_z = straight.world_from_handle.rotation.T @ turned.world_from_handle.rotation
     assert np.arccos((np.trace(about_z) - 1) / 2) == pytest.approx(0.7)
@@ -60,7 +60,7 @@ def test_a_handle_turns_with_its_cabinet_and_opens_across_its_hinge() -> None:
     assert float(turned.opening_world @ np.cross(axis, arm)) > 0
 
 
-def test_the_room_beside_a_handle_ends_at_the_neighbour() -> None:
+def test_finger_clearance_beside_a_handle_ends_at_the_nearest_obstacle() -> None:
     free = only(planned(drawer("drawer_1")))
     assert free.room.beside_m == (0.3, 0.3)
     board = Box(
@@ -77,7 +77,7 @@ def test_the_room_beside_a_handle_ends_at_the_neighbour() -> None:
     assert near.room.depth_m == (pytest.approx(0.03, abs=5e-4), pytest.approx(0.03, abs=5e-4))
 
 
-def test_a_front_without_a_handle_is_pushed_at_its_free_edge() -> None:
+def test_a_front_without_a_handle_gets_a_push_point_at_its_free_edge() -> None:
     handle = only(planned(without_handles(cabinet("a"))))
     assert (handle.kind, handle.name) == ("push", "a_door_push")
     width = 0.6 - 0.003
@@ -87,7 +87,7 @@ def test_a_front_without_a_handle_is_pushed_at_its_free_edge() -> None:
     assert out_of_reach(handle.kind, handle.grasp_width_m, handle.room) is None
 
 
-def test_every_format_has_the_handle_where_the_manifest_says(good_folder: Path) -> None:
+def test_every_format_places_handles_as_in_the_manifest(good_folder: Path) -> None:
     from pxr import Usd, UsdGeom
 
     manifest = json.loads((good_folder / "manifest.json").read_text())
@@ -111,7 +111,7 @@ def test_every_format_has_the_handle_where_the_manifest_says(good_folder: Path) 
         assert listed[handle["name"]].get("link") == handle["link"]
 
 
-def test_the_opening_direction_is_where_mujoco_moves_the_handle(good_folder: Path) -> None:
+def test_the_opening_direction_matches_the_handles_motion_in_mujoco(good_folder: Path) -> None:
     model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
     for handle in with_handles(plan_bundle(kitchen())).handles:
         data = mujoco.MjData(model)
@@ -123,7 +123,7 @@ def test_the_opening_direction_is_where_mujoco_moves_the_handle(good_folder: Pat
         np.testing.assert_allclose(moved / np.linalg.norm(moved), handle.opening_world, atol=1e-3)  # of a chord of 0.1 mrad
 
 
-def test_a_handle_too_thick_for_the_gripper_is_a_finding_that_says_so(tmp_path: Path) -> None:
+def test_a_handle_too_thick_for_the_gripper_is_reported_as_a_warning(tmp_path: Path) -> None:
     thick = with_handle_size(drawer("drawer_1"), [0.18, 0.03, 0.1])
     scene = ArticulatedScene(name="t", objects=(thick,), layout_moves_m={}, warnings=())
     found = [f for f in lint(write_folder(scene, tmp_path / "b")) if f.rule == "handle-reach"]
@@ -131,6 +131,6 @@ def test_a_handle_too_thick_for_the_gripper_is_a_finding_that_says_so(tmp_path: 
     assert found[0].message.endswith("it is 100 mm thick, the fingers open 80 mm")
 
 
-def test_good_handles_are_within_reach() -> None:
+def test_handles_of_the_good_kitchen_are_reachable() -> None:
     for handle in with_handles(plan_bundle(kitchen())).handles:
         assert out_of_reach(handle.kind, handle.grasp_width_m, handle.room) is None

@@ -62,7 +62,7 @@ def in_usd(folder: Path) -> Said:
     return found
 
 
-def test_doors_drawers_bodies_things_and_handles_are_told_apart(good_folder: Path) -> None:
+def test_links_are_labelled_by_category_part_and_affordance(good_folder: Path) -> None:
     said = in_manifest(good_folder)
     assert said["cabinet_1_door"] == ("cabinet", "door", ("openable",))
     assert said["cabinet_1_base"] == ("cabinet", "body", ())
@@ -72,5 +72,5 @@ def test_doors_drawers_bodies_things_and_handles_are_told_apart(good_folder: Pat
 
 
 @pytest.mark.parametrize("read", [in_urdf, in_mjcf, in_glb, in_usd])
-def test_every_format_says_what_the_manifest_says(good_folder: Path, read: object) -> None:
+def test_every_format_has_the_manifests_labels(good_folder: Path, read: object) -> None:
     assert read(good_folder) == in_manifest(good_folder)  # type: ignore[operator]

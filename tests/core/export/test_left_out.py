@@ -43,7 +43,7 @@ def names(path: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("step", ["plan", "meshes"])
-def test_an_object_that_cannot_be_written_is_left_out_by_name(
+def test_an_object_that_fails_to_export_is_omitted_and_reported(
     step: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module, name = (planning, "_bodies_of") if step == "plan" else (stage, "write_body")
@@ -68,7 +68,7 @@ def test_an_object_that_cannot_be_written_is_left_out_by_name(
         assert "bottle_1" in archive.read("report.json").decode()
 
 
-def test_a_thing_whose_support_cannot_be_told_stays_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_object_whose_support_search_fails_is_still_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: Any) -> None:
         raise np.linalg.LinAlgError("SVD did not converge")
 
@@ -77,7 +77,7 @@ def test_a_thing_whose_support_cannot_be_told_stays_where_it_is(tmp_path: Path, 
 
 
 @pytest.mark.parametrize(("step", "file"), [("scan_fits", ""), ("preview_png", "preview.png"), ("review_html", "review.html")])
-def test_evidence_that_cannot_be_made_is_missing_and_the_scene_is_there(
+def test_failing_evidence_is_omitted_and_the_scene_is_exported(
     step: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(*_: Any, **__: Any) -> None:
@@ -91,7 +91,7 @@ def test_evidence_that_cannot_be_made_is_missing_and_the_scene_is_there(
 
 
 @pytest.mark.parametrize("name", ["mjcf", "usd", "glb"])
-def test_a_format_that_cannot_be_written_is_missing_and_the_others_are_there(
+def test_a_failing_format_is_omitted_and_the_others_are_exported(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(plan: Any, path: Path) -> None:
@@ -105,7 +105,7 @@ def test_a_format_that_cannot_be_written_is_missing_and_the_others_are_there(
     assert {entry.file for entry in table.FORMATS} - names(tmp_path / "b.zip") == {lost.file}
 
 
-def test_a_full_disk_is_no_format_s_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_raises_instead_of_omitting_a_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(plan: Any, path: Path) -> None:
         raise OSError(28, "No space left on device")
 

@@ -31,7 +31,7 @@ def document(scene: ArticulatedScene, *said: Contradiction) -> dict[str, Any]:
     return manifest_of(replace(reconstruction(scene), contradictions=said), plan_bundle(scene), None)
 
 
-def test_a_contradiction_of_the_segmenter_is_a_finding(good_folder: Path) -> None:
+def test_a_segmenter_contradiction_is_a_finding(good_folder: Path) -> None:
     assert findings(good_folder, document(kitchen())) == []
     (found,) = findings(good_folder, document(kitchen(), SAID))
     assert (found.rule, found.severity, found.where) == ("same-thing", "error", "cabinet_1, drawer_1")
@@ -44,14 +44,14 @@ def test_a_finding_about_one_object_does_not_repeat_its_name(good_folder: Path) 
     assert (found.where, found.message) == ("cabinet_1", "is 35 % sure; draw it")
 
 
-def test_a_door_that_something_all_but_locks_is_a_finding(good_folder: Path) -> None:
+def test_a_door_with_strongly_reduced_travel_is_a_finding(good_folder: Path) -> None:
     scene = kitchen()
     for share, count in ((0.6, 0), (0.4, 1)):
         cut = replace(scene, objects=tuple(_cut(item, share) for item in scene.objects))
         assert len(findings(good_folder, document(cut))) == count
 
 
-def test_hinges_that_no_handle_tells_are_one_finding_for_all_doors(good_folder: Path) -> None:
+def test_low_confidence_hinges_share_one_finding(good_folder: Path) -> None:
     said = document(kitchen())
     doors = [item["name"] for item in said["objects"] if item["joint"] and item["joint"]["type"] == "revolute"]
     for item in said["objects"]:
@@ -65,7 +65,7 @@ def test_hinges_that_no_handle_tells_are_one_finding_for_all_doors(good_folder: 
     assert findings(good_folder, said) == []
 
 
-def test_a_place_that_is_unsure_is_a_finding_with_how_far_another_one_is_turned(good_folder: Path) -> None:
+def test_an_ambiguous_placement_is_reported_with_the_alternative_angle(good_folder: Path) -> None:
     said = document(kitchen())
     placement = next(item for item in said["objects"] if item["placement"])["placement"]
     placement |= {"unsure": True, "runner_up_turn_deg": 90.0}
@@ -86,7 +86,7 @@ def test_likeness_is_judged_by_its_own_rules_and_names_each_object_once() -> Non
     assert worse.doubts == (("cabinet_2", "one thing"), ("mug_1", "one thing"), ("cabinet_1", "no handle shows"))
 
 
-def test_what_the_clearance_takes_from_a_joint_is_known() -> None:
+def test_a_joint_cut_by_clearance_keeps_its_uncut_limit() -> None:
     door = cabinet("cabinet_1")
     blocked = replace(counter_at("counter_1"), world_from_object=replace(door.world_from_object, translation=_before(door)))
     free, _ = open_freely([door, blocked], (), frozenset())

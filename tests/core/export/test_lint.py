@@ -360,12 +360,14 @@ def edit_text(path: Path, old: str, new: str) -> None:
     path.write_text(path.read_text().replace(old, new))
 
 
-def test_the_good_bundle_is_clean(good_folder: Path) -> None:
+def test_the_good_bundle_has_no_lint_findings(good_folder: Path) -> None:
     assert lint(good_folder) == ()
 
 
 @pytest.mark.parametrize(("rule", "what", "plant", "implied"), CASES, ids=[f"{c[0]}: {c[1]}" for c in CASES])
-def test_a_planted_defect_is_found(good_folder: Path, rule: str, what: str, plant: Plant, implied: set[str]) -> None:
+def test_a_planted_defect_is_reported_by_its_rule(
+    good_folder: Path, rule: str, what: str, plant: Plant, implied: set[str]
+) -> None:
     plant(good_folder)
     found = lint(good_folder)
     assert rule in {f.rule for f in found}, f"{what}: {found}"
@@ -380,14 +382,14 @@ def test_every_rule_of_the_table_has_a_planted_defect() -> None:
 
 
 @pytest.mark.parametrize("content", ["", "<robot", "<mujoco/>", "not xml at all"])
-def test_a_urdf_that_cannot_be_read_is_one_line(good_folder: Path, content: str) -> None:
+def test_an_unreadable_urdf_raises_a_one_line_error(good_folder: Path, content: str) -> None:
     (good_folder / "scene.urdf").write_text(content)
     with pytest.raises(BundleError, match=r"^scene\.urdf") as caught:
         lint(good_folder)
     assert "\n" not in str(caught.value)
 
 
-def test_names_that_begin_alike_are_told_apart(tmp_path: Path) -> None:
+def test_object_names_with_a_common_prefix_cause_no_findings(tmp_path: Path) -> None:
     from r2c2r_core.model.scene import ArticulatedScene
     from tests.core.export.conftest import write_folder
     from tests.core.export.kitchen import cabinet

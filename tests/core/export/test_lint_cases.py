@@ -105,19 +105,19 @@ CASES = (
 )
 
 
-def test_there_are_27_cases_and_none_twice() -> None:
+def test_there_are_27_unique_lint_cases() -> None:
     assert [case.number for case in CASES] == list(range(1, 28))
     assert len({case.what for case in CASES}) == 27
 
 
 @pytest.mark.parametrize("case", CASES, ids=[f"{case.number}: {case.what}" for case in CASES])
-def test_the_case_is_found(good_folder: Path, case: Case) -> None:
+def test_the_linter_reports_the_planted_case(good_folder: Path, case: Case) -> None:
     assert case.code not in {found.rule for found in lint(good_folder)}
     case.plant(good_folder)
     assert case.code in {found.rule for found in lint(good_folder)}
 
 
-def test_five_collisions_of_their_own_are_what_a_cabinet_should_have(good_folder: Path) -> None:
+def test_a_cabinet_base_has_five_collision_shapes_and_no_findings(good_folder: Path) -> None:
     """The one row of the table that every loader opens."""
     from r2c2r_core.export.reading import read_urdf
 

@@ -26,7 +26,7 @@ def own_environment(name: str) -> pytest.MarkDecorator:
 
 
 @own_environment("Drake")
-def test_the_good_bundle_loads_in_drake_and_an_edited_world_fails(good_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_drake_accepts_the_good_bundle_and_detects_an_edited_limit(good_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(APART["Drake"].variable, GIVEN["Drake"])
     found = verdicts(good_folder)["Drake"]
     assert found.state == "passed", found
@@ -37,7 +37,7 @@ def test_the_good_bundle_loads_in_drake_and_an_edited_world_fails(good_folder: P
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=own_environment(name)) for name in ("MJX", "MuJoCo Warp")])
-def test_the_good_bundle_moves_in_engines_of_mujocos_models_as_in_mujoco(
+def test_mjcf_based_engines_move_the_good_bundle_like_mujoco(
     good_folder: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.setenv(APART[name].variable, GIVEN[name])
@@ -48,9 +48,7 @@ def test_the_good_bundle_moves_in_engines_of_mujocos_models_as_in_mujoco(
 
 
 @own_environment("Newton")
-def test_newton_holds_every_value_but_velocity_and_no_body_for_what_stands_fast(
-    good_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_newton_keeps_all_values_except_velocity_and_fixed_bodies(good_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(APART["Newton"].variable, GIVEN["Newton"])
     found = verdicts(good_folder)["Newton"]
     assert found.state == "passed", found
@@ -84,7 +82,7 @@ def test_the_good_bundle_loads_in_yourdfpy_mujoco_pybullet_and_usd(good_folder: 
     assert found["MuJoCo (MJCF)"].detail.endswith("it does not keep joint velocity")
 
 
-def test_usd_is_loaded_in_a_process_of_its_own(good_folder: Path) -> None:
+def test_usd_is_loaded_in_a_separate_process(good_folder: Path) -> None:
     """Its libraries ask for the GIL while they are loaded: beside another thread that loads one, both waited forever."""
     code = """
 import sys
@@ -99,7 +97,7 @@ print(found["USD"], "pxr" in sys.modules)
     assert done.stdout.split()[-2:] == ["passed", "False"]
 
 
-def test_a_loader_that_is_not_there_is_not_tried(good_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_loader_is_reported_as_not_tried(good_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import importlib.util
 
     real = importlib.util.find_spec
@@ -113,7 +111,7 @@ def test_a_loader_that_is_not_there_is_not_tried(good_folder: Path, monkeypatch:
 
 
 @pytest.mark.parametrize("python", ["/nowhere/python", "/bin/false"])
-def test_a_wrong_sapien_python_is_not_tried(good_folder: Path, python: str) -> None:
+def test_an_invalid_sapien_python_is_reported_as_not_tried(good_folder: Path, python: str) -> None:
     result = verdicts(good_folder, python)["SAPIEN"]
     assert result.state == "not tried"
     assert python in result.detail
@@ -125,7 +123,7 @@ def test_the_good_bundle_loads_in_sapien(good_folder: Path) -> None:
     assert result.state == "passed", result.detail
 
 
-def test_a_dropped_collider_is_noticed(good_folder: Path) -> None:
+def test_a_missing_collider_mesh_fails_the_loaders(good_folder: Path) -> None:
     """PyBullet drops a mesh it cannot find in silence; the comparison does not."""
     (good_folder / "meshes/bottle_1/bottle_1_body_col_0.obj").unlink()
     found = verdicts(good_folder)
@@ -134,7 +132,7 @@ def test_a_dropped_collider_is_noticed(good_folder: Path) -> None:
     assert "\n" not in found["MuJoCo (URDF)"].detail
 
 
-def test_an_mjcf_that_says_something_else_fails(good_folder: Path) -> None:
+def test_an_mjcf_with_different_limits_fails(good_folder: Path) -> None:
     document = ET.parse(good_folder / "scene.xml")
     next(j for j in document.iter("joint") if j.get("name") == "drawer_1_slide").set("range", "0 0.9")
     document.write(good_folder / "scene.xml")
@@ -159,7 +157,7 @@ USD_DEFECTS = (
 
 
 @pytest.mark.parametrize(("asset", "old", "new", "says"), USD_DEFECTS, ids=[d[3] for d in USD_DEFECTS])
-def test_a_usd_that_says_something_else_fails(good_folder: Path, asset: str | None, old: str, new: str, says: str) -> None:
+def test_a_usd_with_different_values_fails(good_folder: Path, asset: str | None, old: str, new: str, says: str) -> None:
     scene = good_folder / ("scene.usda" if asset is None else f"assets/{asset}/{asset}.usda")
     text = scene.read_text()
     assert old in text
@@ -170,7 +168,7 @@ def test_a_usd_that_says_something_else_fails(good_folder: Path, asset: str | No
     assert found["yourdfpy"].state == "passed"
 
 
-def test_every_loader_opens_a_bundle_whose_path_has_spaces_and_other_letters(good_folder: Path, tmp_path: Path) -> None:
+def test_loaders_open_a_bundle_with_spaces_and_unicode_in_its_path(good_folder: Path, tmp_path: Path) -> None:
     moved = tmp_path / "Küche 1 – キッチン"
     good_folder.rename(moved)
     found = verdicts(moved, GIVEN["SAPIEN"] or None)

@@ -8,13 +8,13 @@ def said(*issues: tuple[str, str]) -> dict[str, Any]:
     return {"version": "validator 1", "issues": entries}
 
 
-def test_a_serious_issue_fails_and_is_named_with_its_rule_and_place() -> None:
+def test_a_serious_issue_fails_with_its_rule_and_location() -> None:
     result = validated("NVIDIA", said(("VG.016", "warning"), ("RB.001", "failure")))
     assert result.state == "failed"
     assert result.detail == "validator 1: 1 serious, first RB.001 at /Scene/a: m"
 
 
-def test_false_alarms_pass_and_are_counted_with_the_reason() -> None:
+def test_known_false_alarms_pass_and_are_counted_with_the_reason() -> None:
     result = validated("NVIDIA", said(("RB.007", "failure"), ("RB.007", "failure")))
     assert result.state == "passed"
     assert result.detail == f"validator 1: 2 x RB.007 ({FALSE_ALARMS['RB.007']})"
@@ -24,5 +24,5 @@ def test_a_warning_of_another_rule_passes_and_is_shown() -> None:
     assert validated("NVIDIA", said(("ZZ.1", "warning"))).detail == "validator 1: 1 x ZZ.1 (a warning)"
 
 
-def test_nothing_said_is_said() -> None:
+def test_no_issues_are_reported_as_no_issues() -> None:
     assert validated("NVIDIA", said()).detail == "validator 1: no issues"

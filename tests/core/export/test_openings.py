@@ -60,20 +60,20 @@ def opened(visual: ObjMesh, colliders: list[np.ndarray]) -> float | None:
     return opening_free(UrdfLink(name="mug", inertial=None, shapes=tuple(shapes)), files)
 
 
-def test_a_mug_of_staves_keeps_its_opening() -> None:
+def test_a_mug_of_stave_colliders_keeps_its_opening() -> None:
     assert opened(mug(), staves()) == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_mug_of_one_hull_has_none() -> None:
+def test_a_mug_with_one_convex_hull_has_no_opening() -> None:
     assert opened(mug(), [mug().vertices]) == 0.0
 
 
-def test_a_mug_half_full_of_collider_is_half_open() -> None:
+def test_a_mug_half_filled_by_colliders_is_half_open() -> None:
     half = np.concatenate([ring(OUTER_M, 0.0), ring(OUTER_M, (HEIGHT_M + FLOOR_M) / 2)])
     assert opened(mug(), [*staves(), half]) == pytest.approx(0.5, abs=0.04)
 
 
-def test_a_solid_block_and_a_mug_upside_down_have_no_hollow() -> None:
+def test_a_solid_block_and_an_upside_down_mug_have_no_cavity() -> None:
     block = mug()
     solid = ObjMesh(vertices=block.vertices[: 2 * SIDES], faces=_hull(block.vertices[: 2 * SIDES]), parts=1, libraries=())
     turned = ObjMesh(vertices=block.vertices * [1, -1, -1], faces=block.faces, parts=1, libraries=())

@@ -8,7 +8,7 @@ from r2c2r_core.export.plan import plan_bundle
 from tests.core.export.kitchen import reconstruction
 
 
-def test_each_clicked_object_is_shown_in_the_photo_and_as_a_model(tmp_path: Path) -> None:
+def test_each_segmented_object_has_a_photo_beside_its_model(tmp_path: Path) -> None:
     item = reconstruction()
     files = write_pictures(item, plan_bundle(item.scene), tmp_path)
     assert set(files) == {track.name for track in item.tracks}  # objects without clicks have no mask

@@ -15,7 +15,7 @@ def scene_of(*objects: SceneObject) -> ArticulatedScene:
     return ArticulatedScene(name="test", objects=objects, layout_moves_m={}, warnings=())
 
 
-def test_names_start_with_their_object_and_are_unique() -> None:
+def test_body_and_joint_names_are_unique_and_prefixed_by_object() -> None:
     plan = plan_bundle(kitchen())
     for body in plan.bodies:
         assert body.name.startswith(f"{body.object_name}_")
@@ -24,7 +24,7 @@ def test_names_start_with_their_object_and_are_unique() -> None:
     assert len(set(names)) == len(names)
 
 
-def test_two_objects_whose_link_names_would_meet_are_kept_apart() -> None:
+def test_colliding_link_names_of_two_objects_are_made_unique() -> None:
     first, second = cabinet("a"), cabinet("a_b", x=1.0)
     first = replace(
         first,
@@ -40,7 +40,7 @@ def test_two_objects_whose_link_names_would_meet_are_kept_apart() -> None:
     assert len(set(names)) == 4
 
 
-def test_a_bare_link_name_gets_its_objects_name_and_odd_letters_go() -> None:
+def test_link_names_are_prefixed_and_special_characters_replaced() -> None:
     item = cabinet("cab")
     item = replace(
         item,
@@ -52,7 +52,7 @@ def test_a_bare_link_name_gets_its_objects_name_and_odd_letters_go() -> None:
     assert plan.bodies[1].joint_name == "cab_hinge"
 
 
-def test_parents_come_before_children_whatever_the_order_of_links() -> None:
+def test_bodies_are_sorted_parents_before_children() -> None:
     item = double_door("d")
     item = replace(item, links=(item.links[0], item.links[2], item.links[1]))
     seen = {"world"}
@@ -61,7 +61,7 @@ def test_parents_come_before_children_whatever_the_order_of_links() -> None:
         seen.add(body.name)
 
 
-def test_a_link_frame_off_the_hinge_is_moved_onto_it_and_moves_the_same_way() -> None:
+def test_link_frames_are_moved_onto_the_hinge_with_the_same_motion() -> None:
     """A door given in the object's frame opens exactly like the same door given in the hinge's frame."""
     good = cabinet("c", x=0.3, yaw=0.4)
     door = good.links[1]
@@ -86,7 +86,7 @@ def test_a_link_frame_off_the_hinge_is_moved_onto_it_and_moves_the_same_way() ->
         )
 
 
-def test_opening_moves_a_left_hinged_door_out_of_the_front_and_to_the_left() -> None:
+def test_a_left_hinged_door_opens_outwards_and_to_the_left() -> None:
     plan = plan_bundle(scene_of(cabinet("c")))
     handle = np.array([[0.55, 0.0, 0.0]])
     closed, opened = (poses_at(plan, fraction)["c_door"].apply(handle)[0] for fraction in (0.0, 0.9))
@@ -94,20 +94,20 @@ def test_opening_moves_a_left_hinged_door_out_of_the_front_and_to_the_left() -> 
     assert opened[0] < closed[0] - 0.4
 
 
-def test_equal_textures_of_one_object_are_written_once() -> None:
+def test_identical_textures_of_an_object_share_one_file() -> None:
     item = cabinet("c")
     base = replace(item.links[0], visual=item.links[1].visual)
     plan = plan_bundle(scene_of(replace(item, links=(base, item.links[1]))))
     assert plan.bodies[0].texture_file == plan.bodies[1].texture_file
 
 
-def test_the_floor_is_never_above_what_stands_on_it() -> None:
+def test_the_floor_is_lowered_to_the_lowest_object() -> None:
     low = bottle("b", bottom_z=-0.004)
     assert plan_bundle(scene_of(low)).floor_z_m == pytest.approx(-0.004)
     assert plan_bundle(kitchen()).floor_z_m == 0.0
 
 
-def test_a_scene_without_objects_or_with_a_loop_is_refused_by_name() -> None:
+def test_an_empty_scene_or_a_kinematic_loop_is_rejected() -> None:
     with pytest.raises(ExportFailed, match="no object"):
         plan_bundle(scene_of())
     item = cabinet("c")
@@ -120,7 +120,7 @@ def replace_box(box: Box, shift: np.ndarray) -> Box:
     return replace(box, link_from_box=Rigid3(np.eye(3), shift) @ box.link_from_box)
 
 
-def test_joint_and_link_of_the_model_are_left_alone() -> None:
+def test_planning_does_not_modify_the_scene_model() -> None:
     item = cabinet("c")
     before: tuple[Link, Joint] = (item.links[1], item.joints[0])
     plan_bundle(scene_of(item))

@@ -83,7 +83,7 @@ URDF_PROBES: dict[str, Callable[[Path], dict[str, Any]]] = {
 
 @pytest.mark.parametrize("loader", URDF_PROBES)
 @pytest.mark.parametrize("what", URDF_EDITS)
-def test_a_urdf_that_says_one_thing_otherwise_is_caught(bundle: Path, expected: Readback, loader: str, what: str) -> None:
+def test_an_edited_urdf_value_is_detected_on_readback(bundle: Path, expected: Readback, loader: str, what: str) -> None:
     edit, says = URDF_EDITS[what]
     lines = differences(expected, readback_of(URDF_PROBES[loader](edited_urdf(bundle, what, edit))))
     if (loader, what) == ("mujoco", "velocity"):
@@ -102,7 +102,7 @@ def edited_urdf(bundle: Path, what: str, edit: Callable[[ET.Element], None]) -> 
 
 
 @pytest.mark.skipif(not Path(SAPIEN).is_file(), reason="no SAPIEN environment: set R2C2R_SAPIEN_PYTHON to its python")
-def test_sapien_holds_all_but_friction_effort_and_velocity(bundle: Path, expected: Readback) -> None:
+def test_sapien_keeps_all_values_except_friction_effort_and_velocity(bundle: Path, expected: Readback) -> None:
     def all_of_them(root: ET.Element) -> None:
         for what, (edit, _) in URDF_EDITS.items():
             if what not in ("type", "inertia axes"):  # a type hides later values, inertia axes hide earlier ones
@@ -147,7 +147,7 @@ MJCF_EDITS: dict[str, tuple[Callable[[ET.Element], None], str]] = {
 
 
 @pytest.mark.parametrize("what", MJCF_EDITS)
-def test_an_mjcf_that_says_one_thing_otherwise_is_caught(bundle: Path, expected: Readback, what: str) -> None:
+def test_an_edited_mjcf_value_is_detected_on_readback(bundle: Path, expected: Readback, what: str) -> None:
     edit, says = MJCF_EDITS[what]
     document = ET.parse(bundle / "scene.xml")
     edit(document.getroot())
@@ -173,7 +173,7 @@ USD_EDITS: dict[str, tuple[str, str, object, str]] = {
 
 
 @pytest.mark.parametrize("what", USD_EDITS)
-def test_a_usd_that_says_one_thing_otherwise_is_caught(bundle: Path, expected: Readback, what: str) -> None:
+def test_an_edited_usd_value_is_detected_on_readback(bundle: Path, expected: Readback, what: str) -> None:
     from pxr import Usd
 
     prim, attribute, value, says = USD_EDITS[what]
@@ -189,7 +189,7 @@ def test_a_usd_that_says_one_thing_otherwise_is_caught(bundle: Path, expected: R
     assert any(line.startswith(says) for line in lines), lines
 
 
-def test_hinges_agree_in_degrees_and_radians(bundle: Path, expected: Readback) -> None:
+def test_usd_hinge_values_in_degrees_match_the_urdf_in_radians(bundle: Path, expected: Readback) -> None:
     """USD counts a hinge's limits, damping and velocity in degrees; read back they are the URDF's radians."""
     held = readback_of(usd.read_back(bundle / "scene.usda")).joints["cabinet_1_hinge"]
     wanted = expected.joints["cabinet_1_hinge"]
@@ -198,7 +198,7 @@ def test_hinges_agree_in_degrees_and_radians(bundle: Path, expected: Readback) -
         assert getattr(held, name) == pytest.approx(getattr(wanted, name), rel=1e-5)
 
 
-def test_a_joint_and_a_link_too_many_or_missing_are_named(expected: Readback) -> None:
+def test_extra_and_missing_joints_and_links_are_reported(expected: Readback) -> None:
     without = Readback(
         version="",
         joints={k: v for k, v in expected.joints.items() if k != JOINT},
@@ -209,7 +209,7 @@ def test_a_joint_and_a_link_too_many_or_missing_are_named(expected: Readback) ->
     assert differences(without, expected) == [f"joint {JOINT} is not in scene.urdf", f"link {LINK} is not in scene.urdf"]
 
 
-def test_not_a_number_is_never_equal(expected: Readback) -> None:
+def test_nan_values_are_reported_as_differences(expected: Readback) -> None:
     from dataclasses import replace
 
     hollow = replace(expected.bodies[LINK], inertia_world=np.full((3, 3), np.nan), mass_kg=float("nan"))
@@ -217,7 +217,7 @@ def test_not_a_number_is_never_equal(expected: Readback) -> None:
     assert [line.split()[1] for line in lines] == ["weighs", "has"]
 
 
-def test_a_link_that_a_loader_makes_part_of_the_world_is_not_missing(expected: Readback) -> None:
+def test_a_link_merged_into_the_world_is_not_missing(expected: Readback) -> None:
     bodies = {name: body for name, body in expected.bodies.items() if name != "counter_1_slab"}
     found = replace(expected, bodies=bodies)
     assert differences(expected, found) == ["link counter_1_slab is missing"]

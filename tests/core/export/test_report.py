@@ -48,7 +48,7 @@ def tags(text: str) -> Tags:
     return parser
 
 
-def test_nothing_from_data_becomes_markup() -> None:
+def test_data_is_html_escaped_in_the_report() -> None:
     hit = finding("tree", EVIL, EVIL)
     capture = {"name": EVIL, "sha256": EVIL, "format": EVIL, "frames": EVIL}
     text = page(certificate(findings=(hit,)), {EVIL: EVIL}, capture=capture, tool_version=EVIL, created=EVIL)
@@ -58,27 +58,27 @@ def test_nothing_from_data_becomes_markup() -> None:
     assert "&lt;script&gt;" in text
 
 
-def test_pictures_are_relative_files() -> None:
+def test_the_report_references_images_by_relative_path() -> None:
     sources = [attrs["src"] for tag, attrs in tags(page(certificate())).seen if tag == "img"]
     assert sources == ["preview.png", "pictures/cabinet_1.jpg"]
     assert not re.search(r"https?://", page(certificate()))
 
 
-def test_a_failed_certificate_and_its_reasons_are_on_the_page() -> None:
+def test_the_report_shows_a_failed_certificate_with_its_reasons() -> None:
     hit = finding("travel", "drawer_1_slide", "opens 3 % of its range under 30 N")
     text = page(certificate(passed=False, findings=(hit,)), {"mug_1": "no frame shows it"})
     for words in ("failed", "opens 3 % of its range", "mug_1", "no frame shows it", "not tried"):
         assert words in text
 
 
-def test_what_was_not_measured_is_a_dash() -> None:
+def test_unmeasured_values_are_shown_as_a_dash() -> None:
     nan = float("nan")
     text = page(certificate(passed=False, joints=(), rest_penetration_m=nan, drift_m=nan, realtime_factor=nan))
     assert "nan" not in text.lower().replace("finance", "")
     assert "–" in text
 
 
-def test_the_json_report_repeats_certificate_objects_and_losses_without_the_machines_speed() -> None:
+def test_the_json_report_omits_the_realtime_factor() -> None:
     manifest = manifest_of(reconstruction(), plan_bundle(kitchen()), None)
     report = report_of(manifest, certificate(), {"mug_1": "not seen"})
     assert report["version"] == 1
@@ -89,7 +89,7 @@ def test_the_json_report_repeats_certificate_objects_and_losses_without_the_mach
     assert np.isfinite(report["objects"][0]["placement_rms_m"])
 
 
-def test_what_stands_in_a_joints_way_and_how_things_stand_is_on_the_page() -> None:
+def test_the_report_lists_joint_blockers_and_object_stability() -> None:
     joint = JointResult(
         joint="cabinet_1_hinge",
         deepest_penetration_m=0.0,
@@ -105,7 +105,7 @@ def test_what_stands_in_a_joints_way_and_how_things_stand_is_on_the_page() -> No
         assert words in text
 
 
-def test_findings_of_one_rule_share_a_row_and_remarks_stand_under_their_object() -> None:
+def test_the_report_groups_findings_by_rule_and_warnings_by_object() -> None:
     hits = (finding("together", "a_joint", "meets b"), finding("together", "c_joint", "meets d"))
     text = page(certificate(findings=hits))
     assert text.count("<strong>together</strong>") == 1
@@ -117,7 +117,7 @@ def test_findings_of_one_rule_share_a_row_and_remarks_stand_under_their_object()
     assert '<td colspan="9"><ul class="quiet"><li>&lt;script&gt;' in noted
 
 
-def test_an_arm_is_shown_with_its_map_or_with_why_it_was_not_tried() -> None:
+def test_the_report_shows_the_arm_map_or_why_it_was_not_tried() -> None:
     grip = {"kind": "joint", "name": "cabinet_1_hinge", "method": "pinch", "passed": True, "film": "cabinet_1_hinge", "why": ""}
     grip |= dict.fromkeys(("grip_n", "opened", "slip_m", "off_m", "force_n", "blame"))
     arm = {

@@ -26,7 +26,7 @@ def page() -> str:
     return review_html(plan_bundle(kitchen()), certificate(), np.array([0.0, -3.0, 1.5]))
 
 
-def test_bodies_come_parents_first_with_their_joints(page: str) -> None:
+def test_review_bodies_are_listed_parents_first_with_their_joints(page: str) -> None:
     plan, scene = plan_bundle(kitchen()), scene_of(page)
     assert [body["name"] for body in scene["bodies"]] == [body.name for body in plan.bodies]
     for k, (said, body) in enumerate(zip(scene["bodies"], plan.bodies, strict=True)):
@@ -39,7 +39,7 @@ def test_bodies_come_parents_first_with_their_joints(page: str) -> None:
             assert (said["joint"]["lower"], said["joint"]["upper"]) == (body.joint.lower, body.joint.upper)
 
 
-def test_surfaces_are_kept_to_a_tenth_of_a_millimetre(page: str) -> None:
+def test_review_meshes_are_accurate_to_a_tenth_of_a_millimetre(page: str) -> None:
     for said, body in zip(scene_of(page)["bodies"], plan_bundle(kitchen()).bodies, strict=True):
         if body.link.visual is None:
             continue
@@ -50,7 +50,7 @@ def test_surfaces_are_kept_to_a_tenth_of_a_millimetre(page: str) -> None:
         np.testing.assert_array_equal(faces, body.link.visual.faces)
 
 
-def test_a_finding_leads_to_its_object_and_no_name_ends_the_script() -> None:
+def test_findings_link_to_their_object_and_names_cannot_close_the_script() -> None:
     findings = (
         Finding(rule="travel", severity="error", where="drawer_1_slide", message="jams"),
         Finding(rule="name", severity="error", where="</script><b>", message="<img src=x>"),
@@ -62,6 +62,6 @@ def test_a_finding_leads_to_its_object_and_no_name_ends_the_script() -> None:
     assert "<img src=x>" not in page
 
 
-def test_nothing_is_fetched(page: str) -> None:
+def test_the_review_page_loads_no_external_resources(page: str) -> None:
     assert "default-src 'none'" in page
     assert not re.search(r"(src|href)=[\"']?(https?:)?//", page)

@@ -57,7 +57,7 @@ def fits_of(item: Reconstruction, plan: Plan) -> dict[str, ScanFit]:
 
 
 @pytest.mark.parametrize("behind_m", [0.0, 0.004, 0.015])
-def test_a_model_as_far_from_the_scan_as_it_is(behind_m: float) -> None:
+def test_the_scan_fit_measures_a_known_offset(behind_m: float) -> None:
     item = filmed(behind_m)
     fit = fits_of(item, plan_bundle(item.scene))["drawer_1"]  # a flat front, filmed straight on
     assert fit.median_m == pytest.approx(behind_m, abs=0.0015)
@@ -65,7 +65,7 @@ def test_a_model_as_far_from_the_scan_as_it_is(behind_m: float) -> None:
     assert fit.f_score_2cm == pytest.approx(1.0, abs=0.02)
 
 
-def test_an_object_that_cannot_be_judged_or_pictured_ends_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_object_that_fails_fit_or_picture_is_skipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     item = filmed(0.0)
     plan = plan_bundle(item.scene)
     clicked = {track.name for track in item.tracks}
@@ -83,7 +83,7 @@ def test_an_object_that_cannot_be_judged_or_pictured_ends_nothing(tmp_path: Path
     assert set(write_pictures(item, plan, tmp_path)) == clicked - {item.tracks[0].name}
 
 
-def test_surface_that_something_unnamed_hides_is_not_judged() -> None:
+def test_surface_occluded_by_an_unsegmented_object_is_not_scored() -> None:
     item = filmed(0.0)
     name = item.tracks[0].name
     left, width = item.tracks[0].masks[0].left, item.tracks[0].masks[0].box_width
@@ -92,7 +92,7 @@ def test_surface_that_something_unnamed_hides_is_not_judged() -> None:
     assert fits_of(covered, plan_bundle(item.scene))[name].f_score_1cm == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_perfect_mesh_scores_the_same_whatever_its_size() -> None:
+def test_a_perfect_large_mesh_has_an_f_score_of_one() -> None:
     """The widest front of the kitchen: so many points of it that only some are kept, and not the same of mesh and scan."""
     item = filmed(0.0)
     masks = {index: unpack_mask(mask) for index, mask in item.tracks[2].masks.items()}
@@ -104,7 +104,7 @@ def test_a_perfect_mesh_scores_the_same_whatever_its_size() -> None:
     assert fits["double_1"].f_score_1cm > 0.995
 
 
-def test_frames_in_which_a_door_stands_open_are_not_asked() -> None:
+def test_frames_with_an_open_door_are_excluded_from_the_fit() -> None:
     item = filmed(0.0)
     opened = motion(dict.fromkeys(item.tracks[0].masks, 1.0), "left")
     tracks = (replace(item.tracks[0], motions=(opened,)), *item.tracks[1:])
@@ -119,7 +119,7 @@ def test_objects_without_depth_points_have_no_fit() -> None:
     assert fits_of(replace(item, tracks=empty), plan_bundle(item.scene)) == {}
 
 
-def test_the_f_score_is_the_harmonic_mean_of_both_shares() -> None:
+def test_the_f_score_is_the_harmonic_mean_of_precision_and_recall() -> None:
     to_mesh, to_scan = np.array([0.0, 0.0, 0.0, 0.03]), np.array([0.0, 0.03])
     assert f_score(to_mesh, to_scan, 0.01) == pytest.approx(2 * 0.75 * 0.5 / 1.25)
     assert f_score(np.array([0.5]), np.array([0.5]), 0.01) == 0.0

@@ -30,7 +30,7 @@ def found(folder: Path) -> set[tuple[str, str, str]]:
     return {(one.severity, one.rule, one.where) for one in check_seal(folder)}
 
 
-def test_a_bundle_as_it_was_written_is_whole(folder: Path) -> None:
+def test_an_unmodified_bundle_passes_the_checksum_check(folder: Path) -> None:
     assert check_seal(folder) == ()
     listed = json.loads((folder / "manifest.json").read_text())["files"]
     assert listed.keys() == {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()} - {"manifest.json"}
@@ -46,13 +46,13 @@ def test_a_bundle_as_it_was_written_is_whole(folder: Path) -> None:
     ],
     ids=["noise", "another texture", "a file gone", "a file more"],
 )
-def test_what_was_changed_is_told(folder: Path, change: Callable[[Path], object], told: tuple[str, str, str]) -> None:
+def test_changed_files_are_reported(folder: Path, change: Callable[[Path], object], told: tuple[str, str, str]) -> None:
     change(folder)
     assert found(folder) == {told}
     assert all("\n" not in one.message for one in check_seal(folder))
 
 
-def test_a_bundle_with_another_scene_glb_fails_the_check(folder: Path, tmp_path: Path) -> None:
+def test_a_bundle_with_a_replaced_scene_glb_fails_the_check(folder: Path, tmp_path: Path) -> None:
     (folder / "scene.glb").write_bytes(b"noise")
     write_zip(folder, tmp_path / "noise.zip")
     certificate = check_bundle(tmp_path / "noise.zip")
@@ -61,12 +61,12 @@ def test_a_bundle_with_another_scene_glb_fails_the_check(folder: Path, tmp_path:
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"files": 5}', "{}"])
-def test_a_manifest_without_checksums_is_told_or_left_to_the_linter(folder: Path, content: str) -> None:
+def test_a_manifest_without_checksums_yields_at_most_a_warning(folder: Path, content: str) -> None:
     (folder / "manifest.json").write_text(content)
     assert found(folder) <= {("warning", "file-unsealed", "manifest.json")}
 
 
-def test_equal_inputs_give_equal_bytes_however_long_it_took(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_equal_inputs_give_identical_bytes_regardless_of_timing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     one = replace(kitchen(), objects=tuple(item for item in kitchen().objects if item.name in ("cabinet_1", "bottle_1")))
     assert len(one.objects) == 2
     monkeypatch.setattr(stage, "preview_png", lambda plan, seen_from: preview_png(plan, seen_from, 64))
@@ -80,7 +80,7 @@ def test_equal_inputs_give_equal_bytes_however_long_it_took(tmp_path: Path, monk
 
 
 @pytest.mark.slow
-def test_a_whole_kitchen_again_gives_equal_bytes_however_long_it_took(
+def test_exporting_a_kitchen_twice_gives_identical_bytes(
     kitchen_bundle: tuple[Path, Certificate], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spent = time.thread_time

@@ -21,7 +21,7 @@ def seen_in(item: Reconstruction) -> dict[str, Seen]:
     return seen_sides(item, plan, looks_of(item.capture, plan))
 
 
-def test_a_unit_filmed_straight_on_was_seen_from_the_front_only() -> None:
+def test_a_unit_filmed_frontally_is_observed_from_the_front_only() -> None:
     seen = seen_in(filmed(0.0))["drawer_1"]
     assert seen.sides["front"] > 0.95
     assert seen.sides["back"] == 0.0
@@ -30,7 +30,7 @@ def test_a_unit_filmed_straight_on_was_seen_from_the_front_only() -> None:
     assert min(seen.sides.values()) < seen.share < max(seen.sides.values())
 
 
-def test_what_something_unnamed_hides_was_not_seen() -> None:
+def test_surface_hidden_by_an_unsegmented_object_is_not_observed() -> None:
     item = filmed(0.0)
     mask = item.tracks[0].masks[0]
     name = item.tracks[0].name
@@ -38,7 +38,7 @@ def test_what_something_unnamed_hides_was_not_seen() -> None:
     assert seen_in(covered)[name].sides["front"] == pytest.approx(seen_in(item)[name].sides["front"] / 2, abs=0.1)
 
 
-def test_an_object_that_nobody_clicked_or_no_frame_shows_has_no_shares() -> None:
+def test_an_object_without_clicks_or_masks_has_no_coverage() -> None:
     item = filmed(0.0)
     unseen = replace(item.tracks[0], masks={})
     found = seen_in(replace(item, tracks=(unseen, item.tracks[1])))
@@ -55,11 +55,11 @@ def test_an_object_that_nobody_clicked_or_no_frame_shows_has_no_shares() -> None
         (("front", "back", "left", "right"), "not seen: front, back, left, right"),
     ],
 )
-def test_unseen_sides_are_said_as_people_do(unseen: tuple[str, ...], words: str) -> None:
+def test_unobserved_sides_are_described_in_plain_words(unseen: tuple[str, ...], words: str) -> None:
     assert unseen_words(unseen) == words
 
 
-def test_manifest_report_and_review_mark_what_was_not_seen() -> None:
+def test_manifest_report_and_review_mark_unobserved_sides() -> None:
     item, plan = reconstruction(), plan_bundle(kitchen())
     name = item.tracks[0].name
     seen = {name: Seen(share=0.314, sides={"front": 0.9, "back": 0.0, "left": 0.1, "right": 0.2, "top": 0.4})}

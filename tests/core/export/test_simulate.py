@@ -29,7 +29,7 @@ def moved(item: SceneObject, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> 
     return replace(item, world_from_object=pose)
 
 
-def test_the_good_kitchen_opens_fully_and_touches_nothing(tmp_path: Path) -> None:
+def test_the_good_kitchen_opens_fully_without_penetration(tmp_path: Path) -> None:
     result = simulate(write_folder(kitchen(), tmp_path / "b") / "scene.xml")
     assert [(f.rule, f.where) for f in result.findings] == [("together", "drawer_1_slide")]  # beside a door open by 92 degrees
     assert {joint.joint for joint in result.joints} == {
@@ -46,7 +46,7 @@ def test_the_good_kitchen_opens_fully_and_touches_nothing(tmp_path: Path) -> Non
     assert result.realtime_factor > 1.0
 
 
-def test_a_scene_with_names_that_are_no_text_is_one_finding(tmp_path: Path) -> None:
+def test_a_scene_with_undecodable_names_is_one_compile_finding(tmp_path: Path) -> None:
     """MuJoCo compiles them; its Python bindings then fail at each name."""
     scene = write_folder(kitchen(), tmp_path / "b") / "scene.xml"
     scene.write_bytes(scene.read_bytes().replace(b"bottle_1", b"bottle\xf51"))
@@ -54,7 +54,7 @@ def test_a_scene_with_names_that_are_no_text_is_one_finding(tmp_path: Path) -> N
     assert [f.rule for f in result.findings] == ["mjcf-compile"]
 
 
-def test_a_scene_that_diverges_leaves_no_log_where_the_person_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_diverging_scene_writes_no_mujoco_log_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """MuJoCo appends its warnings to MUJOCO_LOG.TXT in the working folder, unless somebody else takes them."""
     monkeypatch.chdir(tmp_path)
     Path("scene.xml").write_text(
@@ -77,7 +77,7 @@ def test_a_door_without_a_gap_to_its_neighbours_jams(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("depth_m", [0.002, 0.01, 0.03])
-def test_a_drawer_that_runs_into_a_cabinet_is_found_with_its_depth(tmp_path: Path, depth_m: float) -> None:
+def test_a_drawer_hitting_an_obstacle_is_reported_with_its_depth(tmp_path: Path, depth_m: float) -> None:
     """A post stands `depth_m` inside the open drawer's last stretch of travel."""
     item = drawer("d")
     front_y = -0.56 / 2 - 0.03  # y of the handle's outer face, closed
@@ -93,25 +93,25 @@ def test_a_drawer_that_runs_into_a_cabinet_is_found_with_its_depth(tmp_path: Pat
 
 
 @pytest.mark.parametrize("depth_m", [0.001, 0.004, 0.012])
-def test_a_door_inside_its_neighbour_is_found_at_rest_with_its_depth(tmp_path: Path, depth_m: float) -> None:
+def test_a_door_overlapping_its_neighbour_is_reported_at_rest(tmp_path: Path, depth_m: float) -> None:
     first, second = cabinet("a"), cabinet("b", x=0.6 - 0.003 - depth_m)
     result = simulated(tmp_path, first, second)
     assert result.rest_penetration_m == pytest.approx(depth_m, abs=DEPTH_TOLERANCE_M)
     assert "penetration-rest" in {f.rule for f in result.findings}
 
 
-def test_a_door_inside_its_own_carcass_is_found_though_the_mjcf_excludes_the_pair(tmp_path: Path) -> None:
+def test_door_carcass_penetration_is_measured_despite_contact_exclusion(tmp_path: Path) -> None:
     result = simulated(tmp_path, cabinet("a", gap_m=-0.005))
     assert result.rest_penetration_m == pytest.approx(0.005, abs=DEPTH_TOLERANCE_M)
 
 
-def test_a_thing_sunk_too_deep_into_the_counter_is_found_with_its_depth(tmp_path: Path) -> None:
+def test_an_object_sunk_into_the_counter_is_measured_with_its_depth(tmp_path: Path) -> None:
     result = simulated(tmp_path, counter("counter_1"), bottle("b", bottom_z=0.865 - 0.03))
     assert result.rest_penetration_m == pytest.approx(0.03, abs=DEPTH_TOLERANCE_M)
 
 
 @pytest.mark.parametrize("off_m", [-0.015, -0.003, 0.004, 0.011])
-def test_a_thing_a_little_above_or_below_what_carries_it_stands_on_it_and_stays(tmp_path: Path, off_m: float) -> None:
+def test_a_small_gap_or_overlap_with_the_support_is_corrected(tmp_path: Path, off_m: float) -> None:
     """The counter's top is at 0.865 m; millimetres of a scan neither sink the bottle nor let it fall."""
     result = simulated(tmp_path, counter("counter_1"), bottle("b", bottom_z=0.865 + off_m))
     assert result.findings == ()
@@ -119,7 +119,7 @@ def test_a_thing_a_little_above_or_below_what_carries_it_stands_on_it_and_stays(
     assert result.most_drift_m < 5e-4
 
 
-def test_a_chair_before_a_door_is_named_and_does_not_fail_the_door(tmp_path: Path) -> None:
+def test_an_obstacle_in_front_of_a_door_is_a_warning_only(tmp_path: Path) -> None:
     result = simulated(tmp_path, cabinet("c"), moved(bottle("b", x=0.1, bottom_z=0.0005), y=-0.35, z=0.0))
     assert {(f.rule, f.severity, f.where) for f in result.findings} == {("blocked-by", "warning", "c_hinge")}
     (blocker,) = result.joints[0].blocked_by
@@ -128,7 +128,7 @@ def test_a_chair_before_a_door_is_named_and_does_not_fail_the_door(tmp_path: Pat
     assert result.joints[0].travel_reached >= 0.98
 
 
-def test_a_thing_that_falls_is_reported_as_drift(tmp_path: Path) -> None:
+def test_an_unsupported_object_that_falls_is_reported_as_drift(tmp_path: Path) -> None:
     """Over the counter's edge: its centre is not carried, a third of its foot is."""
     result = simulated(tmp_path, counter("k"), bottle("b", bottom_z=0.9))
     assert "drift" not in {f.rule for f in result.findings}  # a support plate carries it
@@ -153,7 +153,7 @@ def test_fixed_parts_that_overlap_are_a_warning(tmp_path: Path) -> None:
     assert {(f.rule, f.severity) for f in result.findings} == {("overlap", "warning")}
 
 
-def test_a_scene_mujoco_cannot_compile_is_one_finding(tmp_path: Path) -> None:
+def test_a_scene_mujoco_cannot_compile_gives_one_finding(tmp_path: Path) -> None:
     folder = write_folder(kitchen(), tmp_path / "b")
     scene = folder / "scene.xml"
     scene.write_text(scene.read_text().replace('type="box"', 'type="bx"', 1))
@@ -162,7 +162,7 @@ def test_a_scene_mujoco_cannot_compile_is_one_finding(tmp_path: Path) -> None:
     assert np.isnan(result.most_drift_m)
 
 
-def test_touches_are_the_deepest_of_each_pair(tmp_path: Path) -> None:
+def test_the_good_kitchen_has_no_contacts(tmp_path: Path) -> None:
     folder = write_folder(kitchen(), tmp_path / "b")
     model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
     assert touches(model, {}) == []
@@ -177,7 +177,7 @@ def _without_body(text: str, name: str) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def test_doors_that_meet_when_both_are_open_are_a_warning(tmp_path: Path) -> None:
+def test_doors_that_collide_when_both_are_open_are_a_warning(tmp_path: Path) -> None:
     """Two cabinets facing each other 0.8 m apart: each opens fully, their doors cross."""
     turned = Rigid3(np.diag([-1.0, -1.0, 1.0]), np.array([0.1, -0.56 - 0.8, 0.0]))
     facing = cabinet("b")
@@ -189,12 +189,12 @@ def test_doors_that_meet_when_both_are_open_are_a_warning(tmp_path: Path) -> Non
     assert min(joint.travel_reached for joint in result.joints) >= 0.98
 
 
-def test_what_opens_is_hollow(tmp_path: Path) -> None:
+def test_openable_units_have_a_free_cavity(tmp_path: Path) -> None:
     result = simulate(write_folder(kitchen(), tmp_path / "b") / "scene.xml")
     assert all(joint.cavity_open is not None and joint.cavity_open > 0.9 for joint in result.joints)
 
 
-def test_what_stands_beside_a_door_is_no_part_of_the_space_it_opens(tmp_path: Path) -> None:
+def test_the_cavity_check_of_a_door_ignores_space_behind_its_neighbour(tmp_path: Path) -> None:
     """A block behind the right door of a pair: the left door's space stays free, the right one's does not."""
     item = double_door("d")
     filling = Box(
@@ -209,7 +209,7 @@ def test_what_stands_beside_a_door_is_no_part_of_the_space_it_opens(tmp_path: Pa
     assert right.cavity_open < 0.2
 
 
-def test_a_door_before_a_solid_block_is_an_error(tmp_path: Path) -> None:
+def test_a_door_in_front_of_a_solid_block_is_a_finding(tmp_path: Path) -> None:
     item = cabinet("c")
     size = item.dimensions_m - np.array([0.05, 0.05, 0.05])
     filling = Box(name="filling", role="inner", size_m=size, link_from_box=Rigid3(np.eye(3), np.array([0.0, 0.03, 0.0])))
@@ -219,9 +219,7 @@ def test_a_door_before_a_solid_block_is_an_error(tmp_path: Path) -> None:
     assert result.joints[0].cavity_open < 0.1
 
 
-def test_a_joint_that_cannot_be_tested_is_named_and_the_others_are_tested(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_joint_whose_test_fails_is_reported_and_others_are_tested(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     real = simulation.examine_joint
 
     def fails(strict: Any, solid: Any, name: str) -> Any:

@@ -28,13 +28,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_folder(kitchen(), tmp_path_factory.mktemp("simulators") / "kitchen")
 
 
-def test_every_engine_of_the_certificate_has_lines_and_all_lines_that_can_be_are_run() -> None:
+def test_every_certified_engine_has_a_recipe_and_all_recipes_are_listed() -> None:
     assert set(EVERY_LOADER) - READERS == {recipe.loader for recipe in RECIPES.values()} - {None}
     assert set(RECIPES) == {*HERE, *ELSEWHERE, *WITHOUT_A_DEVICE, *NOT_FROM_PYPI}
 
 
 @pytest.mark.parametrize("recipe", RECIPES.values(), ids=RECIPES)
-def test_every_file_that_is_named_is_in_the_bundle(recipe: Recipe, folder: Path) -> None:
+def test_files_referenced_by_a_recipe_exist_in_the_bundle(recipe: Recipe, folder: Path) -> None:
     named = re.findall(r"\b(?:scene\.(?:xml|urdf|usda|sdf|srdf)|assets/[\w/.]+\w)", f"{recipe.code} {recipe.note}")
     assert named or "PACKAGE" not in recipe.code
     assert [name for name in named if not (folder / name).is_file()] == []
@@ -42,12 +42,12 @@ def test_every_file_that_is_named_is_in_the_bundle(recipe: Recipe, folder: Path)
 
 
 @pytest.mark.parametrize("recipe", [r for r in RECIPES.values() if r.language == "python"], ids=lambda r: r.simulator)
-def test_python_lines_are_python(recipe: Recipe) -> None:
+def test_recipe_code_compiles(recipe: Recipe) -> None:
     compile(recipe.code, recipe.simulator, "exec")
 
 
 @pytest.mark.parametrize("simulator", HERE)
-def test_the_lines_run(simulator: str, folder: Path) -> None:
+def test_recipe_code_runs(simulator: str, folder: Path) -> None:
     pytest.importorskip(HERE[simulator], reason=f"{RECIPES[simulator].install}")
     ran = subprocess.run(
         [sys.executable, "-c", RECIPES[simulator].code],
@@ -61,7 +61,7 @@ def test_the_lines_run(simulator: str, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("simulator", ELSEWHERE)
-def test_the_lines_run_in_an_environment_of_its_own(simulator: str, folder: Path) -> None:
+def test_recipe_code_runs_in_its_own_environment(simulator: str, folder: Path) -> None:
     python = os.environ.get(APART[ELSEWHERE[simulator]].variable)
     if not python:
         pytest.skip(f"{APART[ELSEWHERE[simulator]].variable} names no environment")
@@ -70,7 +70,7 @@ def test_the_lines_run_in_an_environment_of_its_own(simulator: str, folder: Path
     assert ran.returncode == 0, ran.stderr
 
 
-def test_sapiens_lines_run_without_a_device_as_their_note_says(folder: Path, tmp_path: Path) -> None:
+def test_the_sapien_recipe_runs_without_a_gpu_as_its_note_describes(folder: Path, tmp_path: Path) -> None:
     python = os.environ.get(APART["SAPIEN"].variable)
     if not python:
         pytest.skip(f"{APART['SAPIEN'].variable} names no environment")
@@ -84,6 +84,6 @@ def test_sapiens_lines_run_without_a_device_as_their_note_says(folder: Path, tmp
     assert ran.returncode == 0, ran.stderr
 
 
-def test_ros_is_told_the_packages_name(folder: Path) -> None:
+def test_the_ros_recipe_uses_the_package_name(folder: Path) -> None:
     assert "<name>hand_made</name>" in (folder / "package.xml").read_text()
     assert "ros2 launch hand_made view.launch.py" in RECIPES["ROS 2"].code

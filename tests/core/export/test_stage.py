@@ -42,7 +42,7 @@ def test_the_good_kitchen_is_certified(kitchen_bundle: tuple[Path, Certificate])
     assert states["SAPIEN"] in ("not tried", "passed")
 
 
-def test_the_bundle_holds_what_product_md_lists(kitchen_bundle: tuple[Path, Certificate]) -> None:
+def test_the_bundle_contains_the_documented_files(kitchen_bundle: tuple[Path, Certificate]) -> None:
     with zipfile.ZipFile(kitchen_bundle[0]) as archive:
         names = set(archive.namelist())
     assert {
@@ -63,7 +63,7 @@ def test_the_bundle_holds_what_product_md_lists(kitchen_bundle: tuple[Path, Cert
     assert {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()} == names
 
 
-def test_a_gripper_opens_the_good_kitchen_and_is_filmed(kitchen_bundle: tuple[Path, Certificate]) -> None:
+def test_the_gripper_opens_the_good_kitchen_with_films_in_the_report(kitchen_bundle: tuple[Path, Certificate]) -> None:
     with zipfile.ZipFile(kitchen_bundle[0]) as archive:
         names, page = set(archive.namelist()), archive.read("report.html").decode()
         gripper = json.loads(archive.read("report.json"))["gripper"]
@@ -77,18 +77,18 @@ def test_a_gripper_opens_the_good_kitchen_and_is_filmed(kitchen_bundle: tuple[Pa
     assert "opened and closed 4 of 4 joints" in page
 
 
-def test_a_bundle_can_go_without_a_gripper(tmp_path: Path, small_preview: None) -> None:
+def test_the_gripper_check_can_be_disabled(tmp_path: Path, small_preview: None) -> None:
     write_bundle(one_drawer(), tmp_path / "b.zip", ExportConfig(gripper=False))
     with zipfile.ZipFile(tmp_path / "b.zip") as archive:
         assert json.loads(archive.read("report.json"))["gripper"] is None
         assert not [name for name in archive.namelist() if name.startswith("gripper/")]
 
 
-def test_nothing_else_is_left_beside_the_bundle(kitchen_bundle: tuple[Path, Certificate]) -> None:
+def test_no_other_files_are_left_beside_the_bundle(kitchen_bundle: tuple[Path, Certificate]) -> None:
     assert {p.name for p in kitchen_bundle[0].parent.iterdir()} == {"kitchen.zip", "kitchen"}
 
 
-def test_checking_the_zip_and_its_folder_gives_the_certificate_again(kitchen_bundle: tuple[Path, Certificate]) -> None:
+def test_checking_the_zip_or_its_folder_reproduces_the_certificate(kitchen_bundle: tuple[Path, Certificate]) -> None:
     path, certificate = kitchen_bundle
     for bundle in (path, path.with_suffix("")):
         again = check_bundle(bundle)
@@ -159,19 +159,19 @@ def test_a_full_disk_leaves_the_old_bundle_and_nothing_half_written(
     assert destination.read_bytes() == b"the old bundle"
 
 
-def test_a_folder_one_may_not_write_to_is_one_line(tmp_path: Path) -> None:
+def test_an_unwritable_destination_raises_an_environment_problem(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(EnvironmentProblem):
         write_bundle(reconstruction(), tmp_path / "file" / "b.zip", ExportConfig())
 
 
-def test_a_cancelled_export_leaves_nothing(tmp_path: Path) -> None:
+def test_a_cancelled_export_leaves_no_files(tmp_path: Path) -> None:
     with pytest.raises(Cancelled):
         write_bundle(reconstruction(), tmp_path / "b.zip", ExportConfig(), progress=Progress(is_cancelled=lambda: True))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_progress_rises_to_one(tmp_path: Path, small_preview: None) -> None:
+def test_progress_increases_to_one(tmp_path: Path, small_preview: None) -> None:
     seen: list[float] = []
     channel = Progress(report=lambda stage, fraction, text: seen.append(fraction))
     write_bundle(one_drawer(), tmp_path / "b.zip", ExportConfig(pictures=False), progress=channel)
@@ -179,19 +179,19 @@ def test_progress_rises_to_one(tmp_path: Path, small_preview: None) -> None:
     assert seen[-1] == 1.0
 
 
-def test_an_empty_scene_is_refused(tmp_path: Path) -> None:
+def test_an_empty_scene_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(ExportFailed):
         write_bundle(reconstruction(replace(kitchen(), objects=())), tmp_path / "b.zip", ExportConfig())
 
 
-def test_the_time_of_a_reproducible_build_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_preview: None) -> None:
+def test_source_date_epoch_sets_the_creation_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_preview: None) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
     write_bundle(one_drawer(), tmp_path / "b.zip", ExportConfig(pictures=False, gripper=False))
     with zipfile.ZipFile(tmp_path / "b.zip") as archive:
         assert json.loads(archive.read("manifest.json"))["created"] == "1970-01-01T00:00:00+00:00"
 
 
-def test_an_unsafe_bundle_is_given_to_no_loader(kitchen_bundle: tuple[Path, Certificate], tmp_path: Path) -> None:
+def test_an_unsafe_bundle_is_not_passed_to_any_loader(kitchen_bundle: tuple[Path, Certificate], tmp_path: Path) -> None:
     import shutil
 
     folder = tmp_path / "unsafe"
@@ -205,7 +205,7 @@ def test_an_unsafe_bundle_is_given_to_no_loader(kitchen_bundle: tuple[Path, Cert
 
 
 @pytest.mark.slow
-def test_fifteen_objects_are_certified(tmp_path: Path) -> None:
+def test_a_scene_of_fifteen_objects_is_certified(tmp_path: Path) -> None:
     from r2c2r_core.export.certify import certify
     from tests.core.export.conftest import write_folder
 

@@ -17,7 +17,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("state", ["closed", "ajar", "open"])
-def test_a_keyframe_puts_every_joint_where_the_manifest_says_and_things_where_they_stand(good_folder: Path, state: str) -> None:
+def test_mujoco_keyframes_match_the_manifests_joint_states(good_folder: Path, state: str) -> None:
     said = json.loads((good_folder / "manifest.json").read_text())["states"][state]
     model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
     data, still = mujoco.MjData(model), mujoco.MjData(model)
@@ -31,12 +31,12 @@ def test_a_keyframe_puts_every_joint_where_the_manifest_says_and_things_where_th
     np.testing.assert_allclose(data.body("bottle_1_body").xpos, still.body("bottle_1_body").xpos, atol=1e-8)
 
 
-def test_an_asset_has_the_states_of_its_own_joint(good_folder: Path) -> None:
+def test_an_asset_has_an_open_keyframe_for_its_own_joint(good_folder: Path) -> None:
     model = mujoco.MjModel.from_xml_path(str(good_folder / "assets/drawer_1/drawer_1.xml"))
     assert model.key("open").qpos[0] == pytest.approx(0.42)
 
 
-def test_usd_joints_have_a_state_and_newtons_words(good_folder: Path) -> None:
+def test_usd_joints_have_joint_state_and_newton_attributes(good_folder: Path) -> None:
     from pxr import Usd
 
     stage = Usd.Stage.Open(str(good_folder / "scene.usda"))
@@ -48,7 +48,7 @@ def test_usd_joints_have_a_state_and_newtons_words(good_folder: Path) -> None:
     assert said["newton:armature"] == pytest.approx(0.02)
 
 
-def test_the_written_number_lies_within_each_of_its_ranges(good_folder: Path) -> None:
+def test_manifest_values_lie_within_their_randomization_ranges(good_folder: Path) -> None:
     manifest = Manifest.model_validate_json((good_folder / "manifest.json").read_text())
     for item in manifest.objects:
         ranges = item.randomize
@@ -61,7 +61,7 @@ def test_the_written_number_lies_within_each_of_its_ranges(good_folder: Path) ->
             assert joint.randomize.upper.low <= joint.upper <= joint.randomize.upper.high
 
 
-def test_a_measured_spread_is_a_normal_distribution_and_a_guess_a_wider_uniform_one() -> None:
+def test_measured_spreads_are_normal_and_defaults_are_uniform() -> None:
     item = drawer("drawer_1")
     placement = reconstruction().placements[0]
     placement = replace(
@@ -74,7 +74,7 @@ def test_a_measured_spread_is_a_normal_distribution_and_a_guess_a_wider_uniform_
     assert depth.high - depth.low == pytest.approx(0.1 * item.dimensions_m[1])
 
 
-def test_what_whole_ones_weigh_is_sourced_and_an_obstacle_is_never_passed() -> None:
+def test_mass_ranges_are_sourced_and_joint_ranges_stop_at_obstacles() -> None:
     mass = randomize.of_object(bottle("bottle_1"), 0.9, None)["mass_kg"]
     assert (mass.low, mass.high, mass.source) == (0.2, 2.2, "sourced")
     (joint,) = cabinet("a").joints

@@ -12,12 +12,12 @@ def bodies_of(*objects: SceneObject) -> list[str]:
     return [body.name for body in supported(plan_bundle(scene)).bodies]
 
 
-def test_a_thing_on_a_named_counter_or_on_the_floor_needs_no_plate() -> None:
+def test_objects_on_a_counter_or_the_floor_get_no_support_plate() -> None:
     assert "bottle_1_support" not in [body.name for body in supported(plan_bundle(kitchen())).bodies]
     assert "b_support" not in bodies_of(bottle("b", bottom_z=0.0005), cabinet("c", x=2.0))
 
 
-def test_a_thing_that_nothing_carries_gets_a_plate_under_its_foot() -> None:
+def test_an_unsupported_object_gets_a_support_plate() -> None:
     scene = ArticulatedScene(name="t", objects=(bottle("b", bottom_z=0.8), cabinet("c", x=2.0)), layout_moves_m={}, warnings=())
     plan = supported(plan_bundle(scene))
     plate = next(body for body in plan.bodies if body.name == "b_support")
@@ -29,10 +29,10 @@ def test_a_thing_that_nothing_carries_gets_a_plate_under_its_foot() -> None:
     assert [body.name for body in plan.of("b")] == ["b_body"]
 
 
-def test_a_counter_far_below_does_not_count_as_carrying() -> None:
+def test_a_counter_far_below_does_not_count_as_support() -> None:
     assert "b_support" in bodies_of(counter("k"), bottle("b", bottom_z=1.2))
 
 
-def test_no_plate_is_put_where_another_thing_stands() -> None:
+def test_no_support_plate_is_placed_inside_another_object() -> None:
     """Two bottles one inside the other's plate: better let it fall and be reported than jam both."""
     assert bodies_of(bottle("b", bottom_z=0.8), bottle("lower", bottom_z=0.6)).count("b_support") == 0

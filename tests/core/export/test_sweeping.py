@@ -31,12 +31,12 @@ def stepped_in(model: Any) -> Any:
     return stepped
 
 
-def test_an_engine_that_steps_as_mujoco_has_no_problem(good_folder: Path, sweeping: Any) -> None:
+def test_an_engine_that_matches_mujoco_has_no_problem(good_folder: Path, sweeping: Any) -> None:
     model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
     assert sweeping.sweep_beside_mujoco(model, stepped_in(model)) == ""
 
 
-def test_a_door_that_an_engine_lets_meet_its_carcass_is_named(good_folder: Path, sweeping: Any) -> None:
+def test_an_engine_that_deviates_from_mujoco_is_reported(good_folder: Path, sweeping: Any) -> None:
     """Contact exclusions that are not kept throw a door out of its frame."""
     model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
     other = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
@@ -46,7 +46,7 @@ def test_a_door_that_an_engine_lets_meet_its_carcass_is_named(good_folder: Path,
     assert "from where MuJoCo has it after 10 steps" in sweeping.sweep_beside_mujoco(model, stepped_in(other))
 
 
-def test_an_engine_that_diverges_is_named_with_the_joint(good_folder: Path, sweeping: Any) -> None:
+def test_an_engine_that_diverges_is_reported_with_the_joint(good_folder: Path, sweeping: Any) -> None:
     model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
     problem = sweeping.sweep_beside_mujoco(model, lambda qpos, steps: np.full_like(qpos, np.nan))
     assert problem == "it diverges with cabinet_1_hinge at 0%"

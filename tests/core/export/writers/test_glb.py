@@ -14,7 +14,7 @@ from tests.core.export.conftest import write_meshes
 from tests.core.export.kitchen import kitchen
 
 
-def test_the_glb_is_y_up_and_holds_every_link_where_it_stands(tmp_path: Path) -> None:
+def test_the_glb_is_y_up_with_every_link_at_its_pose(tmp_path: Path) -> None:
     plan = plan_bundle(kitchen())
     write_meshes(plan, tmp_path)
     write_glb(plan, tmp_path / "scene.glb")
@@ -28,7 +28,7 @@ def test_the_glb_is_y_up_and_holds_every_link_where_it_stands(tmp_path: Path) ->
         np.testing.assert_allclose(pose, Y_UP_FROM_WORLD @ body.world_from_body.matrix, atol=1e-6)
 
 
-def test_the_glb_carries_its_textures_and_is_the_same_twice(tmp_path: Path) -> None:
+def test_the_glb_embeds_its_textures_and_is_deterministic(tmp_path: Path) -> None:
     plan = plan_bundle(kitchen())
     write_meshes(plan, tmp_path)
     write_glb(plan, tmp_path / "a.glb")
@@ -55,7 +55,7 @@ def values_of(document: dict, binary: bytes, accessor: int) -> np.ndarray:
     return np.frombuffer(binary, "<f4", entry["count"] * width, view["byteOffset"]).reshape(-1, width)
 
 
-def test_every_joint_is_a_clip_that_opens_its_part_as_the_plan_says_and_one_clip_opens_all(tmp_path: Path) -> None:
+def test_the_glb_has_an_opening_animation_per_joint_and_one_for_all(tmp_path: Path) -> None:
     plan = plan_bundle(kitchen())
     write_meshes(plan, tmp_path)
     write_glb(plan, tmp_path / "scene.glb")

@@ -14,7 +14,7 @@ def model(good_folder: Path) -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
 
 
-def test_mjcf_and_urdf_agree_in_mujoco_on_masses_inertias_joints_and_poses(good_folder: Path, model: mujoco.MjModel) -> None:
+def test_mjcf_and_urdf_give_the_same_mujoco_bodies_and_joints(good_folder: Path, model: mujoco.MjModel) -> None:
     other = mujoco.MjModel.from_xml_path(str(good_folder / "scene.urdf"))
     names = {model.body(b).name for b in range(1, model.nbody)}
     assert names == {other.body(b).name for b in range(1, other.nbody)}
@@ -32,7 +32,7 @@ def test_mjcf_and_urdf_agree_in_mujoco_on_masses_inertias_joints_and_poses(good_
             assert there == pytest.approx(here)
 
 
-def test_dry_friction_holds_what_it_is_stronger_than(model: mujoco.MjModel) -> None:
+def test_joints_do_not_creep_under_half_their_dry_friction(model: mujoco.MjModel) -> None:
     """Half of it pulls on every joint for five seconds, which nothing else stops: none creeps by a milliradian or a mm."""
     model.opt.gravity[:] = 0.0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
@@ -47,7 +47,7 @@ def test_dry_friction_holds_what_it_is_stronger_than(model: mujoco.MjModel) -> N
 
 
 @pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
-def test_mujoco_moves_every_body_where_the_plan_says(model: mujoco.MjModel, fraction: float) -> None:
+def test_mujoco_body_poses_match_the_plan(model: mujoco.MjModel, fraction: float) -> None:
     plan = plan_bundle(kitchen())
     data = mujoco.MjData(model)
     for body in plan.bodies:
@@ -60,7 +60,7 @@ def test_mujoco_moves_every_body_where_the_plan_says(model: mujoco.MjModel, frac
             np.testing.assert_allclose(data.body(name).xmat.reshape(3, 3), pose.rotation, atol=1e-6)
 
 
-def test_visuals_touch_nothing_and_textures_arrive(model: mujoco.MjModel) -> None:
+def test_visuals_have_no_contacts_and_textures_are_loaded(model: mujoco.MjModel) -> None:
     for g in range(model.ngeom):
         visual = model.geom_group[g] == 2
         assert visual == (model.geom_contype[g] == 0 and model.geom_conaffinity[g] == 0)
@@ -71,11 +71,11 @@ def test_visuals_touch_nothing_and_textures_arrive(model: mujoco.MjModel) -> Non
     assert (model.tex_width[texture], model.tex_height[texture]) == (64, 64)
 
 
-def test_parents_and_children_are_excluded_from_contact(model: mujoco.MjModel) -> None:
+def test_four_parent_child_pairs_are_excluded_from_contact(model: mujoco.MjModel) -> None:
     assert model.nexclude == 4
 
 
-def test_the_camera_sees_the_whole_kitchen_from_the_front_and_the_sun_shines_on_it(model: mujoco.MjModel) -> None:
+def test_the_front_camera_frames_the_kitchen_and_the_light_faces_it(model: mujoco.MjModel) -> None:
     plan = plan_bundle(kitchen())
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -92,7 +92,7 @@ def test_the_camera_sees_the_whole_kitchen_from_the_front_and_the_sun_shines_on_
     assert model.light("sun").dir @ fronts < -0.3
 
 
-def test_a_full_hd_picture_needs_no_edit_and_the_floor_keeps_its_own_colour(model: mujoco.MjModel) -> None:
+def test_full_hd_rendering_is_allowed_and_the_floor_is_white(model: mujoco.MjModel) -> None:
     assert (model.vis.global_.offwidth, model.vis.global_.offheight) == (1920, 1080)
     np.testing.assert_array_equal(model.geom("floor").rgba, [1.0, 1.0, 1.0, 1.0])
     assert model.geom("floor").friction[0] == model.geom("cabinet_1_door_col_0").friction[0]

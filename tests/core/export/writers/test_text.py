@@ -12,7 +12,7 @@ def test_rpy_and_rotation_are_inverse(seed: int) -> None:
 
 
 @pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
-def test_rpy_holds_at_the_pole(pitch: float) -> None:
+def test_rpy_is_correct_at_gimbal_lock(pitch: float) -> None:
     rotation = rotation_of([0.3, pitch, 0.8])
     np.testing.assert_allclose(rotation_of(rpy_of(rotation)), rotation, atol=1e-9)
 

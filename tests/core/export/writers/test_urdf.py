@@ -13,7 +13,7 @@ from tests.core.export.kitchen import kitchen
 GOLDEN = Path(__file__).parents[3] / "golden" / "kitchen.urdf"
 
 
-def test_the_urdf_says_what_the_golden_one_says() -> None:
+def test_the_urdf_matches_the_golden_file() -> None:
     """To accept a wanted change: write `text` over the golden file and review the difference."""
     text = urdf_text(with_handles(plan_bundle(kitchen())))
     assert_same(ET.fromstring(text), ET.fromstring(GOLDEN.read_text()), "robot")
@@ -39,7 +39,7 @@ def label(element: ET.Element) -> str:
     return f"{element.tag} {element.get('name', '')}"
 
 
-def test_every_link_but_the_bare_world_has_an_inertial_and_every_path_is_relative() -> None:
+def test_links_have_inertials_and_mesh_paths_are_relative() -> None:
     root = ET.fromstring(urdf_text(with_handles(plan_bundle(kitchen()))))
     for link in root.findall("link"):
         assert (link.find("inertial") is not None) == (link.get("name") != "world")
@@ -48,7 +48,7 @@ def test_every_link_but_the_bare_world_has_an_inertial_and_every_path_is_relativ
         assert "scale" not in mesh.attrib
 
 
-def test_free_things_are_fixed_in_the_urdf_and_free_in_the_mjcf() -> None:
+def test_free_objects_are_fixed_in_urdf_and_free_in_mjcf() -> None:
     from r2c2r_core.export.writers.mjcf import mjcf_text
 
     plan = plan_bundle(kitchen())

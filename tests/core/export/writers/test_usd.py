@@ -49,7 +49,7 @@ def along_x(kind: str, value: float) -> Rigid3:
 
 
 @pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
-def test_joints_move_every_body_where_the_plan_says(stage: Usd.Stage, plan: Plan, fraction: float) -> None:
+def test_usd_joints_move_bodies_as_planned(stage: Usd.Stage, plan: Plan, fraction: float) -> None:
     poses = poses_at(plan, fraction)
     for body in plan.bodies:
         if body.joint is None:
@@ -66,7 +66,7 @@ def test_joints_move_every_body_where_the_plan_says(stage: Usd.Stage, plan: Plan
         np.testing.assert_allclose(found.matrix, poses[body.name].matrix, atol=1e-5)
 
 
-def test_bodies_stand_where_the_plan_says_with_its_mass_and_inertia(stage: Usd.Stage, plan: Plan) -> None:
+def test_usd_bodies_have_the_planned_pose_mass_and_inertia(stage: Usd.Stage, plan: Plan) -> None:
     cache = UsdGeom.XformCache()
     for body in plan.bodies:
         prim = named(stage, body.name)
@@ -80,7 +80,7 @@ def test_bodies_stand_where_the_plan_says_with_its_mass_and_inertia(stage: Usd.S
         np.testing.assert_allclose(mass.GetCenterOfMassAttr().Get(), inertial.com_link, atol=1e-6)
 
 
-def test_what_moves_is_dynamic_and_the_rest_stands_still(stage: Usd.Stage) -> None:
+def test_movable_objects_are_dynamic_and_counters_are_static(stage: Usd.Stage) -> None:
     dynamic = {prim.GetName() for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)}
     assert {"drawer_1_base", "drawer_1_drawer", "bottle_1_body"} <= dynamic
     assert not {name for name in dynamic if name.startswith("counter_1")}
@@ -91,7 +91,7 @@ def test_what_moves_is_dynamic_and_the_rest_stands_still(stage: Usd.Stage) -> No
     assert {j.GetBody1Rel().GetTargets()[0].name for j in fixed} == {"cabinet_1_base", "drawer_1_base", "double_1_base"}
 
 
-def test_drives_and_friction_are_in_the_units_of_usd(stage: Usd.Stage, plan: Plan) -> None:
+def test_drives_and_friction_use_usd_units(stage: Usd.Stage, plan: Plan) -> None:
     for body in plan.bodies:
         if body.joint is None:
             continue
@@ -108,7 +108,7 @@ def test_drives_and_friction_are_in_the_units_of_usd(stage: Usd.Stage, plan: Pla
         assert say.Get() == pytest.approx(body.joint.friction)
 
 
-def test_visuals_wear_their_texture_and_colliders_are_convex_guides(stage: Usd.Stage, good_folder: Path) -> None:
+def test_visuals_are_textured_and_colliders_are_convex_guides(stage: Usd.Stage, good_folder: Path) -> None:
     door = stage.GetPrimAtPath("/Scene/cabinet_1/cabinet_1_door/visual")
     material, _ = UsdShade.MaterialBindingAPI(door).ComputeBoundMaterial()
     picture = UsdShade.Shader(material.GetPrim().GetChild("picture")).GetInput("file").Get()
@@ -121,7 +121,7 @@ def test_visuals_wear_their_texture_and_colliders_are_convex_guides(stage: Usd.S
                 assert UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() == "convexHull"
 
 
-def test_equal_plans_give_equal_bytes(good_folder: Path, tmp_path: Path) -> None:
+def test_equal_plans_give_identical_usd_bytes(good_folder: Path, tmp_path: Path) -> None:
     from tests.core.export.conftest import write_folder
 
     other = write_folder(kitchen(), tmp_path / "other")
