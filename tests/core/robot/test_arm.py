@@ -30,7 +30,7 @@ def chain(panda_model: mujoco.MjModel) -> Chain:
     return chain_of(panda_model, panda.JOINTS, "tool", panda.RESTS)
 
 
-def test_the_chain_is_the_simulators(panda_model: mujoco.MjModel, chain: Chain) -> None:
+def test_forward_kinematics_and_jacobian_match_mujoco(panda_model: mujoco.MjModel, chain: Chain) -> None:
     data, jacobian = mujoco.MjData(panda_model), np.zeros((6, panda_model.nv))
     for angles in np.random.default_rng(0).uniform(chain.low, chain.high, (5, 7)):
         data.qpos[:7] = angles
@@ -42,7 +42,7 @@ def test_the_chain_is_the_simulators(panda_model: mujoco.MjModel, chain: Chain) 
         np.testing.assert_allclose(now.jacobian[0], jacobian[:, :7], atol=1e-7)
 
 
-def test_angles_are_found_again_and_keep_their_limits(chain: Chain) -> None:
+def test_inverse_kinematics_recovers_poses_within_joint_limits(chain: Chain) -> None:
     middle, span = (chain.low + chain.high) / 2, chain.high - chain.low
     angles = middle + 0.25 * span * np.random.default_rng(1).uniform(-1, 1, (50, 7))
     found = solve(chain, placed(chain, angles).base_from_tool, angles + 0.15, 40)
@@ -71,14 +71,14 @@ def test_an_arm_opens_and_closes_a_drawer_and_a_door(tmp_path: Path, kind: str, 
     assert "Apache-2.0" in told["arm"]["source"]
 
 
-def test_what_is_walled_in_is_reached_from_nowhere(tmp_path: Path) -> None:
+def test_a_walled_in_drawer_is_unreachable_for_the_arm(tmp_path: Path) -> None:
     walls = '<body name="walls" pos="0 -0.75 0"><geom size="1.5 0.05 0.8"/></body>'
     (grip,) = certify_with_arm(scene(tmp_path, kind="drawer", bar=Bar(wide=0.16, high=0.012), beside=walls)).grips
     assert (grip.passed, grip.blame) == (False, "arm")
     assert grip.why == "no place on the floor lets the arm reach the whole motion"
 
 
-def test_the_fewest_places_serve_every_joint_and_the_easiest_of_equals_is_taken() -> None:
+def test_the_fewest_base_positions_are_chosen_preferring_the_easiest() -> None:
     reached = {
         "a": {HERE: _reach(0.01), THERE: _reach(0.03)},
         "b": {HERE: _reach(0.01), THERE: _reach(0.02)},
@@ -88,7 +88,7 @@ def test_the_fewest_places_serve_every_joint_and_the_easiest_of_equals_is_taken(
     assert fewest_places(reached) == {THERE: ["a", "b"], THERE._replace(x_m=3.0): ["c"]}
 
 
-def test_the_map_shows_furniture_places_and_what_is_out_of_reach() -> None:
+def test_the_base_map_shows_furniture_positions_and_unreachable_joints() -> None:
     floor = Floor(stands=(HERE, THERE), furniture=shapely.box(-1.0, 0.0, 1.0, 0.6))
     svg = standing_svg(floor, {"a<b": {HERE: _reach(0.1)}, "far": {}}, {HERE: ("a<b",)})
     page = ET.fromstring(svg)
@@ -98,11 +98,11 @@ def test_the_map_shows_furniture_places_and_what_is_out_of_reach() -> None:
     assert len(list(page.iter("{http://www.w3.org/2000/svg}polygon"))) == 1
 
 
-def test_a_floor_that_serves_nothing_has_a_map_too() -> None:
+def test_a_floor_without_base_positions_still_has_a_map() -> None:
     ET.fromstring(standing_svg(Floor(stands=(), furniture=shapely.union_all([])), {"a": {}}, {}))
 
 
-def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_the_arm_extra_the_error_names_the_package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(BackendUnavailable) as raised:
         certify_with_arm(scene(tmp_path))

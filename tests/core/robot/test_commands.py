@@ -14,7 +14,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_folder(kitchen(), tmp_path_factory.mktemp("commands") / "kitchen")
 
 
-def test_check_says_what_the_gripper_opened(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_prints_the_gripper_results_and_writes_films(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     main(["check", str(folder), "--gripper", "--films", str(tmp_path / "films"), "--json", str(tmp_path / "found.json")])
     said = capsys.readouterr().out
     assert "the gripper opens and closes 4 of 4 joints and moves 0 of 1 free things" in said
@@ -25,7 +27,7 @@ def test_check_says_what_the_gripper_opened(folder: Path, tmp_path: Path, capsys
     }
 
 
-def test_check_says_where_an_arm_stands_and_what_it_opened(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_prints_the_arm_results_and_writes_films(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("pybullet_data", reason="the arm's description is in pybullet's wheel")
     one = write_folder(replace(kitchen(), objects=(drawer("drawer_1"),)), tmp_path / "kitchen")
     main(["check", str(one), "--arm", "--films", str(tmp_path / "films"), "--json", str(tmp_path / "found.json")])
@@ -39,14 +41,18 @@ def test_check_says_where_an_arm_stands_and_what_it_opened(tmp_path: Path, capsy
     }
 
 
-def test_films_without_a_gripper_are_wrong_usage(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_films_without_gripper_or_arm_is_a_usage_error(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["check", str(folder), "--films", str(tmp_path)]) == 2
     assert capsys.readouterr().err.strip() == (
         "r2c2r: --films: there is nothing to film without --gripper or --arm; add --gripper or --arm"
     )
 
 
-def test_vary_says_what_it_made(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_vary_prints_its_results_and_requires_an_empty_folder(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["vary", str(folder), "-n", "2", "-o", str(tmp_path / "v")]) == 0
     assert "certificates of 2 random variants: 2 passed" in capsys.readouterr().out
     assert {path.name for path in (tmp_path / "v").iterdir()} == {"base", "textures", "variants", "variants.json", "wall.jpg"}

@@ -24,7 +24,9 @@ LEVEL = Bar(wide=0.16, high=0.012)
     ],
 )
 @pytest.mark.parametrize("turned", [0.0, pytest.param(2.5, marks=pytest.mark.slow)])
-def test_it_opens_and_closes_what_it_can_hold(tmp_path: Path, kind: str, bar: Bar | None, method: str, turned: float) -> None:
+def test_the_gripper_opens_and_closes_graspable_fronts(
+    tmp_path: Path, kind: str, bar: Bar | None, method: str, turned: float
+) -> None:
     (grip,) = certify_with_gripper(scene(tmp_path, kind=kind, bar=bar, turned=turned)).grips
     assert grip.passed, grip
     assert grip.method == method
@@ -32,13 +34,13 @@ def test_it_opens_and_closes_what_it_can_hold(tmp_path: Path, kind: str, bar: Ba
     assert grip.left_open <= 0.02
 
 
-def test_it_opens_and_closes_what_stands_askew(tmp_path: Path) -> None:
+def test_the_gripper_opens_and_closes_a_rotated_drawer(tmp_path: Path) -> None:
     (grip,) = certify_with_gripper(scene(tmp_path, kind="drawer", bar=LEVEL, turned=2.5)).grips
     assert grip.passed, grip
     assert grip.method == "pinch"
 
 
-def test_friction_alone_holds_the_handle(tmp_path: Path) -> None:
+def test_only_pad_friction_holds_the_handle(tmp_path: Path) -> None:
     """A flat-sided bar pulled straight out leaves smooth pads behind: nothing else ties the gripper to it."""
     rig, travel = rig_and_travel(scene(tmp_path, kind="drawer", bar=LEVEL))
     way = best_way(rig, travel)
@@ -49,27 +51,27 @@ def test_friction_alone_holds_the_handle(tmp_path: Path) -> None:
     assert attempt(rig, travel, way).opened < 0.1
 
 
-def test_the_base_gives_no_more_than_it_says(tmp_path: Path) -> None:
+def test_the_gripper_force_is_limited_to_its_maximum(tmp_path: Path) -> None:
     (grip,) = certify_with_gripper(scene(tmp_path, kind="drawer", bar=LEVEL, frictionloss=400.0)).grips
     assert not grip.passed
     assert grip.opened < 0.2  # MuJoCo's dry friction creeps under a steady pull
     assert grip.force_n <= np.sqrt(3) * 80.0 + 1e-6
 
 
-def test_a_stiff_joint_is_named(tmp_path: Path) -> None:
+def test_a_stiff_joint_is_reported_as_the_reason(tmp_path: Path) -> None:
     (grip,) = certify_with_gripper(scene(tmp_path, kind="hinge", bar=Bar(), frictionloss=60.0)).grips
     assert not grip.passed
     assert "stiff" in grip.why or "slipped" in grip.why
     assert grip.grip_n == 40.0
 
 
-def test_a_handle_thicker_than_the_stroke_is_named(tmp_path: Path) -> None:
+def test_a_handle_thicker_than_the_gripper_stroke_is_reported(tmp_path: Path) -> None:
     (grip,) = certify_with_gripper(scene(tmp_path, bar=Bar(wide=0.12, high=0.12))).grips
     assert (grip.passed, grip.blame) == (False, "scan")
     assert grip.why == "handle too thick: 120 mm wide and 120 mm high, the gripper opens 80 mm"
 
 
-def test_what_stands_out_and_is_not_described_as_a_handle_is_none(tmp_path: Path) -> None:
+def test_a_protrusion_not_shaped_as_a_bar_is_not_a_handle(tmp_path: Path) -> None:
     path = scene(tmp_path, bar=Bar())
     _, travel = rig_and_travel(path)
     assert travel.part.bar is not None
@@ -79,14 +81,14 @@ def test_what_stands_out_and_is_not_described_as_a_handle_is_none(tmp_path: Path
     assert travel.part.bar is None
 
 
-def test_what_stands_in_the_way_is_named(tmp_path: Path) -> None:
+def test_a_blocking_obstacle_is_reported_by_name(tmp_path: Path) -> None:
     post = '<body name="post" pos="-0.16 -0.36 0"><geom size="0.3 0.01 0.4"/></body>'
     (grip,) = certify_with_gripper(scene(tmp_path, bar=Bar(), beside=post)).grips
     assert (grip.passed, grip.blame) == (False, "world")
     assert grip.why.startswith("blocked by post")
 
 
-def test_the_wrist_need_not_turn_with_a_bar_that_turns_in_its_grip(tmp_path: Path) -> None:
+def test_a_blocked_wrist_lets_the_bar_rotate_in_the_grip(tmp_path: Path) -> None:
     """A level bar on an upright hinge: with a wall where the wrist would go, it stays behind and the bar turns in the pads."""
     free, travel = rig_and_travel(scene(tmp_path, bar=LEVEL))
     way = best_way(free, travel)
@@ -99,6 +101,6 @@ def test_the_wrist_need_not_turn_with_a_bar_that_turns_in_its_grip(tmp_path: Pat
     assert way.opens.follow < 1.0
 
 
-def test_the_same_scene_goes_the_same_way(tmp_path: Path) -> None:
+def test_the_gripper_certificate_is_deterministic(tmp_path: Path) -> None:
     path = scene(tmp_path, bar=Bar())
     assert certify_with_gripper(path) == certify_with_gripper(path)

@@ -30,7 +30,7 @@ def scene(folder: Path, *, radius: float = 0.03, half: float = 0.1, table: str =
 
 
 @pytest.mark.parametrize("half", [0.03, 0.1])
-def test_a_thing_is_put_down_ten_centimetres_further(tmp_path: Path, half: float) -> None:
+def test_an_object_is_moved_by_ten_centimetres(tmp_path: Path, half: float) -> None:
     certificate = certify_with_gripper(scene(tmp_path, half=half))
     (grip,) = certificate.grips
     assert grip.passed, grip
@@ -38,18 +38,18 @@ def test_a_thing_is_put_down_ten_centimetres_further(tmp_path: Path, half: float
     assert json.loads(json.dumps(gripper_to_json(certificate)))["things_moved"] == 1
 
 
-def test_a_thing_wider_than_the_stroke_is_left(tmp_path: Path) -> None:
+def test_an_object_wider_than_the_stroke_is_not_picked(tmp_path: Path) -> None:
     (grip,) = certify_with_gripper(scene(tmp_path, radius=0.05)).grips
     assert (grip.passed, grip.why) == (False, "wider than 76 mm all round")
 
 
-def test_a_thing_is_not_put_where_nothing_holds_it(tmp_path: Path) -> None:
+def test_an_object_without_free_support_nearby_is_not_moved(tmp_path: Path) -> None:
     small = '<body name="table"><geom class="hard" type="box" size="0.05 0.05 0.02" pos="0 0 0.48"/></body>'
     (grip,) = certify_with_gripper(scene(tmp_path, table=small)).grips
     assert (grip.passed, grip.why) == (False, "no free place 10 cm further on its support")
 
 
-def test_a_film_and_a_sheet_are_written(tmp_path: Path) -> None:
+def test_a_gif_and_a_contact_sheet_are_written(tmp_path: Path) -> None:
     from PIL import Image
 
     (grip,) = certify_with_gripper(scene(tmp_path), tmp_path / "films").grips
@@ -60,7 +60,7 @@ def test_a_film_and_a_sheet_are_written(tmp_path: Path) -> None:
         assert sheet.size == (4 * 208, 2 * 156)
 
 
-def test_a_picture_shows_each_body_where_it_is(tmp_path: Path) -> None:
+def test_a_rendered_picture_shows_each_body_at_its_pose(tmp_path: Path) -> None:
     import numpy as np
 
     rig = gripper_in(scene(tmp_path).with_name("scene.xml"), lambda spec: [setattr(g, "group", 2) for g in spec.geoms])

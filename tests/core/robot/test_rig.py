@@ -11,7 +11,7 @@ from tests.core.robot.scenes import Bar, rig_and_travel, scene
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_pose_is_its_six_axes(seed: int) -> None:
+def test_a_pose_round_trips_through_the_six_rig_axes(seed: int) -> None:
     rng = np.random.default_rng(seed)
     pose = Rigid3(Rotation.random(random_state=seed).as_matrix(), rng.normal(size=3))
     axes = axes_of(pose, near_yaw=3 * np.pi)
@@ -20,14 +20,14 @@ def test_a_pose_is_its_six_axes(seed: int) -> None:
 
 
 @pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
-def test_straight_down_the_yaw_stays_and_the_roll_makes_up_for_it(pitch: float) -> None:
+def test_at_gimbal_lock_the_yaw_is_kept_and_the_roll_compensates(pitch: float) -> None:
     pose = pose_of(np.array([0, 0, 0, 0.7, pitch, 0.4]))
     axes = axes_of(pose, near_yaw=0.2)
     assert axes[3] == pytest.approx(0.2)
     np.testing.assert_allclose(pose_of(axes).rotation, pose.rotation, atol=1e-6)
 
 
-def test_the_tool_stands_where_it_is_put(tmp_path: Path) -> None:
+def test_the_tool_is_at_the_requested_pose(tmp_path: Path) -> None:
     rig, _ = rig_and_travel(scene(tmp_path))
     pose = pose_of(np.array([0.3, -0.9, 0.7, 1.2, 0.3, -0.8]))
     rig.put(pose, 0.05)
@@ -37,7 +37,7 @@ def test_the_tool_stands_where_it_is_put(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["hinge", "drawer", "sliding"])
-def test_a_part_is_where_the_engine_says(tmp_path: Path, kind: str) -> None:
+def test_the_computed_part_pose_matches_mujoco(tmp_path: Path, kind: str) -> None:
     rig, travel = rig_and_travel(scene(tmp_path, kind=kind, bar=Bar(), turned=0.6))
     rig.data.qpos[travel.address] = 0.6 * travel.upper
     mujoco.mj_kinematics(rig.model, rig.data)
