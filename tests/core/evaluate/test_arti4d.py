@@ -47,7 +47,7 @@ def values(evaluation: Evaluation, name: str) -> dict[str, float | None]:
     return {metric.name: metric.value for row in evaluation.rows if row.name == name for metric in row.metrics}
 
 
-def test_axes_are_matched_by_place_whatever_their_names_and_scored_in_the_recordings_world(tmp_path: Path) -> None:
+def test_axes_are_matched_by_position_and_scored_in_world_coordinates(tmp_path: Path) -> None:
     truth = truth_of(0)
     assert not np.allclose(WORLD_FROM_CAPTURE.matrix, Rigid3().matrix)
     evaluation = evaluate_arti4d(bundle_in(tmp_path, truth), sequence_of(tmp_path, truth))
@@ -60,14 +60,14 @@ def test_axes_are_matched_by_place_whatever_their_names_and_scored_in_the_record
     assert {metric.name: metric.value for metric in evaluation.scene}["objects_found"] == pytest.approx(2 / 3)
 
 
-def test_a_pivot_beside_the_true_line_is_off_by_that_much(tmp_path: Path) -> None:
+def test_a_shifted_pivot_has_the_error_of_its_offset(tmp_path: Path) -> None:
     truth = truth_of(0)
     door = values(evaluate_arti4d(bundle_in(tmp_path, truth), sequence_of(tmp_path, truth, moved_m=0.02)), "kitchen_door")
     assert door["pivot_arti4d"] == pytest.approx(0.02 * np.cos(TILT), abs=1e-6)
     assert door["pivot"] == pytest.approx(20.0, abs=0.1)
 
 
-def test_the_command_prints_the_table_and_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_the_table_and_reports_missing_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     truth = truth_of(0)
     bundle, sequence = bundle_in(tmp_path, truth), sequence_of(tmp_path, truth)
     assert main(["evaluate", str(bundle), "--benchmark", "arti4d", str(sequence)]) == 0

@@ -54,7 +54,7 @@ def found(tmp_path: Path, change: Any = lambda manifest: None) -> tuple[dict[str
     return row(evaluation, "cabinet_1"), row(evaluation, "drawer_1")
 
 
-def test_a_bundle_that_found_everything_is_all_right(tmp_path: Path) -> None:
+def test_a_bundle_with_the_true_motions_scores_perfectly(tmp_path: Path) -> None:
     door, drawer = found(tmp_path)
     for metrics in (door, drawer):
         assert (metrics["state"], metrics["state_open"], metrics["limit_source"]) == (1.0, 1.0, 1.0)
@@ -63,7 +63,7 @@ def test_a_bundle_that_found_everything_is_all_right(tmp_path: Path) -> None:
     assert (door["stop"], drawer["stop"]) == (None, 1.0)  # no stop of the door was seen, and none is claimed
 
 
-def test_an_unknown_state_is_a_miss_like_a_frame_that_is_not_listed(tmp_path: Path) -> None:
+def test_unknown_and_missing_states_count_as_errors(tmp_path: Path) -> None:
     def forget(joints: dict[str, Any]) -> None:
         joints["cabinet_1"]["motion"]["states"][9]["value"] = None
         del joints["drawer_1"]["motion"]["states"][9]
@@ -74,7 +74,7 @@ def test_an_unknown_state_is_a_miss_like_a_frame_that_is_not_listed(tmp_path: Pa
         assert metrics["state_open"] == pytest.approx((ajar - 1) / ajar)
 
 
-def test_frames_that_do_not_show_the_front_are_not_asked_about(tmp_path: Path) -> None:
+def test_frames_that_do_not_show_the_front_are_not_scored(tmp_path: Path) -> None:
     def err(joints: dict[str, Any]) -> None:
         for i in UNSEEN:
             joints["cabinet_1"]["motion"]["states"][i]["value"] = 1.3
@@ -83,7 +83,7 @@ def test_frames_that_do_not_show_the_front_are_not_asked_about(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(("off", "right"), [(0.9, 1.0), (1.1, 0.0)])
-def test_states_are_right_within_two_degrees_or_six_millimetres(tmp_path: Path, off: float, right: float) -> None:
+def test_states_within_2_degrees_or_6_mm_count_as_correct(tmp_path: Path, off: float, right: float) -> None:
     def shift(joints: dict[str, Any]) -> None:
         for name, tolerance in (("cabinet_1", np.radians(2.0)), ("drawer_1", 0.006)):
             for each in joints[name]["motion"]["states"]:
@@ -92,7 +92,7 @@ def test_states_are_right_within_two_degrees_or_six_millimetres(tmp_path: Path, 
     assert [metrics["state"] for metrics in found(tmp_path, shift)] == [right, right]
 
 
-def test_nothing_of_a_joint_of_another_type_or_without_motion_is_right(tmp_path: Path) -> None:
+def test_a_wrong_joint_type_or_missing_motion_scores_zero(tmp_path: Path) -> None:
     def spoil(joints: dict[str, Any]) -> None:
         joints["cabinet_1"]["type"] = "prismatic"
         joints["drawer_1"]["motion"] = None
@@ -101,7 +101,7 @@ def test_nothing_of_a_joint_of_another_type_or_without_motion_is_right(tmp_path:
     assert (door["state"], door["limit_source"], drawer["state"], drawer["stop"]) == (0.0, 0.0, 0.0, 0.0)
 
 
-def test_a_limit_that_was_not_seen_must_not_be_called_measured(tmp_path: Path) -> None:
+def test_an_unobserved_limit_claimed_as_measured_is_an_error(tmp_path: Path) -> None:
     def claim(joints: dict[str, Any]) -> None:
         joints["cabinet_1"]["source"]["limits"] = "measured"
         joints["cabinet_1"]["motion"]["stop_seen"] = True
@@ -110,7 +110,7 @@ def test_a_limit_that_was_not_seen_must_not_be_called_measured(tmp_path: Path) -
     assert (door["limit_source"], door["stop"]) == (0.0, 0.0)
 
 
-def test_motion_where_nothing_moved_is_counted(tmp_path: Path) -> None:
+def test_motion_of_a_static_joint_is_a_false_motion(tmp_path: Path) -> None:
     truth = opened_truth()
     manifest = filmed_bundle(truth)
     door, fridge = (next(t for t in manifest["objects"] if t["name"] == name) for name in ("cabinet_1", "refrigerator"))
@@ -120,7 +120,7 @@ def test_motion_where_nothing_moved_is_counted(tmp_path: Path) -> None:
     assert row(evaluation, "cabinet_2")["false_motion"] == 0.0
 
 
-def test_of_a_truth_that_says_nothing_of_motion_nothing_is_scored(tmp_path: Path) -> None:
+def test_ground_truth_without_motion_gives_no_motion_scores(tmp_path: Path) -> None:
     truth = truth_of(0)
     metrics = row(evaluate_bundle(*write(tmp_path, truth, bundle_of(truth))), "cabinet_1")
     assert [metrics[name] for name in ("state", "state_open", "stop", "limit_source", "inner_depth", "false_motion")] == [

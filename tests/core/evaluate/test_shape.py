@@ -28,20 +28,20 @@ def at(x: float, yaw: float = 0.0) -> Rigid3:
         (box((0.999, 0.999, 0.999), at(0.0)), 0.999**3),
     ],
 )
-def test_the_overlap_of_a_unit_box_with_a_known_box(other: ObjectRecord, expected: float) -> None:
+def test_box_iou_matches_known_values(other: ObjectRecord, expected: float) -> None:
     unit = box((1, 1, 1), at(0.0))
     assert box_iou(unit, other) == pytest.approx(expected, abs=1e-6)
     assert box_iou(other, unit) == pytest.approx(expected, abs=1e-6)
 
 
-def test_the_overlap_does_not_depend_on_the_world() -> None:
+def test_box_iou_is_invariant_to_the_world_frame() -> None:
     a, b = box((0.6, 0.5, 0.8), at(0.0, 0.2)), box((0.5, 0.6, 0.7), at(0.2, -0.3))
     world = Rigid3(rotation_between(np.array([0.0, 0.0, 1.0]), np.array([0.3, -0.5, 0.8])), np.array([4.0, -2.0, 1.0]))
     moved = [box(tuple(t.dimensions_m), world @ t.world_from_object) for t in (a, b)]
     assert box_iou(*moved) == pytest.approx(box_iou(a, b), abs=1e-9)
 
 
-def test_the_yaw_of_a_round_thing_costs_nothing_its_place_does() -> None:
+def test_box_iou_of_a_round_object_ignores_yaw_but_not_position() -> None:
     bottle = replace(box((0.08, 0.08, 0.3), at(0.0, 0.3)), turns_freely=True)
     assert box_iou(bottle, box((0.08, 0.08, 0.3), at(0.0, 1.1))) == pytest.approx(1.0, abs=1e-6)
     aside = Rigid3(rotation_about_z(1.1), at(0.0, 0.3).apply(np.array([0.04, 0.0, 0.0])))

@@ -60,7 +60,7 @@ def row(evaluation: Evaluation, name: str) -> dict[str, float | None]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_bundle_built_from_the_truth_has_no_error(tmp_path: Path, seed: int) -> None:
+def test_a_bundle_built_from_ground_truth_has_no_error(tmp_path: Path, seed: int) -> None:
     truth = truth_of(seed)
     values = scene(evaluate_bundle(*write(tmp_path, truth, bundle_of(truth))))
     for name in ("objects_found", "joint_type", "hinge_side", "range_ratio", "box_iou"):
@@ -94,7 +94,7 @@ def test_each_metric_returns_the_size_of_a_known_perturbation(tmp_path: Path) ->
     assert values["hinge_side"] == 1.0
 
 
-def test_a_round_thing_has_no_front_to_be_turned(tmp_path: Path) -> None:
+def test_a_round_object_has_no_front_or_yaw_error(tmp_path: Path) -> None:
     truth = truth_of(0)
     manifest = bundle_of(truth)
     bottle = next(entry for entry in manifest["objects"] if entry["name"] == "bottle_1")
@@ -105,7 +105,7 @@ def test_a_round_thing_has_no_front_to_be_turned(tmp_path: Path) -> None:
     assert values["centre"] == pytest.approx(0.0, abs=1e-5)
 
 
-def test_a_door_hinged_on_the_other_edge_is_wrong_and_a_drawer_called_a_door_too(tmp_path: Path) -> None:
+def test_wrong_hinge_sides_and_joint_types_score_zero(tmp_path: Path) -> None:
     truth = truth_of(0)
     manifest = bundle_of(truth)
     by_name = {entry["name"]: entry for entry in manifest["objects"]}
@@ -123,7 +123,7 @@ def test_a_door_hinged_on_the_other_edge_is_wrong_and_a_drawer_called_a_door_too
     assert row(evaluation, "drawer_1")["range_ratio"] == 0.0
 
 
-def test_renamed_objects_are_matched_by_their_boxes_and_strangers_are_listed(tmp_path: Path) -> None:
+def test_renamed_objects_are_matched_by_box_and_extra_ones_are_listed(tmp_path: Path) -> None:
     truth = truth_of(1)
     manifest = bundle_of(truth)
     for position, entry in enumerate(manifest["objects"]):
@@ -136,7 +136,7 @@ def test_renamed_objects_are_matched_by_their_boxes_and_strangers_are_listed(tmp
     assert evaluation.surplus == ("stranger",)
 
 
-def test_a_missing_object_is_counted_and_named(tmp_path: Path) -> None:
+def test_a_missing_object_is_counted_and_reported(tmp_path: Path) -> None:
     truth = truth_of(0)
     manifest = bundle_of(truth)
     gone = manifest["objects"].pop()["name"]
@@ -172,7 +172,7 @@ def test_a_zip_gives_the_same_numbers_as_the_folder(tmp_path: Path) -> None:
     ("content", "found"),
     [(b"not a zip", "not a zip"), (None, "no manifest.json")],
 )
-def test_unreadable_bundles_end_in_one_clear_error(tmp_path: Path, content: bytes | None, found: str) -> None:
+def test_unreadable_bundles_raise_a_clear_error(tmp_path: Path, content: bytes | None, found: str) -> None:
     _, truth_file = write(tmp_path, truth_of(0), {})
     path = tmp_path / "bad.zip"
     if content is None:
@@ -184,7 +184,7 @@ def test_unreadable_bundles_end_in_one_clear_error(tmp_path: Path, content: byte
         evaluate_bundle(path, truth_file)
 
 
-def test_unreadable_truth_names_the_file_and_what_is_wrong(tmp_path: Path) -> None:
+def test_unreadable_ground_truth_raises_a_clear_error(tmp_path: Path) -> None:
     truth = truth_of(0)
     bundle, truth_file = write(tmp_path, truth, bundle_of(truth))
     truth_file.write_text("{")
@@ -201,7 +201,7 @@ def square(side: int) -> np.ndarray:
     return mask
 
 
-def test_the_fit_to_the_scan_is_what_the_bundle_says(tmp_path: Path) -> None:
+def test_scan_fit_metrics_are_read_from_the_bundle(tmp_path: Path) -> None:
     truth = truth_of(1)
     manifest = bundle_of(truth)
     fit = {"median_m": 0.0042, "p95_m": 0.011, "f_score_1cm": 0.93, "f_score_2cm": 0.99, "points": 6000}
@@ -215,7 +215,7 @@ def test_the_fit_to_the_scan_is_what_the_bundle_says(tmp_path: Path) -> None:
     assert scene(evaluation)["f_score_1cm"] == 0.93
 
 
-def test_masks_of_open_frames_are_scored_apart(tmp_path: Path) -> None:
+def test_masks_of_open_frames_are_scored_separately(tmp_path: Path) -> None:
     true, found = tmp_path / "true", tmp_path / "found"
     whole, half = np.full((40, 40), 255, np.uint8), np.zeros((40, 40), np.uint8)
     half[:20] = 255
