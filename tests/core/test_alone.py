@@ -34,7 +34,7 @@ def alone(folder: Path, *arguments: object) -> list[str]:
     return said.stdout.splitlines()
 
 
-def test_its_folder_is_empty_and_goes_with_it(tmp_path: Path) -> None:
+def test_the_sandbox_folder_starts_empty_and_is_deleted(tmp_path: Path) -> None:
     listing, folder = alone(tmp_path, tmp_path / "made", 9)[0].split(" ", 1)
     assert listing == "[]"
     assert Path(folder).parent == Path(tempfile.gettempdir()).resolve()
@@ -42,7 +42,7 @@ def test_its_folder_is_empty_and_goes_with_it(tmp_path: Path) -> None:
     assert (tmp_path / "made").read_text() == "ours stays ours"
 
 
-def test_it_reaches_no_server_of_this_machine(tmp_path: Path) -> None:
+def test_the_sandbox_cannot_reach_local_servers(tmp_path: Path) -> None:
     if not network_can_be_left():
         pytest.skip("this system lets no process leave its network")
     with socket.create_server(("127.0.0.1", 0)) as listener:

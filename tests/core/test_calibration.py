@@ -17,17 +17,17 @@ CLAIMS = np.linspace(0.0, 1.0, 201)
 
 
 @pytest.mark.parametrize(("slope", "offset"), [(1.0, 0.0), (0.4, 1.2), (2.5, -3.0)])
-def test_a_surer_claim_stays_surer_and_a_share_stays_a_share(slope: float, offset: float) -> None:
+def test_calibration_is_monotonic_and_maps_zero_and_one_to_themselves(slope: float, offset: float) -> None:
     worth = np.array([calibrated(claim, slope, offset) for claim in CLAIMS])
     assert (np.diff(worth) > 0).all()
     assert (worth[0], worth[-1]) == (0.0, 1.0)
 
 
-def test_a_slope_of_one_and_no_offset_leave_a_claim_as_it_is() -> None:
+def test_slope_one_and_offset_zero_leave_confidence_unchanged() -> None:
     assert calibrated(0.73, 1.0, 0.0) == pytest.approx(0.73)
 
 
-def test_maps_follow_one_another_as_their_log_odds_do() -> None:
+def test_calibration_maps_compose_linearly_in_log_odds() -> None:
     """Twice the map is another map: whoever applies it a second time changes what it says."""
     twice = calibrated(calibrated(0.9, 0.5, 0.4), 0.5, 0.4)
     assert twice == pytest.approx(calibrated(0.9, 0.25, 0.6))
@@ -35,7 +35,7 @@ def test_maps_follow_one_another_as_their_log_odds_do() -> None:
 
 
 @pytest.mark.parametrize(("name", "module"), [("mask", "segment.expected_iou"), ("hinge", "synthesize.joints")])
-def test_the_maps_in_force_are_those_that_were_fitted(name: str, module: str) -> None:
+def test_calibration_parameters_match_the_fitted_file(name: str, module: str) -> None:
     found, numbers = json.loads(FITTED.read_text())["maps"][name], params_of(module)()
     assert (numbers.slope, numbers.offset) == (found["slope"], found["offset"])
     assert numbers.slope > 0
@@ -45,7 +45,7 @@ def test_the_maps_in_force_are_those_that_were_fitted(name: str, module: str) ->
 MAP, NONE = {"slope": 2.0, "offset": 0.5}, {"slope": 1.0, "offset": 0.0}
 
 
-def test_a_masks_confidence_goes_through_its_map_once() -> None:
+def test_mask_confidence_is_calibrated_exactly_once() -> None:
     def claim(numbers: Mapping[str, float]) -> float:
         with tuning(changed({"segment.expected_iou": numbers})):
             return expected_iou(box(200, 200, 260, 260), 0.9, FRAME, AT_2_M, 0.008)
@@ -53,7 +53,7 @@ def test_a_masks_confidence_goes_through_its_map_once() -> None:
     assert claim(MAP) == pytest.approx(calibrated(claim(NONE), **MAP))
 
 
-def test_a_hinges_confidence_goes_through_its_map_once() -> None:
+def test_hinge_confidence_is_calibrated_exactly_once() -> None:
     def claim(numbers: Mapping[str, float]) -> float:
         with tuning(changed({"synthesize.joints": numbers})):
             handle = Handle(0.09, 0.2)

@@ -62,7 +62,7 @@ def test_help_and_version() -> None:
     assert r2c2r("--version", code=0)[0].startswith("r2c2r ")
 
 
-def test_every_option_says_what_it_is_for() -> None:
+def test_every_option_has_a_help_text() -> None:
     silent = [
         f"{parser.prog} {action.dest}"
         for parser in commands_of(build_parser())
@@ -80,13 +80,13 @@ def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentPa
                 yield from commands_of(command)
 
 
-def test_wrong_usage_is_two() -> None:
+def test_wrong_usage_exits_with_code_2() -> None:
     started("fly", code=2)
     r2c2r("sample", "x", "--size", "big", code=2)
 
 
 @pytest.mark.parametrize(("option", "names"), [("--style", STYLES), ("--palette", PALETTES), ("--layout", LAYOUTS)])
-def test_a_sample_explains_its_choices_and_names_them_where_one_is_unknown(option: str, names: dict[str, str]) -> None:
+def test_sample_lists_its_choices_in_help_and_errors(option: str, names: dict[str, str]) -> None:
     said, _ = r2c2r("sample", "--help", code=0)
     _, refused = r2c2r("sample", "x", option, "baroque", code=2)
     for name, meaning in names.items():
@@ -94,12 +94,12 @@ def test_a_sample_explains_its_choices_and_names_them_where_one_is_unknown(optio
         assert re.search(rf"^  {name} +{re.escape(meaning)}$", said, re.MULTILINE)
 
 
-def test_a_missing_recording_is_named(tmp_path: Path, prompts: Path) -> None:
+def test_a_missing_recording_is_reported_by_name(tmp_path: Path, prompts: Path) -> None:
     _, said = started("run", tmp_path / "no.r3d", "--prompts", prompts, "-o", tmp_path / "b.zip", code=2)
     assert "no.r3d" in one_line(said)
 
 
-def test_unknown_fixtures_are_refused_before_anything_is_read(tmp_path: Path, prompts: Path) -> None:
+def test_unknown_fixtures_are_rejected_before_reading_the_scan(tmp_path: Path, prompts: Path) -> None:
     scan, config = tmp_path / "scan.r3d", tmp_path / "config.json"
     scan.write_bytes(b"not read")
     config.write_text('{"synthesize": {"fixtures": "flatpack"}}')
@@ -107,7 +107,7 @@ def test_unknown_fixtures_are_refused_before_anything_is_read(tmp_path: Path, pr
     assert one_line(said).strip() == "r2c2r: unknown fixtures 'flatpack'; choose one of: boards, scene-synthesizer"
 
 
-def test_the_papers_preset_names_the_extra_it_lacks_before_anything_is_read(
+def test_the_paper_preset_reports_a_missing_extra_before_reading(
     tmp_path: Path, prompts: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "scene_synthesizer", None)
@@ -128,7 +128,7 @@ def _tiny(folder: Path, depth_factor: float = 1.0) -> Path:
     )
 
 
-def test_what_nothing_can_come_of_is_refused_with_its_mend_before_anything_is_computed(tmp_path: Path, prompts: Path) -> None:
+def test_a_hopeless_scan_is_rejected_with_a_fix_before_computing(tmp_path: Path, prompts: Path) -> None:
     work = tmp_path / "work"
     command = ("run", _tiny(tmp_path, 1000.0), "--prompts", prompts, "-o", tmp_path / "b.zip", "--workdir", work)
     _, said = r2c2r(*command, code=2)
@@ -142,7 +142,7 @@ def test_what_nothing_can_come_of_is_refused_with_its_mend_before_anything_is_co
     assert "expected a positive number" in said
 
 
-def test_an_unusable_recording_is_named_in_one_line_before_computing(
+def test_doubts_about_a_recording_are_printed_before_computing(
     tmp_path: Path, prompts: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from r2c2r_core.ingest.doctor.doubts import Doubts
@@ -162,21 +162,21 @@ def test_an_unusable_recording_is_named_in_one_line_before_computing(
     assert "--register-depth (and 1 more: `r2c2r info` lists them); the run continues" in lines[0]
 
 
-def test_a_foreign_zip_is_named(tmp_path: Path, prompts: Path) -> None:
+def test_a_file_that_is_no_zip_is_reported_by_name(tmp_path: Path, prompts: Path) -> None:
     scan = tmp_path / "scan.r3d"
     scan.write_bytes(b"not a zip at all")
     _, said = r2c2r("info", scan, code=2)
     assert "scan.r3d" in one_line(said.splitlines()[-1])
 
 
-def test_prompts_that_are_not_json_are_named(tmp_path: Path, prompts: Path) -> None:
+def test_invalid_prompts_json_is_reported_by_name(tmp_path: Path, prompts: Path) -> None:
     prompts.write_text("{")
     (tmp_path / "scan.r3d").write_bytes(b"")
     _, said = r2c2r("run", tmp_path / "scan.r3d", "--prompts", prompts, "-o", tmp_path / "b.zip", code=2)
     assert "prompts.json" in one_line(said)
 
 
-def test_an_unknown_backend_lists_the_choices(tmp_path: Path, prompts: Path) -> None:
+def test_an_unknown_setting_is_reported_by_name(tmp_path: Path, prompts: Path) -> None:
     (tmp_path / "scan.r3d").write_bytes(b"")
     config = tmp_path / "config.json"
     config.write_text(json.dumps({"segment": {"no_such": 1}}))
@@ -184,12 +184,12 @@ def test_an_unknown_backend_lists_the_choices(tmp_path: Path, prompts: Path) -> 
     assert "no_such" in one_line(said)
 
 
-def test_a_bundle_that_is_no_bundle_is_named(tmp_path: Path) -> None:
+def test_an_invalid_bundle_is_reported_by_name(tmp_path: Path) -> None:
     (tmp_path / "b.zip").write_bytes(b"PK")
     assert "b.zip" in r2c2r("check", tmp_path / "b.zip", code=2)[1]
 
 
-def test_a_segmenter_without_weights_says_how_to_get_them_before_reading_anything(tmp_path: Path, prompts: Path) -> None:
+def test_missing_segmenter_weights_are_reported_before_reading(tmp_path: Path, prompts: Path) -> None:
     (tmp_path / "scan.r3d").write_bytes(b"")
     config = tmp_path / "config.json"
     config.write_text(json.dumps({"segment": {"weights": str(tmp_path / "nowhere")}}))
@@ -199,7 +199,7 @@ def test_a_segmenter_without_weights_says_how_to_get_them_before_reading_anythin
     assert "R2C2R_SAM2_WEIGHTS" in said
 
 
-def test_doctor_names_every_backend_and_licence(tmp_path: Path) -> None:
+def test_doctor_lists_every_segmenter_and_licence(tmp_path: Path) -> None:
     said, _ = r2c2r("doctor", "--data", tmp_path, "--json", tmp_path / "d.json", code=0)
     for name in ("geometric", "sam2", "edgetam", "sam3"):
         assert f"segmenter {name}" in said
@@ -221,14 +221,14 @@ def test_doctor_names_every_backend_and_licence(tmp_path: Path) -> None:
         ("run", "x", "--prompts", "p", "-o", "b.zip", "--seed", "1e9"),
     ],
 )
-def test_a_number_out_of_range_is_wrong_usage(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_number_out_of_range_is_a_usage_error(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as left:
         main(arguments)
     assert left.value.code == 2
     assert "expected" in one_line(capsys.readouterr().err.splitlines()[-1])
 
 
-def test_a_fault_of_ours_is_one_line_and_its_traceback_on_demand(
+def test_internal_errors_are_one_line_and_a_traceback_with_debug(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: object, **__: object) -> None:
@@ -242,7 +242,9 @@ def test_a_fault_of_ours_is_one_line_and_its_traceback_on_demand(
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_a_name_too_long_is_not_a_full_disk(tmp_path: Path, prompts: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_path_that_is_too_long_is_not_reported_as_a_full_disk(
+    tmp_path: Path, prompts: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["info", str(tmp_path / ("n" * 300))]) == 2
     assert "too long; check the path" in one_line(capsys.readouterr().err)
     bundle = tmp_path / ("n" * 252 + ".zip")
@@ -251,14 +253,14 @@ def test_a_name_too_long_is_not_a_full_disk(tmp_path: Path, prompts: Path, capsy
     assert "free some space" not in one_line(capsys.readouterr().err)
 
 
-def test_a_pipe_is_not_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_named_pipe_is_rejected_without_blocking(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     os.mkfifo(tmp_path / "pipe")
     for command in ("info", "check", "dataset"):
         assert main([command, str(tmp_path / "pipe"), *(["-o", "x"] if command == "dataset" else [])]) == 2
         assert "a pipe, expected a file or a folder" in one_line(capsys.readouterr().err)
 
 
-def test_sigterm_is_one_line_and_leaves_no_temporary_folder(tmp_path: Path) -> None:
+def test_sigterm_prints_one_line_and_leaves_no_temporary_folder(tmp_path: Path) -> None:
     waiting = (
         "import argparse, sys, tempfile, time\n"
         "from pathlib import Path\n"
@@ -284,7 +286,7 @@ def test_sigterm_is_one_line_and_leaves_no_temporary_folder(tmp_path: Path) -> N
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_interrupt_while_commands_are_imported_is_one_line(
+def test_an_interrupt_while_importing_commands_prints_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def interrupted() -> None:

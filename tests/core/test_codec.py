@@ -59,7 +59,7 @@ def test_textures_are_lossless_and_in_rgb_order() -> None:
     assert back.chosen.frames == (1, 2)
 
 
-def test_only_nouns_of_the_model_are_written() -> None:
+def test_encoding_rejects_unknown_types() -> None:
     with pytest.raises(TypeError, match="not a noun"):
         encode_noun(object(), {})
 

@@ -10,7 +10,7 @@ from r2c2r_core.errors import InputError
 
 
 @pytest.mark.parametrize("name", ["a\0b", "n" * 300, "loop/inside"])
-def test_a_path_that_no_file_can_have_is_said_in_one_line(tmp_path: Path, name: str) -> None:
+def test_an_impossible_path_raises_a_one_line_error(tmp_path: Path, name: str) -> None:
     (tmp_path / "loop").symlink_to("loop")
     with pytest.raises(InputError, match="check the path") as said:
         resolved(tmp_path / name)
@@ -18,11 +18,11 @@ def test_a_path_that_no_file_can_have_is_said_in_one_line(tmp_path: Path, name: 
     assert "\0" not in str(said.value)
 
 
-def test_what_is_not_there_yet_has_a_path(tmp_path: Path) -> None:
+def test_a_path_that_does_not_exist_yet_is_resolved(tmp_path: Path) -> None:
     assert resolved(tmp_path / "new" / ".." / "folder") == Path(os.path.realpath(tmp_path)) / "folder"
 
 
-def test_only_what_stays_in_a_folder_is_below_it(tmp_path: Path) -> None:
+def test_is_below_rejects_paths_that_leave_the_folder(tmp_path: Path) -> None:
     inside = tmp_path / "inside"
     inside.mkdir()
     (inside / "loop").symlink_to("loop")

@@ -33,7 +33,7 @@ def parse(content: bytes, *, lenient: bool = False) -> object:
         (b'{"a": 1', "line 1"),
     ],
 )
-def test_what_json_leaves_open_is_refused_in_one_line(content: bytes, says: str) -> None:
+def test_invalid_json_is_rejected_with_a_one_line_error(content: bytes, says: str) -> None:
     with pytest.raises(InputError, match=says) as caught:
         parse(content)
     assert str(caught.value).startswith("x.json: ")
@@ -41,28 +41,28 @@ def test_what_json_leaves_open_is_refused_in_one_line(content: bytes, says: str)
     assert "\n" not in str(caught.value)
 
 
-def test_brackets_in_text_are_no_nesting() -> None:
+def test_brackets_in_strings_do_not_count_as_nesting() -> None:
     text = "[{" * 500 + '\\"' + "[" * 500
     assert parse(json.dumps({"a": [text]}).encode()) == {"a": [text]}
 
 
-def test_a_pair_of_surrogates_is_a_character() -> None:
+def test_a_surrogate_pair_is_decoded_as_one_character() -> None:
     assert parse(rb'["\ud83d\ude00"]') == ["\U0001f600"]
 
 
-def test_recordings_may_hold_what_apps_write() -> None:
+def test_lenient_parsing_accepts_nan_and_duplicate_keys() -> None:
     found = parse(b'{"a": [NaN, -Infinity, ' + b"9" * 400 + b'], "b": 1, "b": 2}', lenient=True)
     assert isinstance(found, dict)
     assert found["b"] == 2.0
     assert str(found["a"]) == "[nan, -inf, inf]"
 
 
-def test_text_that_never_ends_costs_no_more_than_its_length() -> None:
+def test_an_unterminated_string_is_rejected_in_linear_time() -> None:
     with pytest.raises(InputError):
         parse(b"[" * 65 + b'"' + rb"\"" * 300_000)  # a pattern with quadratic time would take minutes
 
 
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+def test_a_named_pipe_is_rejected_without_blocking(tmp_path: Path) -> None:
     pipe = tmp_path / "prompts.json"
     os.mkfifo(pipe)
     done = threading.Event()
@@ -77,17 +77,17 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "says"), [(".", "a folder, expected a file"), ("a", "no such file"), ("n" * 300, "too long")])
-def test_what_is_no_file_is_said(tmp_path: Path, name: str, says: str) -> None:
+def test_a_path_that_is_not_a_file_is_rejected(tmp_path: Path, name: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         read_json(tmp_path / name, hint=HINT)
 
 
-def test_devices_are_refused() -> None:
+def test_device_files_are_rejected() -> None:
     with pytest.raises(InputError, match="a device, expected a file"):
         read_json(Path("/dev/zero"), hint=HINT)
 
 
-def test_a_byte_order_mark_is_no_content(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
     path = tmp_path / "x.json"
     path.write_bytes(b"\xef\xbb\xbf[1, 2.5]")
     assert read_json(path, hint=HINT) == [1, 2.5]

@@ -26,7 +26,7 @@ def kitchen(certified: bool | None = True, **objects: dict[str, float] | None) -
 DOOR = {"width_error": 1.0, "joint_type": 1.0, "mask_iou": 0.95}
 
 
-def test_a_figure_is_worse_in_its_own_direction_and_beyond_its_tolerance(regressions: Any) -> None:
+def test_a_metric_regresses_only_beyond_its_tolerance(regressions: Any) -> None:
     within = DOOR | {"width_error": 1.4, "mask_iou": 0.94}
     better = DOOR | {"width_error": 0.1, "mask_iou": 0.99}
     assert regressions(kitchen(a=within), kitchen(a=DOOR)) == []
@@ -36,20 +36,20 @@ def test_a_figure_is_worse_in_its_own_direction_and_beyond_its_tolerance(regress
     assert regressions(kitchen(a=DOOR | {"joint_type": 0.0}), kitchen(a=DOOR)) == ["k/a: joint_type 0, was 1"]
 
 
-def test_a_missing_object_is_worse_than_any_figure(regressions: Any) -> None:
+def test_a_newly_missing_object_is_a_regression(regressions: Any) -> None:
     assert regressions(kitchen(a=None), kitchen(a=DOOR)) == ["k/a: missing"]
     assert regressions(kitchen(), kitchen(a=DOOR)) == ["k/a: missing"]
     assert regressions(kitchen(a=None), kitchen(a=None)) == []
     assert regressions(kitchen(a=DOOR), kitchen(a=None)) == []
 
 
-def test_a_lost_certificate_is_worse_and_one_not_asked_for_is_not(regressions: Any) -> None:
+def test_a_lost_certificate_is_a_regression_unless_not_requested(regressions: Any) -> None:
     assert regressions(kitchen(False, a=DOOR), kitchen(True, a=DOOR)) == ["k: no certificate"]
     assert regressions(kitchen(None, a=DOOR), kitchen(True, a=DOOR)) == []
     assert regressions(kitchen(False, a=DOOR), kitchen(False, a=DOOR)) == []
 
 
-def test_a_small_loss_on_nearly_all_objects_is_a_drift(regressions: Any) -> None:
+def test_a_small_loss_on_most_objects_is_a_regression(regressions: Any) -> None:
     names = [f"door_{k}" for k in range(12)]
     before = kitchen(**dict.fromkeys(names, DOOR))
     worse = {name: DOOR | {"width_error": 1.1} for name in names}
@@ -58,6 +58,6 @@ def test_a_small_loss_on_nearly_all_objects_is_a_drift(regressions: Any) -> None
     assert regressions(kitchen(**mixed), before) == []
 
 
-def test_kitchens_and_figures_that_only_one_side_has_are_not_compared(regressions: Any) -> None:
+def test_kitchens_and_metrics_on_one_side_only_are_not_compared(regressions: Any) -> None:
     assert regressions(kitchen(a=DOOR), {}) == []
     assert regressions(kitchen(a={"joint_type": 1.0}), kitchen(a=DOOR)) == []

@@ -28,12 +28,12 @@ FORMATS = {
 }
 
 
-def test_the_table_below_has_every_reader() -> None:
+def test_the_format_table_covers_every_reader() -> None:
     assert set(FORMATS.values()) == {reader.name for reader in READERS}
 
 
 @pytest.mark.parametrize("kind", FORMATS)
-def test_info_names_the_format_and_counts_its_frames(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_prints_the_format_and_frame_count(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = write(kind, tmp_path)
     assert main(["info", str(source)]) == 0
     said = capsys.readouterr().out.splitlines()

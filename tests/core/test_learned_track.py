@@ -22,7 +22,7 @@ from tests.core.segment.learned.test_session import TrueMasks
 QUICK = AlignConfig(views=4, match_photos=1, match_views=8, settled=12, refined=2)
 
 
-def test_a_learned_track_goes_through_every_later_stage(tmp_path: Path) -> None:
+def test_a_learned_track_passes_through_all_later_stages(tmp_path: Path) -> None:
     capture, truth = kitchen()
     config = SegmentConfig()
     prepared = GeometricSegmenter().open(capture, tmp_path, config)

@@ -42,7 +42,7 @@ def test_a_changed_prompt_recomputes_only_its_object(tmp_path: Path) -> None:
     assert run(tmp_path, {"a": 1, "b": 3}).computed == ["segment/b"]
 
 
-def test_a_prompt_with_a_painted_mask_is_computed_again_once_a_pixel_of_it_changes(tmp_path: Path) -> None:
+def test_a_changed_pixel_in_a_painted_mask_recomputes_the_object(tmp_path: Path) -> None:
     def computed(mask: np.ndarray) -> list[str]:
         said = (FrameSaid(frame=0, mask=pack_mask(mask)),)
         prompt = ObjectPrompt(name="a", category="drawer", points=(), frames=said)
@@ -59,14 +59,14 @@ def test_a_prompt_with_a_painted_mask_is_computed_again_once_a_pixel_of_it_chang
     assert computed(other) == ["segment/a"]
 
 
-def test_a_damaged_file_is_computed_again(tmp_path: Path) -> None:
+def test_a_damaged_stored_result_is_recomputed(tmp_path: Path) -> None:
     work = run(tmp_path, {"a": 1})
     path = work.noun_path("segment", "a")
     path.write_bytes(path.read_bytes()[:-20])
     assert run(tmp_path, {"a": 1}).computed == ["segment/a"]
 
 
-def test_one_failing_object_leaves_the_others(tmp_path: Path) -> None:
+def test_one_failing_object_does_not_stop_the_others(tmp_path: Path) -> None:
     def compute(name: str, progress: Progress) -> PackedMask:
         if name == "a":
             raise ObjectNotSeen("a: no frame shows it")
@@ -78,7 +78,7 @@ def test_one_failing_object_leaves_the_others(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("error", [np.linalg.LinAlgError("SVD did not converge"), ValueError("bad"), cv2.error("(-215) empty")])
-def test_an_object_whose_numbers_fail_leaves_the_others_and_its_traceback_is_logged(
+def test_a_numerical_error_in_one_object_is_logged_and_others_continue(
     error: Exception, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     def compute(name: str, progress: Progress) -> PackedMask:
@@ -94,7 +94,7 @@ def test_an_object_whose_numbers_fail_leaves_the_others_and_its_traceback_is_log
 
 
 @pytest.mark.parametrize("error", [Cancelled("stopped"), BackendUnavailable("gone"), TypeError("a bug"), MemoryError()])
-def test_what_is_wrong_for_all_ends_the_run(error: Exception, tmp_path: Path) -> None:
+def test_an_error_that_affects_all_objects_ends_the_run(error: Exception, tmp_path: Path) -> None:
     def compute(progress: Progress) -> PackedMask:
         raise error
 
@@ -102,13 +102,13 @@ def test_what_is_wrong_for_all_ends_the_run(error: Exception, tmp_path: Path) ->
         Ledger(Workspace(tmp_path), SILENT).each("align", compute, "a")
 
 
-def test_stages_after_the_last_wanted_one_are_not_begun(tmp_path: Path) -> None:
+def test_stages_after_the_requested_one_are_not_started(tmp_path: Path) -> None:
     ledger = Ledger(Workspace(tmp_path), SILENT, until="segment")
     with pytest.raises(Reached):
         ledger.one("generate", lambda progress: noun(1))
 
 
-def test_two_runs_in_one_workspace_are_refused(tmp_path: Path) -> None:
+def test_a_second_run_in_a_locked_workspace_is_rejected(tmp_path: Path) -> None:
     first, second = Workspace(tmp_path), Workspace(tmp_path)
     with first.locked(), pytest.raises(EnvironmentProblem, match="another run"), second.locked():
         pass
@@ -133,7 +133,7 @@ def of_some(root: Path, only: list[str] | None, until: Stage = "generate") -> Le
     return ledger
 
 
-def test_a_run_of_some_objects_computes_these_of_its_stage_and_nothing_of_earlier_ones(tmp_path: Path) -> None:
+def test_a_partial_run_computes_only_its_objects_in_its_stage(tmp_path: Path) -> None:
     assert of_some(tmp_path, ["b"]).work.computed == []
     of_some(tmp_path, None, "segment")
     assert of_some(tmp_path, ["b"]).work.computed == ["generate/b"]
@@ -142,7 +142,7 @@ def test_a_run_of_some_objects_computes_these_of_its_stage_and_nothing_of_earlie
     assert (joined.work.computed, joined.failures) == (["generate/c"], {"d": "segment: d: no frame shows it"})
 
 
-def test_a_run_of_no_objects_says_which_are_left(tmp_path: Path) -> None:
+def test_a_run_without_objects_lists_the_remaining_ones(tmp_path: Path) -> None:
     assert of_some(tmp_path, [], "segment").left == ["a", "b", "c", "d"]
     of_some(tmp_path, None, "segment")
     assert of_some(tmp_path, []).left == ["a", "b", "c"]
@@ -173,7 +173,7 @@ def at_once(root: Path, *wanted: str) -> list[bool]:
     return [line == "held" for line in told]
 
 
-def test_parts_of_a_workspace_are_held_beside_one_another_each_once_and_none_beside_the_whole(tmp_path: Path) -> None:
+def test_workspace_parts_can_be_locked_in_parallel_but_not_twice(tmp_path: Path) -> None:
     with Workspace(tmp_path).locked(["align/a", "align/b"]):
         assert at_once(tmp_path, "align/c generate/a", "align/c align/b", "") == [True, False, False]
     with Workspace(tmp_path).locked():
@@ -181,7 +181,7 @@ def test_parts_of_a_workspace_are_held_beside_one_another_each_once_and_none_bes
     assert at_once(tmp_path, "", "align/a") == [True, True]
 
 
-def test_a_full_disk_leaves_the_old_file_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_raises_and_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "noun"
     write_atomically(path, b"old")
 
@@ -195,12 +195,12 @@ def test_a_full_disk_leaves_the_old_file_and_says_so(tmp_path: Path, monkeypatch
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_other_io_errors_name_the_path(tmp_path: Path) -> None:
+def test_other_io_errors_report_the_path(tmp_path: Path) -> None:
     with pytest.raises(EnvironmentProblem, match="nowhere"), explained_io(tmp_path / "nowhere"):
         (tmp_path / "nowhere" / "x").write_text("")
 
 
-def test_keys_follow_content(tmp_path: Path) -> None:
+def test_file_keys_depend_on_content(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("1")
     before = file_key(tmp_path / "a"), file_key(tmp_path)
     assert (file_key(tmp_path / "a"), file_key(tmp_path)) == before
@@ -209,7 +209,7 @@ def test_keys_follow_content(tmp_path: Path) -> None:
     assert file_key(tmp_path) != before[1]
 
 
-def test_threads_that_write_one_file_at_once_do_not_take_each_others_half(tmp_path: Path) -> None:
+def test_concurrent_atomic_writes_do_not_mix_contents(tmp_path: Path) -> None:
     path = tmp_path / "overrides.json"
     with ThreadPoolExecutor(8) as pool:
         for done in [pool.submit(write_atomically, path, bytes([value]) * 100_000) for value in range(160)]:

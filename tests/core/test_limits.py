@@ -31,7 +31,7 @@ except MemoryError:
 """
 
 
-def test_memory_beyond_the_limit_is_one_line_with_the_next_step(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exceeding_the_memory_limit_gives_a_one_line_error_with_a_hint(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("R2C2R_WORKER_MEMORY_GB", "2")
     monkeypatch.setenv("R2C2R_WORKER_HOURS", "1.5")
     done = subprocess.run([sys.executable, "-c", LIMITED], capture_output=True, text=True, check=True)
@@ -42,18 +42,18 @@ def test_memory_beyond_the_limit_is_one_line_with_the_next_step(monkeypatch: pyt
 
 
 @pytest.mark.parametrize("module", WORKERS)
-def test_every_worker_limits_itself(module: str) -> None:
+def test_every_worker_module_calls_limit_this_process(module: str) -> None:
     source = (Path(__file__).parents[2] / f"{module.replace('.', '/')}.py").read_text()
     assert "    limit_this_process(" in source
 
 
 @pytest.mark.parametrize("said", ["", "a lot", "-1", "nan", "inf", "0"])
-def test_a_limit_that_is_none_is_the_machines(said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_an_invalid_limit_free_memory_is_positive_and_finite(said: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("R2C2R_WORKER_MEMORY_GB", said)
     assert 0 < free_memory(0.5) < 1 << 50
 
 
-def test_all_the_processor_time_is_no_reason_to_try_again() -> None:
+def test_exhausted_cpu_time_is_an_environment_problem_with_a_hint() -> None:
     failure = outcome({}, -24, "align")
     assert failure is not None
     assert failure["kind"] == "EnvironmentProblem"
@@ -61,5 +61,5 @@ def test_all_the_processor_time_is_no_reason_to_try_again() -> None:
     assert "R2C2R_WORKER_HOURS" in failure["hint"]
 
 
-def test_nothing_here_limits_the_tests() -> None:
+def test_the_test_process_has_no_reduced_memory_limit() -> None:
     assert resource.getrlimit(resource.RLIMIT_DATA)[0] == resource.getrlimit(resource.RLIMIT_DATA)[1]

@@ -15,7 +15,7 @@ def write(tmp_path: Path, document: object) -> Path:
     return path
 
 
-def test_corrections_are_read(tmp_path: Path) -> None:
+def test_overrides_of_objects_and_scene_are_read(tmp_path: Path) -> None:
     entry = {"hinge": "left", "dimensions_m": [0.5, 0.6, 0.7], "joint_limits": [0, 1.5], "candidate": "c2"}
     overrides = read_overrides(write(tmp_path, {"version": 1, "objects": {"door": entry}, "scene": {"up": [0, 1, 0]}}))
     door = overrides.of("door")
@@ -25,13 +25,13 @@ def test_corrections_are_read(tmp_path: Path) -> None:
     assert overrides.of("other").hinge is None
 
 
-def test_states_that_were_marked_are_read_by_joint_and_frame(tmp_path: Path) -> None:
+def test_marked_joint_states_are_read_by_joint_and_frame(tmp_path: Path) -> None:
     marks = {"left_door": [{"frame": 12, "state": 0.0}, {"frame": 40, "state": 1.25}]}
     overrides = read_overrides(write(tmp_path, {"objects": {"pair": {"states": marks}}}))
     assert overrides.of("pair").states == {"left_door": {12: 0.0, 40: 1.25}}
 
 
-def test_a_mesh_file_is_found_beside_the_overrides(tmp_path: Path) -> None:
+def test_a_mesh_file_is_resolved_relative_to_the_overrides_file(tmp_path: Path) -> None:
     (tmp_path / "mine.glb").write_bytes(b"x")
     overrides = read_overrides(write(tmp_path, {"objects": {"door": {"candidate": "mine.glb"}}}))
     assert overrides.of("door").candidate == str((tmp_path / "mine.glb").resolve())
@@ -76,26 +76,26 @@ def test_a_mesh_file_is_found_beside_the_overrides(tmp_path: Path) -> None:
         ({"scene": {"walls": [[0, 1]]}}, "scene.walls"),
     ],
 )
-def test_what_cannot_be_used_is_one_clear_line(tmp_path: Path, document: object, says: str) -> None:
+def test_invalid_overrides_raise_a_one_line_error(tmp_path: Path, document: object, says: str) -> None:
     with pytest.raises(OverrideError, match=says) as caught:
         read_overrides(write(tmp_path, document))
     assert "\n" not in str(caught.value)
     assert str(tmp_path) in str(caught.value)
 
 
-def test_limits_may_name_their_joint_and_leave_one_end_open(tmp_path: Path) -> None:
+def test_joint_limits_can_be_per_joint_and_open_ended(tmp_path: Path) -> None:
     entry = {"joint_limits": [0.2, None], "joints": {"left_door": [None, 1.2]}}
     door = read_overrides(write(tmp_path, {"objects": {"door": entry}})).of("door")
     assert (door.joint_lower, door.joint_upper) == (0.2, None)
     assert door.joints == {"left_door": (None, 1.2)}
 
 
-def test_a_list_of_objects_is_read_as_in_prompts(tmp_path: Path) -> None:
+def test_objects_can_be_given_as_a_list(tmp_path: Path) -> None:
     overrides = read_overrides(write(tmp_path, {"objects": [{"name": "door", "hinge": "left"}]}))
     assert overrides.of("door").hinge == "left"
 
 
-def test_a_drawn_hinge_counts_where_no_correction_says_otherwise() -> None:
+def test_a_drawn_hinge_is_used_unless_overridden() -> None:
     corners = ((0.0, 0.0, 0.8), (0.6, 0.0, 0.8), (0.6, 0.0, 0.1), (0.0, 0.0, 0.1))
     drawn = [
         ObjectPrompt(name=name, category="cabinet", points=(), front=DrawnFront(corners_capture=corners, hinge=side))

@@ -52,7 +52,7 @@ def refusing_the_second(*_request):
     return nim_answer(box_glb()) if refusing_the_second.count == 1 else said(500, {"detail": "CUDA out of memory"})
 
 
-def test_where_a_generator_fails_the_weight_free_one_stands_in_and_every_candidate_says_so(two_bottles, tmp_path):
+def test_a_failing_generator_falls_back_to_completion_with_a_warning(two_bottles, tmp_path):
     capture, tracks = two_bottles
     refusing_the_second.count = 0
     with answering(refusing_the_second) as (address, asked):
@@ -77,7 +77,7 @@ def test_where_a_generator_fails_the_weight_free_one_stands_in_and_every_candida
     assert again["good_1"].key == found["good_1"].key
 
 
-def test_a_person_s_upload_stands_alone_and_says_why(two_bottles, tmp_path):
+def test_an_upload_is_the_only_candidate_if_the_generator_fails(two_bottles, tmp_path):
     capture, tracks = two_bottles
     (tmp_path / "box.glb").write_bytes(box_glb())
     overrides = Overrides(objects={"bad_1": ObjectOverride(candidate=str(tmp_path / "box.glb"))})
@@ -89,7 +89,7 @@ def test_a_person_s_upload_stands_alone_and_says_why(two_bottles, tmp_path):
     assert "remote made no mesh" in asset.warnings[0]
 
 
-def test_an_upload_joins_the_candidates_that_are_there_without_making_them_anew(two_bottles, tmp_path):
+def test_an_upload_is_added_without_regenerating_candidates(two_bottles, tmp_path):
     capture, tracks = two_bottles
     (tmp_path / "mine.glb").write_bytes(box_glb((0.4, 0.3, 0.1)))
     overrides = Overrides(objects={"bad_1": ObjectOverride(candidate=str(tmp_path / "mine.glb"))})
@@ -105,7 +105,7 @@ def test_an_upload_joins_the_candidates_that_are_there_without_making_them_anew(
     assert before["bad_1"].key != after["bad_1"].key
 
 
-def test_another_mesh_under_the_same_name_is_noticed(two_bottles, tmp_path):
+def test_a_changed_upload_under_the_same_name_changes_the_key(two_bottles, tmp_path):
     capture, tracks = two_bottles
     path = tmp_path / "mine.glb"
     overrides = Overrides(objects={"bad_1": ObjectOverride(candidate=str(path))})
@@ -119,7 +119,7 @@ def test_another_mesh_under_the_same_name_is_noticed(two_bottles, tmp_path):
     assert keys[0] == keys[1] != keys[2]
 
 
-def test_further_candidates_join_those_that_are_there_and_repeat_none(two_bottles, tmp_path):
+def test_further_candidates_are_added_without_repeating_existing_ones(two_bottles, tmp_path):
     capture, tracks = two_bottles
     one = {"bad_1": tracks["bad_1"]}
     asked_again = Overrides(objects={"bad_1": ObjectOverride(rejected=("c0",), regenerate=1)})
@@ -142,7 +142,7 @@ def test_further_candidates_join_those_that_are_there_and_repeat_none(two_bottle
     assert chosen.chosen_id == "c1"
 
 
-def test_meshes_from_elsewhere_are_placed_and_judged_by_the_frames(two_bottles):
+def test_external_meshes_are_placed_and_scored_by_the_frames(two_bottles):
     """A bottle and a flat box of the same odd looks: shape alone cannot tell which of two is right, masks and depth can."""
     capture, tracks = two_bottles
     track = tracks["good_1"].value
@@ -163,7 +163,7 @@ def test_meshes_from_elsewhere_are_placed_and_judged_by_the_frames(two_bottles):
     assert "outline agrees" in after.reason
 
 
-def test_a_generator_that_was_never_set_up_stops_the_run_in_one_line(two_bottles, tmp_path, monkeypatch):
+def test_an_unconfigured_generator_stops_the_run_with_a_clear_error(two_bottles, tmp_path, monkeypatch):
     monkeypatch.delenv("R2C2R_GENERATOR_URL", raising=False)
     capture, tracks = two_bottles
     request = replace(request_for("http://h"), config=ReconstructConfig())
@@ -171,7 +171,7 @@ def test_a_generator_that_was_never_set_up_stops_the_run_in_one_line(two_bottles
         generate_objects(request, Ledger(Workspace(tmp_path), SILENT), Kept(capture, "c"), tracks)
 
 
-def test_a_licence_that_forbids_some_uses_is_said_where_it_is_chosen_and_never_the_default():
+def test_restricted_licences_are_reported_and_never_the_default():
     plain = Request(source=Path("scan"), prompts=Prompts(objects=()))
     assert restricted_licences(plain) == []
     (line,) = restricted_licences(replace(plain, tools=Tools(matcher="superglue")))
@@ -222,12 +222,12 @@ def assert_stored_alike(folder, other):
         assert contents(folder / path) == contents(other / path)
 
 
-def test_any_number_of_workers_stores_the_same_keys_and_bytes(two_bottles, one_run, tmp_path):
+def test_two_workers_store_the_same_keys_and_bytes_as_one(two_bottles, one_run, tmp_path):
     run_by(2, tmp_path, two_bottles)
     assert_stored_alike(one_run, tmp_path)
 
 
-def test_objects_that_several_runs_computed_are_stored_as_one_run_stores_them(two_bottles, one_run, tmp_path):
+def test_several_partial_runs_store_the_same_results_as_one_run(two_bottles, one_run, tmp_path):
     capture, tracks = two_bottles
     recording = Kept(capture, "c")
     request = replace(request_for("http://nowhere"), tools=Tools())
@@ -251,12 +251,12 @@ def test_objects_that_several_runs_computed_are_stored_as_one_run_stores_them(tw
 @pytest.mark.parametrize(
     ("until", "only", "said"), [("warp", [], "not computed per object"), ("align", ["door_9"], "door_9: no such object")]
 )
-def test_a_run_of_some_objects_that_is_none_is_one_line(until, only, said, tmp_path):
+def test_an_invalid_partial_run_raises_a_clear_error(until, only, said, tmp_path):
     with pytest.raises(InputError, match=said):
         reconstruct(request_for("http://nowhere"), Workspace(tmp_path), until=until, only=only)
 
 
-def test_what_is_made_for_all_objects_is_not_taken_for_one(tmp_path: Path) -> None:
+def test_results_shared_by_all_objects_are_not_listed_as_an_object(tmp_path: Path) -> None:
     work = Workspace(tmp_path)
     for name in ("door_1", DISPUTED):
         work.save("segment", name, {}, {"key": "k", "seconds": 0.0})

@@ -43,7 +43,7 @@ def pool() -> Iterator[Pool]:
         yield two
 
 
-def test_every_task_gives_its_own_answer_and_progress_goes_on_to_the_end(pool: Pool) -> None:
+def test_every_task_returns_its_own_result_and_progress_is_reported(pool: Pool) -> None:
     shares: list[float] = []
     progress = Progress(lambda stage, share, text: shares.append(share))
     answers = dict(pool.run({str(k): Task(double, (k,)) for k in range(5)}, progress))
@@ -52,7 +52,7 @@ def test_every_task_gives_its_own_answer_and_progress_goes_on_to_the_end(pool: P
     assert all(0 <= share <= 1 for share in shares)
 
 
-def test_a_task_that_fails_says_why_and_where_and_the_others_go_on(pool: Pool) -> None:
+def test_a_failing_task_reports_its_error_and_others_continue(pool: Pool) -> None:
     answers = dict(pool.run({"a": Task(refuse, ("a",)), "b": Task(break_down, ()), "c": Task(double, (3,))}))
     assert answers["c"] == 6
     assert isinstance(answers["a"].error, ObjectNotSeen)
@@ -61,7 +61,7 @@ def test_a_task_that_fails_says_why_and_where_and_the_others_go_on(pool: Pool) -
     assert "break_down" in answers["b"].where
 
 
-def test_a_process_that_is_killed_costs_its_task_only(pool: Pool) -> None:
+def test_a_killed_worker_process_loses_only_its_task(pool: Pool) -> None:
     answers = dict(pool.run({"a": Task(fall, ()), "b": Task(double, (1,)), "c": Task(double, (2,))}))
     lost = answers.pop("a")
     assert isinstance(lost, Failed)
@@ -70,7 +70,7 @@ def test_a_process_that_is_killed_costs_its_task_only(pool: Pool) -> None:
     assert answers == {"b": 2, "c": 4}
 
 
-def test_a_person_who_cancels_is_heard_and_no_process_is_left() -> None:
+def test_cancelling_stops_all_worker_processes() -> None:
     pids: list[int] = []
     progress = Progress(lambda stage, share, text: pids.append(int(text)), lambda: len(pids) == 2)
     with pytest.raises(Cancelled), Pool(2) as pool:
@@ -79,7 +79,7 @@ def test_a_person_who_cancels_is_heard_and_no_process_is_left() -> None:
     assert not any(psutil.pid_exists(pid) for pid in pids)
 
 
-def test_a_worker_ends_when_whoever_holds_it_is_gone() -> None:
+def test_a_worker_exits_when_its_owner_is_gone() -> None:
     class Gone(Exception):
         """Stand-in for the end of the process that owns the pool."""
 
@@ -98,7 +98,7 @@ def test_a_worker_ends_when_whoever_holds_it_is_gone() -> None:
         worker._process.wait()
 
 
-def test_as_many_workers_as_cores_and_memory_allow(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_workers_is_limited_by_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(64)))
     free = psutil.virtual_memory()
     monkeypatch.setattr(psutil, "virtual_memory", lambda: free._replace(available=4 << 30))
@@ -107,7 +107,7 @@ def test_as_many_workers_as_cores_and_memory_allow(monkeypatch: pytest.MonkeyPat
     assert usual_workers() == 1
 
 
-def test_a_pool_without_work_starts_nothing() -> None:
+def test_a_pool_without_tasks_starts_no_process() -> None:
     with Pool(2) as pool:
         assert list(pool.run({}, SILENT)) == []
         assert not pool._idle

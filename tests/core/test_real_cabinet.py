@@ -33,7 +33,7 @@ pytestmark = pytest.mark.skipif(not CABINET.exists(), reason="the TUM cabinet is
 PROMPTS = Prompts(objects=(ObjectPrompt(name="cabinet", category="bench", points=CLICKS),))
 
 
-def test_two_clicks_find_a_real_cabinet_whole(tmp_path: Path) -> None:
+def test_two_clicks_give_the_true_box_of_a_real_cabinet(tmp_path: Path) -> None:
     """Its box, before a mesh of it is made."""
     work = Workspace(tmp_path)
     config = replace(QUICK, ingest=replace(QUICK.ingest, most_frames=29))  # every other frame
@@ -43,7 +43,7 @@ def test_two_clicks_find_a_real_cabinet_whole(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_real_cabinet_has_its_size_within_two_centimetres(tmp_path: Path) -> None:
+def test_a_real_cabinet_is_reconstructed_to_within_two_centimetres(tmp_path: Path) -> None:
     work = Workspace(tmp_path)
     reconstruct(Request(source=CABINET, prompts=PROMPTS, config=QUICK), work, until="synthesize")
     placement, scene = work.load_latest("align", "cabinet"), work.load_latest("synthesize", "scene")

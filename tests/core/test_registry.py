@@ -48,13 +48,13 @@ def model_in(folder: Path) -> Path:
     return folder
 
 
-def test_a_missing_library_names_the_extra() -> None:
+def test_a_missing_library_reports_the_extra_to_install() -> None:
     assert TABLE.available("absent") == (False, "missing no_such_module: pip install 'r2c2r[absent]'")
     with pytest.raises(BackendUnavailable, match=r"painter 'absent' is not available: missing no_such_module; pip install"):
         TABLE.load("absent")
 
 
-def test_missing_weights_name_the_command_that_brings_them() -> None:
+def test_missing_weights_report_the_download_command() -> None:
     ready, reason = TABLE.available("dreamer")
     assert not ready
     assert reason == (
@@ -64,7 +64,7 @@ def test_missing_weights_name_the_command_that_brings_them() -> None:
     assert "accept the licence at https://huggingface.co/someone/gated" in TABLE.available("gated")[1]
 
 
-def test_weights_come_from_the_setting_then_the_variable_then_the_hub_cache(
+def test_weights_are_found_by_setting_then_variable_then_hub_cache(
     tmp_path: Path, empty_hub: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cached = model_in(empty_hub / "models--someone--dreams" / "snapshots" / "abc")
@@ -78,7 +78,7 @@ def test_weights_come_from_the_setting_then_the_variable_then_the_hub_cache(
     assert TABLE.weights_named("plain", "anything") == ""
 
 
-def test_of_several_snapshots_the_one_the_hub_calls_main_is_taken(empty_hub: Path) -> None:
+def test_the_main_snapshot_of_the_hub_cache_is_used(empty_hub: Path) -> None:
     repository = empty_hub / "models--someone--dreams"
     for commit in ("aaa", "bbb", "ccc"):
         model_in(repository / "snapshots" / commit)
@@ -89,7 +89,7 @@ def test_of_several_snapshots_the_one_the_hub_calls_main_is_taken(empty_hub: Pat
     assert found.name == "bbb"
 
 
-def test_half_a_download_is_no_model(tmp_path: Path, empty_hub: Path) -> None:
+def test_an_incomplete_download_is_not_a_model(tmp_path: Path, empty_hub: Path) -> None:
     folder = empty_hub / "models--someone--dreams" / "snapshots" / "abc"
     folder.mkdir(parents=True)
     (folder / "config.json").write_text("{}")
@@ -105,7 +105,7 @@ def test_unknown_names_list_the_choices() -> None:
         TABLE.get("other")
 
 
-def test_every_learned_segmenter_says_its_licence_and_is_not_the_default() -> None:
+def test_learned_segmenters_state_their_licence_and_are_not_default() -> None:
     assert SEGMENTERS.default == "geometric"
     licences = {backend.name: (backend.licence, backend.licence_class) for backend in SEGMENTERS.backends}
     assert licences["sam2"][0].startswith("Apache-2.0")
@@ -122,7 +122,7 @@ def test_every_learned_segmenter_says_its_licence_and_is_not_the_default() -> No
     ],
     ids=lambda value: getattr(value, "name", None),
 )
-def test_every_backend_names_its_protocol_so_that_the_type_checker_compares_them(protocol: type, backend: Backend) -> None:
+def test_every_backend_subclasses_its_protocol(protocol: type, backend: Backend) -> None:
     module, name = backend.target.split(":")
     found = getattr(importlib.import_module(module), name)
     assert protocol in found.__mro__

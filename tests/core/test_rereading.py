@@ -38,7 +38,7 @@ def deepest(capture: Capture) -> float:
     return max(float(capture.images.depth(frame.index).metres.max()) for frame in capture.frames)
 
 
-def test_a_workspace_that_lacks_a_frame_heals(scan: Path, tmp_path: Path) -> None:
+def test_a_missing_stored_frame_is_restored(scan: Path, tmp_path: Path) -> None:
     read(scan, Workspace(tmp_path / "work"), FAR)
     assert read(scan, Workspace(tmp_path / "work"), FAR)[1] == ()
     missing = Workspace(tmp_path / "work").frames / "rgb" / "000003.jpg"
@@ -49,7 +49,7 @@ def test_a_workspace_that_lacks_a_frame_heals(scan: Path, tmp_path: Path) -> Non
     assert capture.images.rgb(3).any()
 
 
-def test_a_reading_that_was_killed_before_its_poses_were_stored_never_lends_its_pixels_to_another(
+def test_an_interrupted_reading_does_not_leave_its_pixels_to_later_ones(
     scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = deepest(read(scan, Workspace(tmp_path / "work"), FAR)[0])
@@ -69,7 +69,7 @@ def test_only_the_frames_of_the_latest_reading_are_kept(scan: Path, tmp_path: Pa
     assert [path.name for path in (work.root / "capture").iterdir()] == [work.frames.name]
 
 
-def test_what_a_person_says_of_the_room_moves_it_and_decodes_nothing(
+def test_room_overrides_are_applied_without_decoding_the_recording(
     scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     work = Workspace(tmp_path / "work")
@@ -87,7 +87,7 @@ def test_what_a_person_says_of_the_room_moves_it_and_decodes_nothing(
         np.testing.assert_allclose(new.world_from_camera.matrix, (moved @ old.world_from_camera).matrix, atol=1e-9)
 
 
-def test_the_doctor_looks_at_the_recording_as_the_run_will_read_it(scan: Path, tmp_path: Path) -> None:
+def test_the_doctor_uses_the_ingest_settings_of_the_run(scan: Path, tmp_path: Path) -> None:
     config = replace(FAR, params={"cloud": {"most_blocks": 40_000}, "doctor.verdict": {"frames": (1000, 2000)}})
     work = Workspace(tmp_path / "work")
     request = Request(source=scan, prompts=Prompts(objects=()), config=ReconstructConfig(ingest=config))

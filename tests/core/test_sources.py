@@ -5,7 +5,7 @@ from pathlib import Path
 from r2c2r_core.sources import source_files
 
 
-def test_whatever_a_stage_copies_into_a_bundle_counts_and_compiled_code_does_not(tmp_path: Path) -> None:
+def test_source_files_include_page_assets_and_exclude_compiled_code(tmp_path: Path) -> None:
     package = tmp_path / ".venv" / "export"
     for name in ("stage.py", "review_page/page.js", "review_page/page.css", "__pycache__/stage.pyc", ".stage.py.swp"):
         path = package / name

@@ -28,23 +28,23 @@ def certificate() -> Certificate:
     )
 
 
-def test_a_character_that_would_be_obeyed_is_written_as_its_code() -> None:
+def test_control_characters_are_escaped() -> None:
     assert shown("a\x1b[31m\tb\n") == "a\\u001b[31m\tb\n"
     assert shown("Küche 日本 مطبخ 🙂") == "Küche 日本 مطبخ 🙂"
 
 
-def test_tables_and_certificates_hold_nothing_a_terminal_obeys() -> None:
+def test_tables_and_certificates_contain_no_control_sequences() -> None:
     assert not OBEYED.search(table(("name",), [(EVIL,), ("two\nlines",)]))
     assert len(table(("name",), [("two\nlines",)]).splitlines()) == 3
     assert not OBEYED.search(certificate_text(certificate()))
 
 
-def test_an_error_holds_nothing_a_terminal_obeys(capsys: pytest.CaptureFixture[str]) -> None:
+def test_error_messages_contain_no_control_sequences(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", f"no{EVIL[:-1]}.zip"]) == 2
     assert not OBEYED.search(capsys.readouterr().err)
 
 
-def test_the_report_holds_nothing_a_page_or_terminal_obeys() -> None:
+def test_the_report_contains_no_control_sequences() -> None:
     manifest = manifest_of(reconstruction(), plan_bundle(kitchen()), None)
     manifest["objects"][0] |= {"category": f"cabinet {EVIL}", "warnings": [EVIL]}
     page = report_html(manifest, report_of(manifest, certificate(), {"mug_1": EVIL}), {})
@@ -52,6 +52,6 @@ def test_the_report_holds_nothing_a_page_or_terminal_obeys() -> None:
     assert "cabinet \\u001b]0;owned" in page
 
 
-def test_a_missing_key_is_said_to_be_missing() -> None:
+def test_a_key_error_is_described_as_a_missing_key() -> None:
     assert fault_of(KeyError("position")) == "'position' is missing"
     assert fault_of(ValueError("not a number")) == "not a number"

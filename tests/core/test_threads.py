@@ -5,7 +5,7 @@ from r2c2r_core.threads import in_threads
 from tests.waiting import PATIENCE_S
 
 
-def test_results_come_in_order_whatever_ends_first() -> None:
+def test_results_are_returned_in_order_regardless_of_completion() -> None:
     second_ended = threading.Event()
 
     def work(number: int) -> int:
@@ -18,7 +18,7 @@ def test_results_come_in_order_whatever_ends_first() -> None:
     assert list(in_threads(work, range(9))) == list(range(9))
 
 
-def test_work_is_begun_only_so_far_ahead_of_who_takes_its_results() -> None:
+def test_work_runs_ahead_of_the_consumer_by_a_limited_amount() -> None:
     begun: list[int] = []
     results = in_threads(lambda number: begun.append(number) or number, count())  # an endless iterator
     assert [next(results), next(results)] == [0, 1]

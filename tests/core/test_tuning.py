@@ -43,20 +43,20 @@ def areas(root: Path, numbers: Changes, workers: int = 1) -> tuple[list[int], li
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_number_that_is_set_holds_in_every_process(tmp_path: Path, workers: int) -> None:
+def test_a_tuned_parameter_applies_in_every_process(tmp_path: Path, workers: int) -> None:
     assert areas(tmp_path / "usual", {})[0] == [175, 175]
     assert areas(tmp_path / "set", WALLS, workers)[0] == [500, 500]
     assert tuned(Params) == Params()
 
 
-def test_a_number_that_is_set_runs_again_what_stands_on_it_and_nothing_else(tmp_path: Path) -> None:
+def test_a_tuned_parameter_recomputes_only_dependent_stages(tmp_path: Path) -> None:
     assert areas(tmp_path, {})[1] == ["segment/a", "segment/b"]
     assert areas(tmp_path, {"warp.corners": {"rim_m": 0.007}})[1] == []
     assert areas(tmp_path, WALLS)[1] == ["segment/a", "segment/b"]
     assert areas(tmp_path, WALLS)[1] == []
 
 
-def test_threads_that_share_work_have_the_numbers_of_who_asked() -> None:
+def test_worker_threads_inherit_tuned_parameters_of_their_caller() -> None:
     with tuning({Params: Params(parallel_rad=0.5)}):
         assert list(in_threads(lambda _: tuned(Params).parallel_rad, range(4))) == [0.5] * 4
         other: list[float] = []
@@ -66,7 +66,7 @@ def test_threads_that_share_work_have_the_numbers_of_who_asked() -> None:
     assert other == [Params().parallel_rad]
 
 
-def test_two_runs_in_one_process_keep_their_own() -> None:
+def test_concurrent_runs_keep_their_own_tuned_parameters() -> None:
     def seen(value: float) -> float:
         with tuning({Params: Params(parallel_rad=value)}):
             return tuned(Params).parallel_rad
@@ -76,7 +76,7 @@ def test_two_runs_in_one_process_keep_their_own() -> None:
         assert list(pool.map(seen, values)) == values
 
 
-def test_a_configuration_sets_them_by_stage_and_module() -> None:
+def test_a_configuration_sets_parameters_by_stage_and_module() -> None:
     config = config_from({"kitchen": {"params": {"walls": {"parallel_rad": 0.5}}}}, "config.json")
     assert config.kitchen.params == {"walls": {"parallel_rad": 0.5}}
     assert config.numbers == WALLS
@@ -98,7 +98,7 @@ def test_a_configuration_sets_them_by_stage_and_module() -> None:
         ([], "kitchen.params is []"),
     ],
 )
-def test_a_number_that_cannot_be_is_one_line(params: Any, says: str) -> None:
+def test_an_invalid_parameter_raises_a_one_line_error(params: Any, says: str) -> None:
     with pytest.raises(InputError) as caught:
         config_from({"kitchen": {"params": params}}, "config.json")
     assert says in str(caught.value)
@@ -106,7 +106,7 @@ def test_a_number_that_cannot_be_is_one_line(params: Any, says: str) -> None:
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_every_number_says_its_unit_its_meaning_and_its_source(room: str) -> None:
+def test_every_parameter_documents_unit_meaning_and_source(room: str) -> None:
     for path in modules_with_numbers(room):
         assert params_of(path).__doc__, path
         for field in fields(params_of(path)):
@@ -117,7 +117,7 @@ def test_every_number_says_its_unit_its_meaning_and_its_source(room: str) -> Non
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_the_usual_numbers_are_within_their_own_bounds(room: str) -> None:
+def test_default_parameters_are_within_their_bounds(room: str) -> None:
     usual = {
         path.partition(".")[2]: {f.name: f.default for f in fields(params_of(path))} for path in modules_with_numbers(room)
     }

@@ -45,7 +45,7 @@ def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "drawn"
 
 
-def test_depth_and_truth_are_of_one_frame(drawn: Path) -> None:
+def test_depth_and_ground_truth_share_one_frame(drawn: Path) -> None:
     recording = open_record3d(open_files(drawn / "scan.r3d"))
     (thing,) = read_truth(drawn / "truth.json", Rigid3())
     for frame in recording.frames:
@@ -72,7 +72,7 @@ def test_the_true_hinge_opens_the_door_towards_positive_values(drawn: Path) -> N
     assert (joint.lower, joint.upper) == (0.0, 1.6)
 
 
-def test_clicks_are_on_the_front_and_not_at_its_border(drawn: Path) -> None:
+def test_random_clicks_are_on_the_front_away_from_its_border(drawn: Path) -> None:
     from recordings import random_clicks, true_masks  # type: ignore[import-not-found]
 
     recording = open_record3d(open_files(drawn / "scan.r3d"))
@@ -94,7 +94,7 @@ def test_clicks_are_on_the_front_and_not_at_its_border(drawn: Path) -> None:
     assert len(seen) > 20
 
 
-def test_what_is_missing_is_wrong_in_every_mean(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_objects_count_as_errors_in_every_mean(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(BENCHMARKS)
     from unseen import row_of  # type: ignore[import-not-found]
 
