@@ -141,7 +141,7 @@ def values(evaluation, name="microwave_1"):
     return {metric.name: metric.value for row in evaluation.rows if row.name == name for metric in row.metrics}
 
 
-def test_the_folder_holds_what_its_page_says(scene, stored, tmp_path):
+def test_the_dataset_folder_contains_the_documented_files(scene, stored, tmp_path):
     capture, track = scene
     folder = written(scene, stored, tmp_path / "set")
     manifest = json.loads((folder / "manifest.json").read_text())
@@ -170,7 +170,7 @@ def test_the_folder_holds_what_its_page_says(scene, stored, tmp_path):
         assert pairs["inlier"].tolist() == [True, True, True, False]
 
 
-def test_meshes_lie_in_their_own_frame_and_aligned_in_the_world(scene, stored, tmp_path):
+def test_meshes_are_written_in_object_frame_and_aligned_in_world(scene, stored, tmp_path):
     folder = written(scene, stored, tmp_path / "set")
     own = trimesh.load_scene(folder / "objects/microwave_1/candidates/c1.glb").to_geometry()
     assert own.extents == pytest.approx(SIDES / 0.46, rel=1e-5)
@@ -179,7 +179,7 @@ def test_meshes_lie_in_their_own_frame_and_aligned_in_the_world(scene, stored, t
     assert placed.bounds.mean(axis=0) == pytest.approx(CENTRE, abs=1e-5)
 
 
-def test_coco_run_lengths_are_the_masks(scene, stored, tmp_path):
+def test_coco_run_lengths_decode_to_the_masks(scene, stored, tmp_path):
     _, track = scene
     coco = json.loads((written(scene, stored, tmp_path / "set") / "annotations.json").read_text())
     assert {c["name"] for c in coco["categories"]} == {"microwave", "bottle"}
@@ -195,7 +195,7 @@ def test_coco_run_lengths_are_the_masks(scene, stored, tmp_path):
 
 
 @pytest.mark.parametrize("mask", [np.ones((3, 4), bool), np.zeros((3, 4), bool), np.eye(5, dtype=bool)])
-def test_run_lengths_of_extreme_masks(mask):
+def test_run_lengths_of_extreme_masks_round_trip(mask):
     assert np.array_equal(decoded(run_lengths(mask), mask.shape), mask)
 
 
@@ -205,7 +205,7 @@ def decoded(counts, size):
     return flat.reshape(size[1], size[0]).T
 
 
-def test_a_right_dataset_evaluates_without_error(scene, stored, tmp_path, truth):
+def test_a_correct_dataset_evaluates_without_error(scene, stored, tmp_path, truth):
     folder = written(scene, stored, tmp_path / "set")
     assert is_dataset(folder)
     found = values(evaluate_dataset(folder, truth))
@@ -218,7 +218,7 @@ def test_a_right_dataset_evaluates_without_error(scene, stored, tmp_path, truth)
 
 
 @pytest.mark.parametrize("quarter", [0, 1, 2, 3])
-def test_a_wrong_place_is_measured_and_a_quarter_turn_is_not(scene, stored, tmp_path, truth, quarter):
+def test_a_position_error_is_measured_at_every_quarter_turn(scene, stored, tmp_path, truth, quarter):
     """A mesh does not say which side is its front, so only what it fills counts."""
     turned = rotation_about_z(quarter * np.pi / 2 + np.radians(4))
     pose = Similarity3(0.46, turned, CENTRE + np.array([0.05, 0.0, 0.0]))
@@ -231,7 +231,7 @@ def test_a_wrong_place_is_measured_and_a_quarter_turn_is_not(scene, stored, tmp_
         assert found["extents"] > 10  # its long side is along the wrong axis
 
 
-def test_a_damaged_file_is_named(scene, stored, tmp_path, truth):
+def test_a_damaged_or_missing_file_is_reported_by_name(scene, stored, tmp_path, truth):
     folder = written(scene, stored, tmp_path / "set")
     path = folder / "objects/microwave_1/aligned.glb"
     path.write_bytes(path.read_bytes()[:-1] + b"x")
@@ -242,13 +242,13 @@ def test_a_damaged_file_is_named(scene, stored, tmp_path, truth):
         evaluate_dataset(folder, truth)
 
 
-def test_a_pose_of_a_candidate_that_is_gone_is_left_out(scene, stored, tmp_path):
+def test_a_placement_of_a_missing_candidate_is_omitted(scene, stored, tmp_path):
     folder = written(scene, stored, tmp_path / "set", placed="c7")
     assert not (folder / "objects/microwave_1/aligned.glb").exists()
     assert json.loads((folder / "objects/microwave_1/object.json").read_text())["placement"] is None
 
 
-def test_nothing_is_overwritten_and_nothing_half_written_stays(scene, stored, tmp_path):
+def test_nothing_is_overwritten_and_no_partial_files_remain(scene, stored, tmp_path):
     (tmp_path / "set").mkdir()
     (tmp_path / "set" / "mine.txt").write_text("keep")
     with pytest.raises(InputError, match="not an empty folder"):
@@ -259,7 +259,7 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(scene, stored, tm
     assert sorted(p.name for p in tmp_path.iterdir() if "other" in p.name) == []
 
 
-def test_the_commands_write_a_work_folder_s_dataset_and_read_it_back(scene, tmp_path, truth, capsys):
+def test_the_commands_write_and_evaluate_the_dataset_of_a_work_folder(scene, tmp_path, truth, capsys):
     capture, track = scene
     work = Workspace(tmp_path / "work")
     for folder in ("rgb", "depth"):
@@ -286,6 +286,6 @@ def test_the_commands_write_a_work_folder_s_dataset_and_read_it_back(scene, tmp_
     assert said["scene"]["mask_iou"]["value"] == pytest.approx(1.0)
 
 
-def test_the_command_names_a_folder_that_is_no_work_folder(tmp_path, capsys):
+def test_the_command_rejects_a_folder_that_is_not_a_work_folder(tmp_path, capsys):
     assert cli.main(["dataset", str(tmp_path), "-o", str(tmp_path / "set")]) == 2
     assert "not a work folder" in capsys.readouterr().err

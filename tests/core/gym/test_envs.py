@@ -36,7 +36,7 @@ def _pick(bundle: Path, **options: Any) -> Any:
 
 
 @pytest.mark.parametrize("observation", ["state", "rgbd"])
-def test_both_pass_gymnasiums_checker(tmp_path: Path, observation: str) -> None:
+def test_both_environments_pass_the_gymnasium_checker(tmp_path: Path, observation: str) -> None:
     from gymnasium.utils.env_checker import check_env
 
     (tmp_path / "a").mkdir()
@@ -48,7 +48,7 @@ def test_both_pass_gymnasiums_checker(tmp_path: Path, observation: str) -> None:
         check_env(env.unwrapped)
 
 
-def test_a_seed_gives_an_episode_again_and_another_another(door: Path) -> None:
+def test_the_same_seed_repeats_an_episode_and_another_differs(door: Path) -> None:
     def episode(seed: int) -> list[Any]:
         env = _open(door)
         first, _ = env.reset(seed=seed)
@@ -64,16 +64,16 @@ def test_the_scripted_policy_opens_the_door(door: Path, seed: int) -> None:
     assert _succeeds(_open(door), seed)
 
 
-def test_the_scripted_policy_opens_what_has_no_handle(tmp_path: Path) -> None:
+def test_the_scripted_policy_opens_a_drawer_without_a_handle(tmp_path: Path) -> None:
     assert _succeeds(_open(scene(tmp_path, kind="drawer").parent), 0)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_scripted_policy_moves_the_thing(block: Path, seed: int) -> None:
+def test_the_scripted_policy_moves_the_object(block: Path, seed: int) -> None:
     assert _succeeds(_pick(block), seed)
 
 
-def test_doing_nothing_solves_neither(door: Path) -> None:
+def test_zero_actions_do_not_open_the_door(door: Path) -> None:
     env = _open(door)
     env.reset(seed=0)
     rewards = [env.step(np.zeros(7, np.float32))[1] for _ in range(20)]
@@ -81,7 +81,7 @@ def test_doing_nothing_solves_neither(door: Path) -> None:
     assert abs(sum(rewards)) < 0.05
 
 
-def test_many_at_once(door: Path) -> None:
+def test_vectorized_environments_have_batched_and_distinct_states(door: Path) -> None:
     envs = gymnasium.make_vec("r2c2r/Open-v0", num_envs=2, vectorization_mode="sync", bundle=door, joint="front_joint")
     first, _ = envs.reset(seed=0)
     after, rewards, *_ = envs.step(envs.action_space.sample())
@@ -90,7 +90,7 @@ def test_many_at_once(door: Path) -> None:
     assert not np.array_equal(first[0], first[1])
 
 
-def test_an_episode_takes_the_variant_it_is_told(tmp_path: Path) -> None:
+def test_an_episode_uses_the_requested_variant(tmp_path: Path) -> None:
     (tmp_path / "variants").mkdir()
     for name, frictionloss in (("00000", 0.1), ("00001", 5.0)):
         shutil.copy(scene(tmp_path, bar=Bar(), frictionloss=frictionloss), tmp_path / "variants" / f"{name}.xml")
@@ -103,7 +103,7 @@ def test_an_episode_takes_the_variant_it_is_told(tmp_path: Path) -> None:
         env.reset(seed=0, options={"variant": "7"})
 
 
-def test_what_is_not_there_is_said(door: Path, tmp_path: Path) -> None:
+def test_a_missing_joint_or_bundle_file_raises_a_clear_error(door: Path, tmp_path: Path) -> None:
     with pytest.raises(BundleError, match="joint lid: no such joint; choose one of: front_joint"):
         gymnasium.make("r2c2r/Open-v0", bundle=door, joint="lid").reset()
     (tmp_path / "empty").mkdir()
@@ -111,7 +111,7 @@ def test_what_is_not_there_is_said(door: Path, tmp_path: Path) -> None:
         gymnasium.make("r2c2r/Open-v0", bundle=tmp_path / "empty", joint="lid")
 
 
-def test_segmentation_names_what_it_shows(block: Path) -> None:
+def test_segmentation_labels_name_the_visible_bodies(block: Path) -> None:
     env = _pick(block, observation="rgbd")
     seen, _ = env.reset(seed=0)
     labels = env.unwrapped.labels()

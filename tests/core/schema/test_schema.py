@@ -27,7 +27,7 @@ PUBLISHED = Path(__file__).parents[3] / "docs" / "schemas"
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_is_published_is_what_is_read(name: str) -> None:
+def test_published_schemas_match_the_models(name: str) -> None:
     again = f"r2c2r schema {name} > docs/schemas/{name}.json"
     assert (PUBLISHED / f"{name}.json").read_text(encoding="utf-8") == schema_text(name), again
 
@@ -47,20 +47,20 @@ def _inside(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_everything_that_can_be_written_is_documented(name: str) -> None:
+def test_every_schema_model_and_field_is_documented(name: str) -> None:
     for model in models_of(document_of(name)):
         assert model.__doc__, model
         for key, field in model.model_fields.items():
             assert field.description, f"{model.__name__}.{key} says nothing of what it means"
 
 
-def test_the_defaults_are_within_their_own_bounds() -> None:
+def test_default_settings_pass_validation() -> None:
     written = json.loads(json.dumps(asdict(ReconstructConfig())))
     assert config_from(written, "config.json") == ReconstructConfig()
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_every_preset_sets_what_differs_from_the_defaults(name: str) -> None:
+def test_every_preset_changes_exactly_its_listed_settings(name: str) -> None:
     chosen, usual = asdict(read_config(None, name)), asdict(ReconstructConfig())
     changed = {stage: {key for key in chosen[stage] if chosen[stage][key] != usual[stage][key]} for stage in chosen}
     assert {stage: keys for stage, keys in changed.items() if keys} == {
@@ -68,14 +68,14 @@ def test_every_preset_sets_what_differs_from_the_defaults(name: str) -> None:
     }
 
 
-def test_a_file_of_settings_changes_a_preset(tmp_path: Path) -> None:
+def test_a_config_file_overrides_a_preset(tmp_path: Path) -> None:
     path = tmp_path / "config.json"
     path.write_text('{"generate": {"count": 3}}', encoding="utf-8")
     config = read_config(path, "paper")
     assert (config.generate.count, config.generate.rule, config.warp.method) == (3, "mean", "paper")
 
 
-def test_what_is_set_is_set_and_the_rest_stays() -> None:
+def test_given_settings_are_applied_and_others_keep_their_defaults() -> None:
     config = config_from({"warp": {"front_scale": [1, 2]}, "align": {"views": 3}, "ingest": {"near_m": 1}}, "config.json")
     assert (config.warp.front_scale, config.warp.depth_scale) == ((1.0, 2.0), (0.2, 5.0))
     assert (config.align.views, config.align.view_px, config.ingest.near_m) == (3, 128, 1.0)
@@ -99,7 +99,7 @@ def test_what_is_set_is_set_and_the_rest_stays() -> None:
         ({"align": {"views": True}}, "align.views is True"),
     ],
 )
-def test_a_setting_that_cannot_be_is_one_line(document: Any, says: str) -> None:
+def test_an_invalid_setting_raises_a_one_line_error(document: Any, says: str) -> None:
     with pytest.raises(InputError) as caught:
         config_from(document, "config.json")
     assert says in str(caught.value)
@@ -107,17 +107,17 @@ def test_a_setting_that_cannot_be_is_one_line(document: Any, says: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_the_manifest_that_is_written_is_the_one_described() -> None:
+def test_the_written_manifest_validates_against_its_schema() -> None:
     scene = kitchen()
     written = json.loads(json.dumps(manifest_of(reconstruction(scene), plan_bundle(scene), None)))
     assert [item.name for item in Manifest.model_validate(written).objects] == [item.name for item in scene.objects]
 
 
-def test_the_app_reads_prompts_by_the_same_description() -> None:
+def test_the_app_uses_the_same_prompts_schema() -> None:
     assert schemas.PromptsFile is PromptsFile
 
 
-def test_a_manifest_says_of_a_filmed_joint_what_the_fit_found() -> None:
+def test_the_manifest_contains_the_fitted_motion_of_a_joint() -> None:
     scene = kitchen()
     motion = JointMotion(
         kind="revolute",

@@ -28,7 +28,7 @@ def corners(thing: TrueObject) -> np.ndarray:
     return thing.kitchen_from_object.apply(signs * thing.dimensions_m / 2)
 
 
-def test_every_kitchen_has_about_fifteen_objects_of_the_usual_kinds(kitchen: Kitchen) -> None:
+def test_every_kitchen_has_12_to_18_objects_of_the_usual_categories(kitchen: Kitchen) -> None:
     objects = true_objects(kitchen)
     assert 12 <= len(objects) <= 18
     assert tuple(thing.name for thing in objects) == kitchen.object_names
@@ -36,7 +36,7 @@ def test_every_kitchen_has_about_fifteen_objects_of_the_usual_kinds(kitchen: Kit
     assert {"drawer", "cabinet", "wall_cabinet", "refrigerator", "microwave", "bottle"} <= {thing.category for thing in objects}
 
 
-def test_boxes_keep_apart_and_neighbouring_fronts_leave_a_gap_of_2_to_4_mm(kitchen: Kitchen) -> None:
+def test_boxes_do_not_overlap_and_fronts_have_gaps_of_2_to_4_mm(kitchen: Kitchen) -> None:
     boxes = [(thing.name, corners(thing).min(axis=0), corners(thing).max(axis=0)) for thing in true_objects(kitchen)]
     for i, (name, low, high) in enumerate(boxes):
         for other, other_low, other_high in boxes[i + 1 :]:
@@ -60,7 +60,7 @@ def test_positive_joint_values_open_outwards(kitchen: Kitchen) -> None:
             assert 0.3 < joint.upper < 1.93
 
 
-def test_door_handles_stand_upright_opposite_the_hinge_and_drawer_handles_lie(kitchen: Kitchen) -> None:
+def test_door_handles_are_vertical_opposite_the_hinge_drawer_ones_level(kitchen: Kitchen) -> None:
     for furniture in (*kitchen.base, *kitchen.upper):
         for leaf in furniture.leaves:
             assert leaf.handle.vertical == (leaf.hinge is not None)
@@ -75,7 +75,7 @@ def test_door_handles_stand_upright_opposite_the_hinge_and_drawer_handles_lie(ki
             assert half < along < room - half
 
 
-def test_the_walk_stays_in_the_room_and_shows_every_object_often(kitchen: Kitchen) -> None:
+def test_the_camera_path_stays_in_the_room_and_shows_every_object(kitchen: Kitchen) -> None:
     shots = walk(kitchen, 180, np.random.default_rng(5))
     camera = Intrinsics(fx=726.0, fy=726.0, cx=480.0, cy=360.0, width=960, height=720)
     eyes = np.array([shot.kitchen_from_camera.translation for shot in shots])
@@ -99,7 +99,7 @@ def test_the_walk_stays_in_the_room_and_shows_every_object_often(kitchen: Kitche
     assert (whole >= 5).all(), [thing.name for thing, count in zip(objects, whole, strict=True) if count < 5]
 
 
-def test_seeds_differ_in_hinge_sides_colours_handles_yaw_and_the_place_of_the_refrigerator() -> None:
+def test_seeds_vary_hinges_colours_handles_yaw_and_fridge_position() -> None:
     kitchens = [plan_kitchen(seed) for seed in SEEDS]
     assert {k.fridge.hinge for k in kitchens} == {"left", "right"}
     assert {k.fridge.centre[0] < 0 for k in kitchens} == {True, False}
@@ -111,7 +111,7 @@ def test_seeds_differ_in_hinge_sides_colours_handles_yaw_and_the_place_of_the_re
     assert {any(leaf.frame for unit in k.base for leaf in unit.leaves) for k in kitchens} == {True, False}
 
 
-def test_the_capture_frame_is_y_up_and_begins_at_the_first_camera() -> None:
+def test_the_capture_frame_is_y_up_with_origin_at_the_first_camera() -> None:
     kitchen = plan_kitchen(3)
     eye = np.array([1.0, -2.0, 1.5])
     to_capture = capture_from_kitchen(kitchen, eye)
@@ -121,7 +121,7 @@ def test_the_capture_frame_is_y_up_and_begins_at_the_first_camera() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 5])
-def test_a_ray_through_an_objects_pixel_ends_on_its_box(seed: int) -> None:
+def test_depth_at_an_objects_pixels_lies_on_its_box(seed: int) -> None:
     """Without noise, and without handles, which the box leaves out."""
     kitchen = plan_kitchen(seed)
     patches = build_kitchen(kitchen)
@@ -153,7 +153,7 @@ def test_a_ray_through_an_objects_pixel_ends_on_its_box(seed: int) -> None:
     assert len(seen) == len(objects)
 
 
-def test_rigid_transforms_of_objects_are_proper(kitchen: Kitchen) -> None:
+def test_object_transforms_are_proper_rotations(kitchen: Kitchen) -> None:
     for thing in true_objects(kitchen):
         assert isinstance(thing.kitchen_from_object, Rigid3)
         assert np.linalg.det(thing.kitchen_from_object.rotation) == pytest.approx(1.0)

@@ -30,7 +30,7 @@ def solids(kitchen: Kitchen) -> list[tuple[str, np.ndarray, np.ndarray]]:
     return [(thing.name, corners(thing).min(axis=0), corners(thing).max(axis=0)) for thing in true_objects(kitchen)]
 
 
-def test_objects_have_names_of_their_own_and_boxes_that_keep_apart_in_the_room(kitchen: Kitchen) -> None:
+def test_objects_have_unique_names_and_disjoint_boxes_in_the_room(kitchen: Kitchen) -> None:
     objects = true_objects(kitchen)
     assert tuple(thing.name for thing in objects) == kitchen.object_names
     assert len(set(kitchen.object_names)) == len(objects)
@@ -62,7 +62,7 @@ def test_fronts_face_the_room_and_open_into_it(kitchen: Kitchen) -> None:
             assert motion @ outward > 0.05, (thing.name, joint)
 
 
-def test_layouts_have_the_units_that_their_line_names() -> None:
+def test_layouts_have_their_documented_runs_and_units() -> None:
     found = {}
     for layout in LAYOUTS:
         kitchen = plan_styled_kitchen(4, Choice(layout=layout))
@@ -76,7 +76,7 @@ def test_layouts_have_the_units_that_their_line_names() -> None:
     assert len(plan_styled_kitchen(4, Choice(layout="island")).runs) == 3
 
 
-def test_french_doors_have_two_hinges_and_a_drawer_that_comes_out() -> None:
+def test_a_french_door_fridge_has_two_hinges_and_a_pull_out_drawer() -> None:
     kitchen = plan_styled_kitchen(4, Choice(layout="galley"))
     fridge = next(thing for thing in true_objects(kitchen) if thing.category == "french_door_refrigerator")
     assert [(joint.type, joint.hinge) for joint in fridge.joints] == [
@@ -90,7 +90,7 @@ def test_french_doors_have_two_hinges_and_a_drawer_that_comes_out() -> None:
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_an_objects_surfaces_lie_on_its_box_whichever_way_its_run_faces(layout: str) -> None:
+def test_object_surfaces_match_their_box_in_every_layout(layout: str) -> None:
     kitchen = plan_styled_kitchen(6, Choice(style="shaker", layout=layout))
     objects, patches = true_objects(kitchen), build_kitchen(kitchen)
     for index, thing in enumerate(objects):
@@ -103,7 +103,7 @@ def test_an_objects_surfaces_lie_on_its_box_whichever_way_its_run_faces(layout: 
         assert reach == pytest.approx(thing.dimensions_m / 2, abs=0.004), thing.name
 
 
-def test_the_walk_keeps_clear_of_walls_and_units_and_shows_every_front(kitchen: Kitchen) -> None:
+def test_the_camera_path_avoids_obstacles_and_shows_every_front(kitchen: Kitchen) -> None:
     shots = walk(kitchen, 120, np.random.default_rng(5))
     eyes = np.array([shot.kitchen_from_camera.translation for shot in shots])
     x_min, x_max, y_min, y_max, ceiling = kitchen.room

@@ -55,7 +55,7 @@ def front_to_rear(film: Film, front: Front) -> float:
     return float(hits[np.isfinite(hits) & (hits < 1.0)].max())
 
 
-def test_films_open_all_kinds_of_fronts_in_turn_together_from_the_start_and_to_the_end() -> None:
+def test_films_open_every_kind_of_front_singly_and_together() -> None:
     films = [film_of(*case) for case in KITCHENS]
     kinds = {film.fronts[o.joint].kind for film in films for o in film.openings}
     assert {"left", "right", "drawer", "bottom", "top", "lateral", "pair", "appliance drawer"} <= kinds
@@ -70,13 +70,13 @@ def test_films_open_all_kinds_of_fronts_in_turn_together_from_the_start_and_to_t
     assert together >= len(films) - 1  # not every kitchen has fronts that one view shows and that do not collide
 
 
-def test_a_front_opens_no_further_than_its_joint_and_is_still_only_there(film: Film) -> None:
+def test_only_fronts_that_rest_open_reach_their_joint_limit(film: Film) -> None:
     for opening in film.openings:
         upper = film.fronts[opening.joint].joint.upper
         assert opening.widest == upper if opening.held else 0.4 * upper < opening.widest < 0.9 * upper
 
 
-def test_insides_are_as_deep_as_they_say(film: Film) -> None:
+def test_interior_depths_match_their_stated_depth(film: Film) -> None:
     for opening in film.openings:
         front = film.fronts[opening.joint]
         if front.owner == "microwave":  # it stands rotated on the worktop
@@ -84,7 +84,7 @@ def test_insides_are_as_deep_as_they_say(film: Film) -> None:
         assert front_to_rear(film, front) == pytest.approx(film.hollows[front.hollow_key].inside.depth_m, abs=2e-3)
 
 
-def test_the_camera_is_before_what_is_opened_and_out_of_its_way(film: Film) -> None:
+def test_the_camera_stays_clear_of_opening_fronts(film: Film) -> None:
     shots = walk_and_open(film, FRAMES, np.random.default_rng(0))
     for number, shot in enumerate(shots):
         time, eye = share_of(number, FRAMES), shot.kitchen_from_camera.translation
@@ -105,7 +105,7 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> SamplePaths:
     return write_sample(tmp_path_factory.mktemp("opened"), seed=3, frames=24, size=(240, 180), opened=True)
 
 
-def test_the_truth_says_of_every_joint_where_it_stands_in_every_frame(sample: SamplePaths) -> None:
+def test_ground_truth_lists_every_joint_state_in_every_frame(sample: SamplePaths) -> None:
     truth = json.loads(sample.truth.read_text())
     joints = [joint for thing in truth["objects"] for joint in thing["joints"]]
     moved = [joint for joint in joints if any(joint["states"])]
@@ -119,7 +119,7 @@ def test_the_truth_says_of_every_joint_where_it_stands_in_every_frame(sample: Sa
     ]
 
 
-def test_masks_and_depth_follow_the_front(sample: SamplePaths) -> None:
+def test_masks_and_depth_follow_the_opened_front(sample: SamplePaths) -> None:
     import lzfse
 
     truth = json.loads(sample.truth.read_text())
@@ -153,13 +153,13 @@ def in_capture(meta: dict, frame: int, rows: np.ndarray, columns: np.ndarray, de
 
 
 @pytest.mark.slow
-def test_the_same_seed_opens_the_same_in_the_same_bytes(sample: SamplePaths, tmp_path: Path) -> None:
+def test_the_same_seed_gives_an_identical_opening_film(sample: SamplePaths, tmp_path: Path) -> None:
     again = write_sample(tmp_path, seed=3, frames=24, size=(240, 180), opened=True)
     assert again.scan.read_bytes() == sample.scan.read_bytes()
     assert again.truth.read_bytes() == sample.truth.read_bytes()
 
 
-def test_what_is_filmed_open_is_clicked_now_and_then_on_its_open_front() -> None:
+def test_some_clicks_are_on_the_opened_front() -> None:
     objects = true_objects(plan_kitchen(3))
     sightings, shape = Sightings(objects, moved={objects[0].name: frozenset({1})}), (60, 80)
     camera, pose = Intrinsics(fx=60.0, fy=60.0, cx=40.0, cy=30.0, width=80, height=60), Rigid3()

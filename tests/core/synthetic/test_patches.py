@@ -17,7 +17,7 @@ def enclosed_volume(patches: list[Patch]) -> float:
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
-def test_a_box_encloses_its_volume_and_has_no_long_edge() -> None:
+def test_a_box_mesh_has_the_correct_volume_and_limited_edge_length() -> None:
     patches = box((0.2, -0.6, 0.1), (1.5, -0.1, 2.0), PAINT)
     assert enclosed_volume(patches) == pytest.approx(1.3 * 0.5 * 1.9)
     for patch in patches:
@@ -25,17 +25,17 @@ def test_a_box_encloses_its_volume_and_has_no_long_edge() -> None:
             assert np.linalg.norm(np.diff(patch.grid, axis=axis), axis=-1).max() <= LONGEST_EDGE_M
 
 
-def test_a_turned_box_keeps_its_volume() -> None:
+def test_a_rotated_box_keeps_its_volume() -> None:
     assert enclosed_volume(turned(box((0, 0, 0), (0.5, 0.4, 0.3), PAINT), 0.3, (0.2, 0.1))) == pytest.approx(0.06)
 
 
-def test_a_lathe_encloses_the_cylinder_of_its_profile() -> None:
+def test_a_lathe_mesh_has_the_volume_of_its_cylinder() -> None:
     body = lathe((0.3, -0.2, 0.9), [(0.0, 0.3), (0.05, 0.3), (0.05, 0.0), (0.0, 0.0)], PAINT, sides=64)
     assert enclosed_volume([body]) == pytest.approx(np.pi * 0.05**2 * 0.3, rel=0.01)  # a 64-gon instead of a circle
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.05, -0.05])
-def test_a_tube_encloses_its_length_times_its_section(bend: float) -> None:
+def test_a_tube_mesh_has_the_volume_of_length_times_section(bend: float) -> None:
     angle = np.linspace(0, np.pi, 21)
     points = np.column_stack([0.2 * np.cos(angle), np.zeros(21), bend * np.sin(angle)])
     length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
@@ -45,7 +45,7 @@ def test_a_tube_encloses_its_length_times_its_section(bend: float) -> None:
 
 @pytest.mark.parametrize("kind", ["bar", "flat", "bow", "knob"])
 @pytest.mark.parametrize("vertical", [True, False])
-def test_handles_stand_out_of_the_front_by_their_reach_and_are_as_long_as_stated(kind: str, vertical: bool) -> None:
+def test_handle_meshes_have_the_stated_protrusion_and_length(kind: str, vertical: bool) -> None:
     length = 0.03 if kind == "knob" else 0.19
     handle = Handle(kind=kind, length_m=length, thickness_m=0.012, reach_m=0.035, vertical=vertical, x=0.3, z=0.5)  # type: ignore[arg-type]
     patches = handle_patches(handle, np.array([1.0, -0.6, 0.1]), PAINT, 7)

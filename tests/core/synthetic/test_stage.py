@@ -39,7 +39,7 @@ def depth_of(sample: SamplePaths, frame: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(("which", "rgb", "lidar"), [("sample", SIZE, (256, 192)), ("upright", (180, 240), (192, 256))])
-def test_the_members_of_the_r3d_decode_to_the_sizes_it_states(
+def test_r3d_members_decode_to_the_sizes_in_the_metadata(
     which: str, rgb: tuple[int, int], lidar: tuple[int, int], request: pytest.FixtureRequest
 ) -> None:
     paths: SamplePaths = request.getfixturevalue(which)
@@ -60,7 +60,7 @@ def test_the_members_of_the_r3d_decode_to_the_sizes_it_states(
             assert (confidence[np.isnan(depth)] == 0).all()
 
 
-def test_confident_depth_behind_a_true_mask_lies_on_the_objects_box(sample: SamplePaths) -> None:
+def test_confident_depth_inside_a_true_mask_lies_on_the_objects_box(sample: SamplePaths) -> None:
     metadata, truth = metadata_of(sample), json.loads(sample.truth.read_text())
     step = SIZE[0] / metadata["dw"]
     off: dict[str, list[np.ndarray]] = {}
@@ -87,7 +87,7 @@ def test_confident_depth_behind_a_true_mask_lies_on_the_objects_box(sample: Samp
         assert np.mean(np.concatenate(distances) < 0.03) > 0.93, name  # the rest: handles
 
 
-def test_the_masks_of_a_frame_share_no_pixel(sample: SamplePaths) -> None:
+def test_masks_of_a_frame_do_not_overlap(sample: SamplePaths) -> None:
     for frame in range(FRAMES):
         files = list(sample.masks.glob(f"*/{frame:06d}.png"))
         masks = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in files]
@@ -96,7 +96,7 @@ def test_the_masks_of_a_frame_share_no_pixel(sample: SamplePaths) -> None:
         assert np.sum([mask > 0 for mask in masks], axis=0).max() == 1
 
 
-def test_every_object_has_one_click_and_it_lies_on_the_object(sample: SamplePaths) -> None:
+def test_every_object_has_one_click_on_its_mask(sample: SamplePaths) -> None:
     truth, prompts = json.loads(sample.truth.read_text()), json.loads(sample.prompts.read_text())
     assert [p["name"] for p in prompts["objects"]] == [o["name"] for o in truth["objects"]]
     for prompt in prompts["objects"]:
@@ -106,7 +106,7 @@ def test_every_object_has_one_click_and_it_lies_on_the_object(sample: SamplePath
         assert point["label"] == 1
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_kitchen(
+def test_samples_are_deterministic_per_seed_and_differ_between_seeds(
     upright: SamplePaths, tmp_path: Path, sample: SamplePaths
 ) -> None:
     again = write_sample(tmp_path, seed=1, frames=2, size=(180, 240))

@@ -53,12 +53,12 @@ def digest(patches: list[Patch]) -> str:
 
 
 @pytest.mark.parametrize("seed", WITHOUT_CHOICE)
-def test_with_nothing_chosen_a_seed_gives_the_kitchen_it_always_gave(seed: int) -> None:
+def test_without_a_choice_a_seed_reproduces_the_reference_kitchen(seed: int) -> None:
     assert digest(build_kitchen(plan_kitchen(seed))) == WITHOUT_CHOICE[seed]
     assert Choice() == SEEDS_OWN
 
 
-def test_fronts_keep_apart_and_every_category_is_known(kitchen: Kitchen) -> None:
+def test_fronts_do_not_overlap_and_every_category_is_known(kitchen: Kitchen) -> None:
     objects = true_objects(kitchen)
     assert len({thing.name for thing in objects}) == len(objects)
     for thing in objects:
@@ -70,7 +70,7 @@ def test_fronts_keep_apart_and_every_category_is_known(kitchen: Kitchen) -> None
             assert apart > 0.0019 or abs(apart) < 1e-9, (name, other, apart)
 
 
-def test_handles_are_those_of_the_style_and_stand_on_the_opening_side() -> None:
+def test_handles_match_the_style_and_are_on_the_opening_side() -> None:
     kinds: dict[str, set[str | None]] = {}
     level = []
     for style in STYLES:
@@ -91,7 +91,7 @@ def test_handles_are_those_of_the_style_and_stand_on_the_opening_side() -> None:
     assert 0 < np.mean(level) < 0.25  # fraction of doors with a centred handle, which does not indicate the hinge
 
 
-def test_frames_and_panes_are_where_the_style_has_them(kitchen: Kitchen, request: pytest.FixtureRequest) -> None:
+def test_front_frames_and_panes_match_the_style(kitchen: Kitchen, request: pytest.FixtureRequest) -> None:
     style = request.node.callspec.params["kitchen"][0]
     for unit, leaf in leaves(kitchen):
         if style in ("slab", "handleless", "push"):
@@ -104,7 +104,7 @@ def test_frames_and_panes_are_where_the_style_has_them(kitchen: Kitchen, request
             assert leaf.frame.filling == "panel"
 
 
-def test_inset_fronts_lie_flush_in_a_face_frame_that_surrounds_them() -> None:
+def test_inset_fronts_are_flush_with_a_surrounding_face_frame() -> None:
     kitchen = plan_styled_kitchen(1, Choice(style="framed"))
     gap = kitchen.style.gap_m
     for run in kitchen.runs:
@@ -118,7 +118,7 @@ def test_inset_fronts_lie_flush_in_a_face_frame_that_surrounds_them() -> None:
                 assert (right < 1e-9) or unit.category == "double_door_cabinet"
 
 
-def test_travels_and_depths_do_not_follow_the_tables_that_estimate_them() -> None:
+def test_travels_and_depths_vary_independently_of_the_estimation_tables() -> None:
     kitchens = [plan_styled_kitchen(seed, Choice(style="slab")) for seed in range(40)]
     drawers = [(u.depth_m, leaf.open_limit) for k in kitchens for u, leaf in leaves(k) if leaf.hinge is None]
     share = np.array([travel / depth for depth, travel in drawers])
@@ -131,7 +131,7 @@ def test_travels_and_depths_do_not_follow_the_tables_that_estimate_them() -> Non
 
 
 @pytest.mark.parametrize("style", STYLES)
-def test_an_objects_surfaces_lie_on_its_box(style: str) -> None:
+def test_object_surfaces_match_their_box(style: str) -> None:
     kitchen = plan_styled_kitchen(2, Choice(style=style))
     objects, patches = true_objects(kitchen), build_kitchen(kitchen)
     for patch in patches:
@@ -150,7 +150,7 @@ def test_an_objects_surfaces_lie_on_its_box(style: str) -> None:
 
 
 @pytest.mark.parametrize("palette", PALETTES)
-def test_a_palette_changes_paints_and_no_size(palette: str) -> None:
+def test_a_palette_changes_the_front_paints(palette: str) -> None:
     plain, painted = (plan_styled_kitchen(3, Choice(style="shaker", palette=p)) for p in (None, palette))
     assert painted.style.base_front != plain.style.base_front
     assert (painted.style.base_front == painted.style.wall_front) == (palette != "two-tone")
@@ -158,7 +158,7 @@ def test_a_palette_changes_paints_and_no_size(palette: str) -> None:
     assert {"dark": mean < 0.05, "white": mean > 0.7}.get(palette, True)
 
 
-def test_the_same_choice_gives_the_same_kitchen() -> None:
+def test_the_same_choice_and_seed_give_the_same_kitchen() -> None:
     choice = Choice(style="cup", palette="wood")
     assert plan_styled_kitchen(5, choice) == plan_styled_kitchen(5, choice)
     assert plan_styled_kitchen(5, choice) != plan_styled_kitchen(6, choice)
@@ -191,7 +191,7 @@ def pane() -> Pane:
     return Pane(kitchen, unit, patches, scene, camera, facing, render_view(scene, camera, facing))
 
 
-def test_depth_passes_through_a_clear_pane_and_the_pane_owns_its_pixels(pane: Pane) -> None:
+def test_depth_passes_through_glass_but_its_pixels_belong_to_the_unit(pane: Pane) -> None:
     number = pane.kitchen.object_names.index(pane.unit.name) + 1
     assert pane.scene.object_of_patch[pane.view.patch[96, 128]] == number
     assert pane.view.depth_m[96, 128] == pytest.approx(1.0, abs=0.02)
@@ -205,7 +205,7 @@ def test_depth_passes_through_a_clear_pane_and_the_pane_owns_its_pixels(pane: Pa
 
 
 @pytest.mark.slow
-def test_light_passes_through_a_clear_pane(pane: Pane) -> None:
+def test_a_clear_pane_transmits_86_percent_of_the_light(pane: Pane) -> None:
     without = light_scene([p for p in pane.patches if p.paint.kind != "glass"], np.random.default_rng(0))
     bare = render_view(without, pane.camera, pane.camera_from_kitchen).colour.mean(axis=2) + 1.0
     share = (pane.view.colour.mean(axis=2) + 1.0) / bare

@@ -29,7 +29,7 @@ def made(bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Variants:
     return make_variants(bundle, COUNT, 0, tmp_path_factory.mktemp("made") / "v")
 
 
-def test_every_variant_loads_with_its_textures_and_its_start(made: Variants) -> None:
+def test_every_variant_loads_in_mujoco_with_textures_and_start_keyframe(made: Variants) -> None:
     for name in made.names:
         model = mujoco.MjModel.from_xml_path(str(made.folder / "variants" / f"{name}.xml"))
         data = mujoco.MjData(model)
@@ -38,11 +38,11 @@ def test_every_variant_loads_with_its_textures_and_its_start(made: Variants) -> 
         assert model.ntex > 0
 
 
-def test_a_sample_is_certified(made: Variants) -> None:
+def test_every_variant_of_the_sample_is_certified(made: Variants) -> None:
     assert made.certified == dict.fromkeys(made.names, True)
 
 
-def test_the_same_seed_gives_the_same_variants_and_another_others(bundle: Path, made: Variants, tmp_path: Path) -> None:
+def test_variants_are_deterministic_per_seed_and_differ_between_seeds(bundle: Path, made: Variants, tmp_path: Path) -> None:
     again = make_variants(bundle, 2, 0, tmp_path / "again")
     other = make_variants(bundle, 2, 1, tmp_path / "other")
     for name in again.names:
@@ -51,13 +51,13 @@ def test_the_same_seed_gives_the_same_variants_and_another_others(bundle: Path, 
         assert (other.folder / file).read_bytes() != (made.folder / file).read_bytes()
 
 
-def test_variants_share_the_meshes_and_textures(made: Variants) -> None:
+def test_variants_share_meshes_and_textures(made: Variants) -> None:
     each = [(made.folder / "variants" / f"{name}.xml").stat().st_size for name in made.names]
     assert {path.suffix for path in (made.folder / "variants").iterdir()} == {".xml"}
     assert max(each) < 100_000  # text only
 
 
-def test_the_manifest_says_what_was_varied_and_what_was_rejected(made: Variants) -> None:
+def test_the_variants_manifest_lists_changes_and_rejections(made: Variants) -> None:
     document = json.loads((made.folder / "variants.json").read_text())
     assert document["rejected"] == made.rejected
     assert sum(entry["draws"] - 1 for entry in document["variants"]) == sum(made.rejected.values())
@@ -66,7 +66,7 @@ def test_the_manifest_says_what_was_varied_and_what_was_rejected(made: Variants)
     assert SURFACE[0] <= first["surface"] <= SURFACE[1]
 
 
-def test_a_stretched_object_keeps_its_front_and_its_underside(bundle: Path, tmp_path: Path) -> None:
+def test_a_scaled_object_keeps_its_front_and_bottom_planes(bundle: Path, tmp_path: Path) -> None:
     base = base_of(bundle)
     change = Change(name="cabinet_1", scale=(1.01, 1.05, 0.98), mass=1.2)
     rest = [Change(name=name) for name in base.halves if name != "cabinet_1"]
@@ -89,7 +89,7 @@ def test_a_stretched_object_keeps_its_front_and_its_underside(bundle: Path, tmp_
     assert mass_after == pytest.approx(1.2 * 1.01 * 1.05 * 0.98 * mass)
 
 
-def test_a_stretched_box_has_the_inertia_of_a_box_of_that_size(tmp_path: Path) -> None:
+def test_a_scaled_box_has_the_inertia_of_its_new_size(tmp_path: Path) -> None:
     size, scale = np.array([0.4, 0.5, 0.6]), np.array([1.1, 0.9, 1.2])
     inertia = 12.0 / 12 * ((size**2).sum() - size**2)
     body = ET.fromstring(
@@ -106,7 +106,7 @@ def test_a_stretched_box_has_the_inertia_of_a_box_of_that_size(tmp_path: Path) -
     np.testing.assert_allclose(given, expected, rtol=1e-6)
 
 
-def test_what_was_measured_varies_less_than_what_was_guessed() -> None:
+def test_measured_dimensions_vary_less_than_inferred_ones() -> None:
     entry = {
         "name": "cabinet_1",
         "category": "cabinet",
@@ -123,7 +123,7 @@ def test_what_was_measured_varies_less_than_what_was_guessed() -> None:
     assert all(MASS[0] <= change.mass <= MASS[1] for change in drawn)
 
 
-def test_a_bundle_whose_parts_overlap_has_no_variants(bundle: Path, tmp_path: Path) -> None:
+def test_a_bundle_with_overlapping_parts_raises_a_stage_error(bundle: Path, tmp_path: Path) -> None:
     broken = shutil.copytree(bundle, tmp_path / "broken")
     scene = ET.parse(broken / "scene.xml")
     box = next(geom for geom in scene.iter("geom") if geom.get("name", "").startswith("drawer_1_drawer_col"))
