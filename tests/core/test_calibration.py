@@ -28,7 +28,7 @@ def test_slope_one_and_offset_zero_leave_confidence_unchanged() -> None:
 
 
 def test_calibration_maps_compose_linearly_in_log_odds() -> None:
-    """Twice the map is another map: whoever applies it a second time changes what it says."""
+    """Applying a map twice is a different map, so a confidence must be calibrated only once."""
     twice = calibrated(calibrated(0.9, 0.5, 0.4), 0.5, 0.4)
     assert twice == pytest.approx(calibrated(0.9, 0.25, 0.6))
     assert twice != pytest.approx(calibrated(0.9, 0.5, 0.4), abs=0.01)

@@ -143,7 +143,7 @@ def test_further_candidates_are_added_without_repeating_existing_ones(two_bottle
 
 
 def test_external_meshes_are_placed_and_scored_by_the_frames(two_bottles):
-    """A bottle and a flat box of the same odd looks: shape alone cannot tell which of two is right, masks and depth can."""
+    """A bottle and a flat box with equal shape metrics: only masks and depth can select the correct mesh."""
     capture, tracks = two_bottles
     track = tracks["good_1"].value
     bottle = generate_candidates(capture, track, "completion", GenerateConfig(count=1, pool_frames=6)).chosen

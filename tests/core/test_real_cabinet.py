@@ -34,7 +34,7 @@ PROMPTS = Prompts(objects=(ObjectPrompt(name="cabinet", category="bench", points
 
 
 def test_two_clicks_give_the_true_box_of_a_real_cabinet(tmp_path: Path) -> None:
-    """Its box, before a mesh of it is made."""
+    """Checks the box of the segment stage, before a mesh is generated."""
     work = Workspace(tmp_path)
     config = replace(QUICK, ingest=replace(QUICK.ingest, most_frames=29))  # every other frame
     reconstruct(Request(source=CABINET, prompts=PROMPTS, config=config), work, until="segment", workers=1)

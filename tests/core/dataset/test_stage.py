@@ -219,7 +219,7 @@ def test_a_correct_dataset_evaluates_without_error(scene, stored, tmp_path, trut
 
 @pytest.mark.parametrize("quarter", [0, 1, 2, 3])
 def test_a_position_error_is_measured_at_every_quarter_turn(scene, stored, tmp_path, truth, quarter):
-    """A mesh does not say which side is its front, so only what it fills counts."""
+    """A mesh has no known front, so only the volume it occupies is compared."""
     turned = rotation_about_z(quarter * np.pi / 2 + np.radians(4))
     pose = Similarity3(0.46, turned, CENTRE + np.array([0.05, 0.0, 0.0]))
     found = values(evaluate_dataset(written(scene, stored, tmp_path / "set", pose=pose), truth))

@@ -33,7 +33,7 @@ def test_a_collider_identical_to_its_visual_has_zero_distance() -> None:
 
 
 def test_both_directions_of_collider_distance_are_measured() -> None:
-    """A board drawn 0.4 m wide of which only half collides: what is drawn lies up to 0.2 m off, the collider 5 mm."""
+    """The collider covers half of a visual 0.4 m wide: visual to collider up to 0.2 m, collider to visual 5 mm."""
     (fit,) = collider_fits(urdf_of(box("visual", (0.4, 0.02, 0.5)), box("collision", (0.2, 0.01, 0.5), (-0.1, 0.0, 0.0))), HERE)
     assert fit.drawn_to_collider.most_m == pytest.approx(0.2, abs=0.01)
     assert fit.collider_to_drawn.median_m == pytest.approx(0.005, abs=1e-5)

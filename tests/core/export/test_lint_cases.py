@@ -118,7 +118,7 @@ def test_the_linter_reports_the_planted_case(good_folder: Path, case: Case) -> N
 
 
 def test_a_cabinet_base_has_five_collision_shapes_and_no_findings(good_folder: Path) -> None:
-    """The one row of the table that every loader opens."""
+    """The only row of the table that every loader opens."""
     from r2c2r_core.export.reading import read_urdf
 
     base = next(link for link in read_urdf(good_folder / "scene.urdf").links if link.name == "cabinet_1_base")

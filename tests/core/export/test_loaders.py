@@ -83,7 +83,7 @@ def test_the_good_bundle_loads_in_yourdfpy_mujoco_pybullet_and_usd(good_folder: 
 
 
 def test_usd_is_loaded_in_a_separate_process(good_folder: Path) -> None:
-    """Its libraries ask for the GIL while they are loaded: beside another thread that loads one, both waited forever."""
+    """USD's libraries acquire the GIL while loading, which deadlocked with another thread that imported a library."""
     code = """
 import sys
 from pathlib import Path
@@ -124,7 +124,7 @@ def test_the_good_bundle_loads_in_sapien(good_folder: Path) -> None:
 
 
 def test_a_missing_collider_mesh_fails_the_loaders(good_folder: Path) -> None:
-    """PyBullet drops a mesh it cannot find in silence; the comparison does not."""
+    """PyBullet silently ignores a missing mesh; the comparison of collision shapes detects it."""
     (good_folder / "meshes/bottle_1/bottle_1_body_col_0.obj").unlink()
     found = verdicts(good_folder)
     assert found["PyBullet"].state == "failed"

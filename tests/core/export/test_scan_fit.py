@@ -93,7 +93,7 @@ def test_surface_occluded_by_an_unsegmented_object_is_not_scored() -> None:
 
 
 def test_a_perfect_large_mesh_has_an_f_score_of_one() -> None:
-    """The widest front of the kitchen: so many points of it that only some are kept, and not the same of mesh and scan."""
+    """The widest front has so many points that mesh and scan are subsampled, each with different points."""
     item = filmed(0.0)
     masks = {index: unpack_mask(mask) for index, mask in item.tracks[2].masks.items()}
     assert sum(int(mask.sum()) for mask in masks.values()) > 20_000

@@ -47,7 +47,7 @@ def test_the_good_kitchen_opens_fully_without_penetration(tmp_path: Path) -> Non
 
 
 def test_a_scene_with_undecodable_names_is_one_compile_finding(tmp_path: Path) -> None:
-    """MuJoCo compiles them; its Python bindings then fail at each name."""
+    """MuJoCo compiles such a model; its Python bindings then fail on every name."""
     scene = write_folder(kitchen(), tmp_path / "b") / "scene.xml"
     scene.write_bytes(scene.read_bytes().replace(b"bottle_1", b"bottle\xf51"))
     result = simulate(scene)
@@ -55,7 +55,7 @@ def test_a_scene_with_undecodable_names_is_one_compile_finding(tmp_path: Path) -
 
 
 def test_a_diverging_scene_writes_no_mujoco_log_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """MuJoCo appends its warnings to MUJOCO_LOG.TXT in the working folder, unless somebody else takes them."""
+    """MuJoCo appends warnings to MUJOCO_LOG.TXT in the working folder unless a warning handler is installed."""
     monkeypatch.chdir(tmp_path)
     Path("scene.xml").write_text(
         '<mujoco><worldbody><body name="b"><freejoint/><geom size="1" mass="1"/></body></worldbody></mujoco>'
@@ -69,7 +69,7 @@ def test_a_diverging_scene_writes_no_mujoco_log_file(tmp_path: Path, monkeypatch
 
 
 def test_a_door_without_a_gap_to_its_neighbours_jams(tmp_path: Path) -> None:
-    """Fronts that touch exactly: nothing penetrates in the sweep's first pose, yet friction holds the door."""
+    """Fronts that touch exactly do not penetrate in the sweep's first pose, but friction blocks the door."""
     jammed = [cabinet(f"c_{k}", x=0.6 * k, front_gap_m=0.0, gap_m=0.0) for k in range(3)]
     result = simulated(tmp_path, *jammed)
     assert min(joint.travel_reached for joint in result.joints) < 0.98
@@ -112,7 +112,7 @@ def test_an_object_sunk_into_the_counter_is_measured_with_its_depth(tmp_path: Pa
 
 @pytest.mark.parametrize("off_m", [-0.015, -0.003, 0.004, 0.011])
 def test_a_small_gap_or_overlap_with_the_support_is_corrected(tmp_path: Path, off_m: float) -> None:
-    """The counter's top is at 0.865 m; millimetres of a scan neither sink the bottle nor let it fall."""
+    """The counter's top is at 0.865 m; scan errors of millimetres neither sink the bottle nor let it drop."""
     result = simulated(tmp_path, counter("counter_1"), bottle("b", bottom_z=0.865 + off_m))
     assert result.findings == ()
     assert result.rest_penetration_m == 0.0
@@ -129,7 +129,7 @@ def test_an_obstacle_in_front_of_a_door_is_a_warning_only(tmp_path: Path) -> Non
 
 
 def test_an_unsupported_object_that_falls_is_reported_as_drift(tmp_path: Path) -> None:
-    """Over the counter's edge: its centre is not carried, a third of its foot is."""
+    """At the counter's edge: a third of the bottle's base is supported, its centre of mass is not."""
     result = simulated(tmp_path, counter("k"), bottle("b", bottom_z=0.9))
     assert "drift" not in {f.rule for f in result.findings}  # a support plate carries it
     scene = ArticulatedScene(
@@ -195,7 +195,7 @@ def test_openable_units_have_a_free_cavity(tmp_path: Path) -> None:
 
 
 def test_the_cavity_check_of_a_door_ignores_space_behind_its_neighbour(tmp_path: Path) -> None:
-    """A block behind the right door of a pair: the left door's space stays free, the right one's does not."""
+    """A block behind the right door of a pair: the left door's cavity stays free, the right door's does not."""
     item = double_door("d")
     filling = Box(
         name="filling",

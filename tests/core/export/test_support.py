@@ -34,5 +34,5 @@ def test_a_counter_far_below_does_not_count_as_support() -> None:
 
 
 def test_no_support_plate_is_placed_inside_another_object() -> None:
-    """Two bottles one inside the other's plate: better let it fall and be reported than jam both."""
+    """One bottle would be inside the other's plate: a reported fall is better than two jammed bottles."""
     assert bodies_of(bottle("b", bottom_z=0.8), bottle("lower", bottom_z=0.6)).count("b_support") == 0

@@ -48,7 +48,7 @@ def test_a_12_mm_bar_handle_is_not_removed_as_flying_pixels(distance):
 
 @pytest.mark.parametrize("width_m", [0.02, 0.028])
 def test_a_thin_bottle_neck_keeps_its_medium_confidence_depth(width_m):
-    """A phone's LiDAR gives medium confidence to each pixel near a step: of a neck 28 mm wide, to all of them."""
+    """A phone's LiDAR reports medium confidence near depth edges: on a neck 28 mm wide, for every pixel."""
     _, x = grid()
     neck = np.abs(x - 380) < width_m / 2 / 1.4 * 193 * 4
     depth = mixed(scene(1.7, 1.4, neck), noise=0.002)
@@ -59,7 +59,7 @@ def test_a_thin_bottle_neck_keeps_its_medium_confidence_depth(width_m):
 
 
 def test_the_edge_of_a_wide_object_is_not_a_ridge():
-    """There the sensor's doubt is about where the edge is, and a sure pixel beside it shows the surface."""
+    """Low confidence there concerns only the edge position; a confident pixel beside it measures the surface."""
     _, x = grid()
     depth = mixed(scene(2.0, 1.4, x < 380))
     assert ridges(depth).mean() < 1e-3

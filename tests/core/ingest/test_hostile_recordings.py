@@ -57,7 +57,7 @@ def test_ffmpeg_is_restricted_to_formats_without_external_references(tmp_path: P
 
 
 def test_a_video_decoder_crash_is_isolated_and_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What OpenCV reads from Python may fail there, at the end of a member with another checksum: it dereferences NULL then."""
+    """A wrong checksum makes reading fail at the end of the zip member; OpenCV then dereferences NULL and crashes."""
     monkeypatch.setattr(tempfile, "tempdir", None)
     monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()

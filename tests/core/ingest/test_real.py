@@ -47,7 +47,7 @@ def test_held_out_frames_are_within_10_mm_of_the_fused_kitchen(real, tmp_path):
 
 
 def test_the_kitchens_table_and_chairs_have_their_measured_heights(kitchen):
-    """Table 0.73 m, chair seat 0.46 m above the floor, by the doors' own level surfaces."""
+    """Table 0.73 m, chair seat 0.46 m above the floor, from the level surfaces of the mesh."""
     vertices, faces = kitchen.surface.vertices_world, kitchen.surface.faces
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     cross = np.cross(b - a, c - a)

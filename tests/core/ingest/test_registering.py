@@ -60,7 +60,7 @@ def test_already_registered_depth_is_unchanged_with_a_notice(scan, tmp_path):
 
 
 def test_reprojected_depth_matches_depth_rendered_in_the_target_camera():
-    """A slanted plane seen by a camera of 1.15 x the focal length, 40 mm aside, turned by nothing."""
+    """A slanted plane and a target camera with 1.15 x the focal length, shifted by 40 mm and not rotated."""
     source = Intrinsics(fx=200.0, fy=200.0, cx=80.0, cy=60.0, width=160, height=120)
     target = Intrinsics(fx=230.0, fy=230.0, cx=83.0, cy=58.0, width=160, height=120)
     at = np.array([0.04, -0.01, 0.02])

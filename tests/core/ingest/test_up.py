@@ -64,7 +64,7 @@ def test_parallel_walls_do_not_determine_up() -> None:
 def test_the_files_gravity_is_kept_unless_floor_and_walls_contradict_it(
     said_deg: float, planes: tuple[Plane, ...], kept: bool
 ) -> None:
-    """Half a degree is what a phone is off itself; without anything level nothing is corrected."""
+    """Half a degree is within a phone's own error; without a level surface gravity is not corrected."""
     up = choose_up(planes, (), [tilted(said_deg)], None)
     assert up.source == "file"
     assert up.corrected == (not kept)

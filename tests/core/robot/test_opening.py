@@ -41,7 +41,7 @@ def test_the_gripper_opens_and_closes_a_rotated_drawer(tmp_path: Path) -> None:
 
 
 def test_only_pad_friction_holds_the_handle(tmp_path: Path) -> None:
-    """A flat-sided bar pulled straight out leaves smooth pads behind: nothing else ties the gripper to it."""
+    """With nearly frictionless pads the gripper slips off a flat-sided bar: no weld holds the handle."""
     rig, travel = rig_and_travel(scene(tmp_path, kind="drawer", bar=LEVEL))
     way = best_way(rig, travel)
     assert way is not None
@@ -89,7 +89,7 @@ def test_a_blocking_obstacle_is_reported_by_name(tmp_path: Path) -> None:
 
 
 def test_a_blocked_wrist_lets_the_bar_rotate_in_the_grip(tmp_path: Path) -> None:
-    """A level bar on an upright hinge: with a wall where the wrist would go, it stays behind and the bar turns in the pads."""
+    """A level bar on a vertical hinge: a wall blocks the wrist, so its rotation lags and the bar turns in the pads."""
     free, travel = rig_and_travel(scene(tmp_path, bar=LEVEL))
     way = best_way(free, travel)
     assert way is not None

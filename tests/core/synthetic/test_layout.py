@@ -122,7 +122,7 @@ def test_the_capture_frame_is_y_up_with_origin_at_the_first_camera() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1, 5])
 def test_depth_at_an_objects_pixels_lies_on_its_box(seed: int) -> None:
-    """Without noise, and without handles, which the box leaves out."""
+    """Without noise, and without handles, which the box does not include."""
     kitchen = plan_kitchen(seed)
     patches = build_kitchen(kitchen)
     mesh = join_patches(patches)

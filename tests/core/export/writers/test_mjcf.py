@@ -33,7 +33,7 @@ def test_mjcf_and_urdf_give_the_same_mujoco_bodies_and_joints(good_folder: Path,
 
 
 def test_joints_do_not_creep_under_half_their_dry_friction(model: mujoco.MjModel) -> None:
-    """Half of it pulls on every joint for five seconds, which nothing else stops: none creeps by a milliradian or a mm."""
+    """Half the friction force acts on every joint for five seconds, without contacts: motion is below 1 mrad or 1 mm."""
     model.opt.gravity[:] = 0.0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     data = mujoco.MjData(model)
