@@ -57,7 +57,7 @@ def prompts(tmp_path: Path) -> Path:
     return path
 
 
-def test_help_and_version() -> None:
+def test_help_and_version_are_printed() -> None:
     assert "COMMAND" in started("--help", code=0)[0]
     assert r2c2r("--version", code=0)[0].startswith("r2c2r ")
 

@@ -32,7 +32,7 @@ def run(root: Path, areas: dict[str, int]) -> Workspace:
     return work
 
 
-def test_a_second_run_computes_nothing(tmp_path: Path) -> None:
+def test_a_second_run_with_equal_inputs_recomputes_nothing(tmp_path: Path) -> None:
     assert run(tmp_path, {"a": 1, "b": 2}).computed == ["segment/a", "segment/b"]
     assert run(tmp_path, {"a": 1, "b": 2}).computed == []
 

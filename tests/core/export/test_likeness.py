@@ -74,7 +74,7 @@ def test_an_ambiguous_placement_is_reported_with_the_alternative_angle(good_fold
     assert "90 degrees" in found.message
 
 
-def test_likeness_is_judged_by_its_own_rules_and_names_each_object_once() -> None:
+def test_likeness_ignores_other_rules_and_lists_each_object_once() -> None:
     about = [
         finding("hinge-unsure", "cabinet_1, cabinet_2", "no handle shows"),
         finding("travel", "drawer_1_slide", "a joint jams"),

@@ -131,7 +131,7 @@ def test_the_manifest_follows_its_schema(kitchen_bundle: tuple[Path, Certificate
     assert document["stages"] == [{"name": "segment", "backend": "geometric", "config": {"voxel_m": 0.01}}]
 
 
-def test_a_kitchen_that_falls_short_is_written_with_its_failed_certificate(tmp_path: Path, small_preview: None) -> None:
+def test_a_kitchen_that_fails_certification_is_still_written(tmp_path: Path, small_preview: None) -> None:
     scene = ArticulatedScene(name="t", objects=(cabinet("a"), cabinet("b", x=0.58)), layout_moves_m={}, warnings=())
     certificate = write_bundle(reconstruction(scene), tmp_path / "b.zip", ExportConfig(gripper=False))
     assert not certificate.passed
@@ -142,7 +142,7 @@ def test_a_kitchen_that_falls_short_is_written_with_its_failed_certificate(tmp_p
 
 
 @pytest.mark.parametrize("victim", ["write_body", "preview_png", "certify", "write_zip"])
-def test_a_full_disk_leaves_the_old_bundle_and_nothing_half_written(
+def test_a_full_disk_keeps_the_old_bundle_and_leaves_no_partial_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_preview: None, victim: str
 ) -> None:
     destination = tmp_path / "b.zip"
