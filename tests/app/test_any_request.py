@@ -31,7 +31,9 @@ def test_no_operation_ends_in_a_server_error(
 
 
 @pytest.mark.slow
-def test_no_walk_from_answer_to_request_meets_a_server_error(tmp_path: Path, kitchen_bundle: tuple[Path, Certificate]) -> None:
+def test_no_chain_of_requests_built_from_responses_ends_in_a_server_error(
+    tmp_path: Path, kitchen_bundle: tuple[Path, Certificate]
+) -> None:
     from any_request import make_template, walk_anywhere
 
     make_template(tmp_path, kitchen_bundle[0])

@@ -24,7 +24,7 @@ def test_too_many_bytes_or_files_are_refused(tmp_path: Path) -> None:
         check_archive(write(tmp_path / "many.zip", *((f"{n}", b"") for n in range(101))), "it", **LIMITS)
 
 
-def test_too_many_files_are_counted_before_any_of_them_is_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_archives_with_too_many_files_are_rejected_before_being_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def list_them(_: Path) -> None:
         raise AssertionError("each entry takes memory")
 
@@ -38,7 +38,7 @@ def test_too_many_files_are_counted_before_any_of_them_is_listed(tmp_path: Path,
 
 
 @pytest.mark.parametrize("cut", range(5))  # bytes of the signature before the chunk's border; the rest is after it
-def test_an_entry_whose_mark_is_cut_by_the_border_of_a_read_is_counted_once(tmp_path: Path, cut: int) -> None:
+def test_an_entry_signature_split_across_two_reads_is_counted_once(tmp_path: Path, cut: int) -> None:
     begins = "n" * (READ_BYTES - 46 - cut)  # the table's first entry takes 46 bytes and its name
     path = tmp_path / "cut.zip"
     table = b"".join(b"PK\x01\x02" + bytes(42) + name.encode() for name in (begins, "a", "b"))
@@ -64,7 +64,7 @@ def test_a_path_that_is_too_long_or_too_deep_is_refused(tmp_path: Path) -> None:
             check_archive(write(tmp_path / f"{name}.zip", (deep, b"x")), "it", **LIMITS)
 
 
-def test_two_files_of_one_name_are_refused(tmp_path: Path) -> None:
+def test_an_archive_with_duplicate_file_names_is_refused(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="Duplicate"):
         path = write(tmp_path / "twice.zip", ("a", b"1"), ("a", b"2"))
     with pytest.raises(CaptureError, match="two files named 'a'"):

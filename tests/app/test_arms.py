@@ -23,7 +23,7 @@ def config_of(web: Running, project: str, job: int) -> Any:
     return json.loads((request_of(web, project, job) / "request.json").read_text()).get("config")
 
 
-def test_a_run_lets_the_chosen_arm_try_the_bundle_and_the_result_before_is_stale(web: Running) -> None:
+def test_choosing_an_arm_makes_the_result_stale_and_configures_the_next_run(web: Running) -> None:
     project = web.sample()
     first = run(web, project)
     web.job(first, "done")
@@ -36,7 +36,7 @@ def test_a_run_lets_the_chosen_arm_try_the_bundle_and_the_result_before_is_stale
     assert web.patch(f"/api/projects/{project}", {"arm": "none"})["result"] == "stale"
 
 
-def test_its_licence_is_listed_and_where_it_is_not_installed_how_to_get_it(web: Running, bare: None) -> None:
+def test_arms_are_listed_with_licence_and_install_hint_if_missing(web: Running, bare: None) -> None:
     none, panda = web.get("/api/system")["arms"]
     assert (none["name"], none["available"]) == ("none", True)
     assert panda["licence"].startswith("Apache-2.0")

@@ -33,7 +33,7 @@ def view(tmp_path: Path) -> View:
     return View(server, Workspace(tmp_path / "work"))
 
 
-def test_a_joint_moves_its_body_as_its_axis_says() -> None:
+def test_a_joint_moves_its_body_along_its_axis_within_its_limits() -> None:
     shown = assemble(MagicMock(), "/scene", kitchen(), Style(), MagicMock())
     closed = shown.poses()
     shown.move({"drawer_1_slide": 0.2, "cabinet_1_hinge": 9.0})
@@ -44,7 +44,7 @@ def test_a_joint_moves_its_body_as_its_axis_says() -> None:
     assert np.arccos((np.trace(turned) - 1) / 2) == pytest.approx(upper)
 
 
-def test_a_box_is_drawn_round_each_body_of_the_chosen_object_and_goes_with_the_choice() -> None:
+def test_bounding_boxes_are_drawn_for_the_selected_object_only() -> None:
     server = MagicMock()
     server.scene.add_frame.side_effect = lambda node, **_: SimpleNamespace(name=node)
     server.scene.add_line_segments.side_effect = lambda node, ends, *_, **__: MagicMock(node=node, ends=ends)
@@ -59,7 +59,7 @@ def test_a_box_is_drawn_round_each_body_of_the_chosen_object_and_goes_with_the_c
     assert shown.boxes == []
 
 
-def test_a_ray_meets_the_first_face_and_nothing_that_is_hidden() -> None:
+def test_a_ray_hits_the_nearest_face_and_ignores_hidden_objects() -> None:
     shown = assemble(MagicMock(), "/scene", kitchen(), Style(), MagicMock())
     cabinet = next(item for item in kitchen().objects if item.name == "cabinet_1")
     middle = cabinet.world_from_object.translation
@@ -73,7 +73,7 @@ def test_a_ray_meets_the_first_face_and_nothing_that_is_hidden() -> None:
     assert shown.hit(start, AHEAD) is None
 
 
-def test_a_click_is_numbered_and_says_the_object(view: View) -> None:
+def test_a_click_reports_its_number_and_the_object_hit(view: View) -> None:
     view.show({"mode": "scene", "cloud": False})
     middle = next(item for item in kitchen().objects if item.name == "drawer_1").world_from_object.translation
     origin = middle + np.array([0.0, -3.0, 0.0])
@@ -83,7 +83,7 @@ def test_a_click_is_numbered_and_says_the_object(view: View) -> None:
     assert (view.picked.number, view.picked.name, view.picked.point) == (2, "", None)
 
 
-def test_corrections_are_shown_before_any_run_and_named_only_where_they_change_something(view: View) -> None:
+def test_corrections_are_previewed_before_a_run_and_listed_if_they_have_effect(view: View) -> None:
     def shown(**corrections: Any) -> list[str]:
         view.show({"mode": "scene", "cloud": False, "corrections": corrections})
         return view.preview
@@ -97,7 +97,7 @@ def test_corrections_are_shown_before_any_run_and_named_only_where_they_change_s
     assert "counter_1" not in {body.object_name for body in view.assembly.plan.bodies}
 
 
-def test_choosing_and_hiding_leave_the_scene_and_the_camera_where_they_are(view: View) -> None:
+def test_selecting_and_hiding_keep_the_scene_and_the_camera(view: View) -> None:
     view.show({"mode": "scene", "cloud": False})
     built = view.assembly
     camera = view.server.get_clients()[0].camera
@@ -107,7 +107,7 @@ def test_choosing_and_hiding_leave_the_scene_and_the_camera_where_they_are(view:
     assert camera.position == (9.0, 9.0, 9.0)
 
 
-def test_a_long_lens_keeps_what_is_looked_at_as_large_as_it_was(view: View) -> None:
+def test_switching_to_the_long_lens_keeps_the_apparent_size_of_the_target(view: View) -> None:
     camera = view.server.get_clients()[0].camera
     view.lens.use(parallel=True)
     assert camera.fov == LONG_FOV
@@ -120,12 +120,12 @@ def test_a_long_lens_keeps_what_is_looked_at_as_large_as_it_was(view: View) -> N
 @pytest.mark.parametrize(
     ("axis", "way"), [("front", (0, -1, 0)), ("right", (1, 0, 0)), ("left", (-1, 0, 0)), ("top", (0, 0, 1))]
 )
-def test_sides_are_those_of_who_faces_the_fronts(axis: Any, way: tuple[int, int, int]) -> None:
+def test_side_views_are_named_from_a_viewer_facing_the_fronts(axis: Any, way: tuple[int, int, int]) -> None:
     place, target = from_axis(axis, -AHEAD, -np.ones(3), np.ones(3))
     assert np.allclose((place - target) / np.linalg.norm(place - target), way, atol=2e-3)
 
 
-def test_a_clip_box_cuts_meshes_and_what_a_click_meets_and_lines_the_cut() -> None:
+def test_a_clip_box_clips_meshes_and_ray_hits_and_outlines_the_cut() -> None:
     server = MagicMock()
     whole = assemble(MagicMock(), "/scene", kitchen(), Style(), MagicMock())
     cut = assemble(server, "/scene", kitchen(), Style(clip=((0.0, 0.5, 0.0), (1.0, 1.0, 1.0))), MagicMock())
@@ -144,7 +144,7 @@ def test_a_clip_box_cuts_meshes_and_what_a_click_meets_and_lines_the_cut() -> No
     assert cut.parts["cabinet_1"][0] == pytest.approx(whole.parts["cabinet_1"][0])
 
 
-def test_a_side_of_the_box_at_its_end_cuts_nothing_away() -> None:
+def test_a_clip_box_covering_the_whole_scene_removes_no_faces() -> None:
     whole = assemble(MagicMock(), "/scene", kitchen(), Style(), MagicMock())
     same = assemble(MagicMock(), "/scene", kitchen(), Style(clip=((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))), MagicMock())
     assert {name: [len(shape.faces) for shape in shapes] for name, shapes in same.shapes.items()} == {
@@ -152,7 +152,7 @@ def test_a_side_of_the_box_at_its_end_cuts_nothing_away() -> None:
     }
 
 
-def test_what_is_cut_stands_where_its_joints_have_it() -> None:
+def test_clipping_is_applied_to_bodies_at_their_joint_positions() -> None:
     whole = assemble(MagicMock(), "/scene", kitchen(), Style(), MagicMock())
     low, high = whole.parts["drawer_1"]
     box = ((0.0, 0.0, 0.0), (1.0, float(low[1] + high[1]) / 2, 1.0))
@@ -165,7 +165,7 @@ def test_what_is_cut_stands_where_its_joints_have_it() -> None:
     assert back({"drawer_1_slide": 0.1}) == pytest.approx(back({}) + 0.1, abs=1e-6)  # pulled out, more of it is before the cut
 
 
-def test_surfaces_are_coloured_by_how_far_they_are_from_the_scan() -> None:
+def test_surfaces_are_coloured_by_distance_to_the_scan() -> None:
     tree = cKDTree(np.zeros((1, 3)))
     points = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.015], [0.0, 0.0, 0.04], [0.0, 0.0, 0.3]])
     found = heat.colours("distance", tree, points)
@@ -175,7 +175,7 @@ def test_surfaces_are_coloured_by_how_far_they_are_from_the_scan() -> None:
     assert brightness[3] > brightness[2] >= brightness[0]
 
 
-def test_a_heat_map_paints_every_body_in_small_triangles(view: View) -> None:
+def test_a_heat_map_subdivides_every_body_into_small_triangles(view: View) -> None:
     view.show({"mode": "scene", "cloud": False, "draw": "unobserved"})
     assert view.assembly is not None
     for shapes in view.assembly.shapes.values():
@@ -186,7 +186,7 @@ def test_a_heat_map_paints_every_body_in_small_triangles(view: View) -> None:
     assert drawn.visual.kind == "vertex"
 
 
-def test_the_clip_box_cuts_the_scan_too_and_says_how_large_what_it_cuts_is(view: View) -> None:
+def test_the_clip_box_clips_the_scan_and_the_selected_object_has_its_extent(view: View) -> None:
     view.show({"mode": "cloud"})
     assert view.span_m is not None
 

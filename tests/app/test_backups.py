@@ -37,7 +37,7 @@ def findings(data: Path) -> set[tuple[str, str]]:
     return {(found.what, Path(found.where).name) for found in check_data(data)}
 
 
-def test_a_backup_taken_while_the_server_writes_is_whole(start: Start, tmp_path: Path) -> None:
+def test_a_backup_taken_while_the_server_writes_is_consistent(start: Start, tmp_path: Path) -> None:
     with start() as web:
         project = web.sample()
         drawer = web.get(f"/api/projects/{project}/objects")[0]["id"]
@@ -53,7 +53,7 @@ def test_a_backup_taken_while_the_server_writes_is_whole(start: Start, tmp_path:
     assert [path.name for path in (tmp_path / "copy").iterdir() if path.is_file()] == ["r2c2r.db"]  # no -wal left behind
 
 
-def test_what_was_lost_comes_back_and_what_is_there_stays(
+def test_restore_recreates_missing_files_and_keeps_existing_ones(
     kept: tuple[Path, str], tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data, project = kept
@@ -81,7 +81,7 @@ def test_a_database_alone_is_backed_up_and_restored(kept: tuple[Path, str], tmp_
     assert findings(data) == set()
 
 
-def test_nothing_is_restored_under_a_running_server_or_from_what_is_no_backup(
+def test_restore_is_refused_under_a_running_server_or_from_an_invalid_backup(
     kept: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data, _ = kept
@@ -97,7 +97,7 @@ def test_nothing_is_restored_under_a_running_server_or_from_what_is_no_backup(
     assert (data / "r2c2r.db").read_bytes() == before
 
 
-def test_check_data_finds_what_is_missing_unknown_damaged_and_open(
+def test_check_data_reports_missing_unknown_damaged_and_exposed_files(
     kept: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data, project = kept
@@ -138,7 +138,7 @@ def test_check_data_finds_what_is_missing_unknown_damaged_and_open(
     assert main(["check-data", str(tmp_path / "nowhere")]) == 2
 
 
-def test_an_older_database_is_checked_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_data_reads_an_outdated_database_without_changing_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     older, path = revisions()[-2], tmp_path / "r2c2r.db"
     engine = create_engine(f"sqlite:///{path}")
     migrate(engine, older)
@@ -154,13 +154,15 @@ def test_an_older_database_is_checked_as_it_is(tmp_path: Path, capsys: pytest.Ca
     assert [found.name for found in tmp_path.iterdir()] == ["r2c2r.db"]
 
 
-def test_a_folder_without_a_database_gets_none_by_being_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_data_creates_no_database_in_an_empty_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check-data", str(tmp_path)]) == 2
     assert "no database yet" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
-def test_what_takes_long_says_where_it_is(kept: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_backup_restore_and_check_data_report_progress(
+    kept: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     data, _ = kept
     assert main(["backup", str(data), "-o", str(tmp_path / "copy")]) == 0
     assert main(["restore", str(tmp_path / "copy"), str(data)]) == 0
@@ -172,7 +174,7 @@ def test_what_takes_long_says_where_it_is(kept: tuple[Path, str], tmp_path: Path
     assert any(line.startswith("check-data 10 % files of project") for line in said)
 
 
-def test_rows_without_their_parents_are_told(kept: tuple[Path, str]) -> None:
+def test_rows_with_missing_parents_are_reported_as_damage(kept: tuple[Path, str]) -> None:
     data, _ = kept
     connection = sqlite3.connect(data / "r2c2r.db")
     connection.execute("INSERT INTO prompt_points (object_id, frame, x, y, label) VALUES (999, 0, 1, 1, 1)")
@@ -181,7 +183,7 @@ def test_rows_without_their_parents_are_told(kept: tuple[Path, str]) -> None:
     assert ("damaged", "r2c2r.db") in findings(data)
 
 
-def test_the_doctor_tells_of_a_folder_that_others_may_use(tmp_path: Path) -> None:
+def test_the_doctor_reports_a_data_folder_accessible_to_other_users(tmp_path: Path) -> None:
     from r2c2r_core.doctor import examine_machine
 
     tmp_path.chmod(0o750)
@@ -192,6 +194,6 @@ def test_the_doctor_tells_of_a_folder_that_others_may_use(tmp_path: Path) -> Non
     assert found.state == "ok"
 
 
-def test_uploads_under_way_are_no_findings(web: Running) -> None:
+def test_uploads_in_progress_are_not_reported_as_problems(web: Running) -> None:
     web.post("/api/uploads", {"file_name": "Kitchen.r3d", "size": 10})
     assert {what for what, _ in findings(web.settings.data_dir)} <= {"open"}

@@ -22,11 +22,11 @@ def said(older: dict, newer: dict) -> set[str]:  # type: ignore[type-arg]
     return {f"{c.object}: {c.text}" for c in changes({"objects": [older]}, {"objects": [newer]})}
 
 
-def test_two_bundles_with_the_same_objects_do_not_differ() -> None:
+def test_bundles_with_the_same_objects_have_no_differences() -> None:
     assert said(DOOR, DOOR) == set()
 
 
-def test_what_a_person_would_see_is_said_with_both_values() -> None:
+def test_visible_differences_are_listed_with_both_values() -> None:
     moved = {**DOOR, "world_from_object": [[1, 0, 0, 0.03], [0, 1, 0, 0.04], [0, 0, 1, 0], [0, 0, 0, 1]]}
     assert said(DOOR, moved) == {"a: moved by 50 mm"}
     assert said(DOOR, {**DOOR, "dimensions_m": [0.5, 0.6, 0.72]}) == {"a: size 50.0 × 60.0 × 70.0 → 50.0 × 60.0 × 72.0 cm"}
@@ -36,7 +36,7 @@ def test_what_a_person_would_see_is_said_with_both_values() -> None:
     assert said(DOOR, {**DOOR, "name": "b"}) == {"a: taken out", "b: new: cabinet"}
 
 
-def test_a_bundle_of_some_formats_has_those_scenes_and_the_proof(tmp_path: Path) -> None:
+def test_a_bundle_limited_to_formats_has_their_scenes_manifest_and_report(tmp_path: Path) -> None:
     whole = tmp_path / "whole.zip"
     scenes = {"scene.urdf", "scene.srdf", "scene.xml", "scene.usda", "scene.usdz", "scene.glb", "package.xml", "ros/scene.urdf"}
     assets = {f"assets/a/a{suffix}" for suffix in (".urdf", ".xml", ".usda", ".glb")}

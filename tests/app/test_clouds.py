@@ -13,7 +13,7 @@ from tests.app.test_reviews import Reviewed, reviewed
 __all__ = ["reviewed"]
 
 
-def test_the_points_of_an_object_lie_where_depth_and_masks_put_them(reviewed: Reviewed) -> None:
+def test_the_point_cloud_of_an_object_lies_within_its_reported_size(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     found = web.get(f"/api/projects/{project}/objects/{number}/cloud")
     points = np.frombuffer(base64.b64decode(found["xyz_mm"]), "<i2").reshape(-1, 3)
@@ -29,7 +29,7 @@ def test_an_object_without_masks_has_no_points(reviewed: Reviewed) -> None:
     assert web.get(f"/api/projects/{project}/objects/{bare}/cloud")["count"] == 0
 
 
-def test_clicks_that_belong_together_are_one_change(reviewed: Reviewed) -> None:
+def test_clicks_sent_together_are_one_undoable_change(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     base = f"/api/projects/{project}"
     points = [{"frame": 3, "x": 40, "y": 40, "label": 1}, {"frame": 3, "x": 5, "y": 40, "label": 0}]
@@ -41,7 +41,7 @@ def test_clicks_that_belong_together_are_one_change(reviewed: Reviewed) -> None:
 
 
 @pytest.mark.parametrize("look", ["ghost", "outline", "residual"])
-def test_the_placed_mesh_is_drawn_for_the_camera_of_a_photo(reviewed: Reviewed, look: str) -> None:
+def test_the_placed_mesh_is_rendered_from_the_camera_of_a_photo(reviewed: Reviewed, look: str) -> None:
     web, project, number = reviewed
     shown = web.get(f"/api/projects/{project}/objects/{number}/photos")
     assert "placed" in shown["of"]
@@ -57,7 +57,7 @@ def test_the_placed_mesh_is_drawn_for_the_camera_of_a_photo(reviewed: Reviewed, 
     assert web.client.get(f"/media/{project}/overlay/{number}/999.png").status_code in (404, 409)
 
 
-def test_depth_of_another_reading_is_told(reviewed: Reviewed) -> None:
+def test_stored_depth_of_another_resolution_is_answered_with_not_ready(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     shown = web.get(f"/api/projects/{project}/objects/{number}/photos")
     frame = shown["photos"][0]["frame"]

@@ -21,7 +21,7 @@ from app.db.tables import Computing, Job, Project
         ([], [(1.0, 2.0), (2.5, 4.0), (4.0 + JOINED_S + 0.1, 10.0)], 3.0 + 6.0 - JOINED_S - 0.1),  # short gaps are ignored
     ],
 )
-def test_what_goes_on_at_the_same_time_counts_once(
+def test_overlapping_intervals_of_computing_count_once(
     tmp_path: Path, jobs: list[tuple[float, float | None]], live: list[tuple[float, float]], seconds: float
 ) -> None:
     engine = open_engine(tmp_path / "r.db")

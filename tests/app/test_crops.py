@@ -14,7 +14,7 @@ CROP: dict[str, Any] = {"corner_m": [0.1, 0.2, 0.3], "edges_m": [[0.4, 0.0, 0.0]
 MUG = {"category": "mug", "points": [{"frame": 3, "x": 152, "y": 40}]}
 
 
-def test_a_crop_box_is_set_undone_and_computes_the_masks_anew(web: Running) -> None:
+def test_setting_a_crop_box_recomputes_the_masks_and_can_be_undone(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     made = web.post(f"{at}/objects", MUG, 201)
@@ -35,7 +35,7 @@ def test_a_crop_box_is_set_undone_and_computes_the_masks_anew(web: Running) -> N
     assert web.post(f"{at}/undo", {"object": made["id"]})["object"]["crop"] == CROP
 
 
-def test_prompts_json_holds_the_box_from_version_3_and_is_read_again(web: Running) -> None:
+def test_prompts_json_version_3_stores_the_crop_box_and_is_read_back(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     made = web.post(f"{at}/objects", {**MUG, "name": "cup"}, 201)
@@ -52,7 +52,7 @@ def test_prompts_json_holds_the_box_from_version_3_and_is_read_again(web: Runnin
 
 
 @pytest.mark.parametrize("edges", [CROP["edges_m"][:2], [[1, 0, 0], [1, 1, 0], [0, 0, 1]], [[0, 0, 0]] * 3])
-def test_what_is_no_box_is_refused(web: Running, edges: Any) -> None:
+def test_an_invalid_crop_box_is_not_stored(web: Running, edges: Any) -> None:
     project = web.sample()
     made = web.post(f"/api/projects/{project}/objects", MUG, 201)
     web.client.patch(f"/api/projects/{project}/objects/{made['id']}", json={"crop": {**CROP, "edges_m": edges}})
@@ -60,7 +60,7 @@ def test_what_is_no_box_is_refused(web: Running, edges: Any) -> None:
     assert item["crop"] is None
 
 
-def test_a_box_is_offered_around_the_points_and_drawn_by_the_camera(reviewed: Reviewed) -> None:
+def test_the_suggested_crop_box_contains_the_centre_and_frames_have_cameras(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     found = web.get(f"/api/projects/{project}/objects/{number}/cloud")
     around = found["around"]

@@ -90,7 +90,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("kind", UNUSABLE)
-def test_a_database_that_cannot_be_used_is_one_line_before_anything_is_printed(
+def test_an_unusable_database_is_reported_in_one_line_and_left_unchanged(
     kind: str, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("uvicorn.Server.run", lambda *_, **__: None)
@@ -108,9 +108,7 @@ def test_a_database_that_cannot_be_used_is_one_line_before_anything_is_printed(
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes everything")
-def test_a_database_that_may_not_be_written_is_one_line(
-    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_read_only_database_is_reported_in_one_line(sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copy(sound, tmp_path / "r2c2r.db").chmod(0o400)
     tmp_path.chmod(0o500)
     try:
@@ -120,7 +118,7 @@ def test_a_database_that_may_not_be_written_is_one_line(
     assert "may not be" in capsys.readouterr().err
 
 
-def test_what_sqlite_says_is_taken_by_its_code(tmp_path: Path) -> None:
+def test_sqlite_errors_are_classified_by_error_code(tmp_path: Path) -> None:
     def said(code: int, text: str) -> str:
         error = sqlite3.OperationalError(text)
         error.sqlite_errorcode = code
@@ -136,7 +134,7 @@ def test_what_sqlite_says_is_taken_by_its_code(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("left", [None, b""])
-def test_no_empty_database_is_made_beside_projects(
+def test_no_empty_database_is_created_beside_project_folders(
     left: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("uvicorn.Server.run", lambda *_, **__: None)
@@ -151,7 +149,7 @@ def test_no_empty_database_is_made_beside_projects(
     assert not (tmp_path / "r2c2r.db").exists() or (tmp_path / "r2c2r.db").read_bytes() == b""
 
 
-def test_a_copy_is_kept_before_a_migration_and_only_the_newest_few(tmp_path: Path) -> None:
+def test_a_migration_keeps_a_backup_and_only_the_newest_three_remain(tmp_path: Path) -> None:
     older, path = revisions()[-2], tmp_path / "r2c2r.db"
     engine = create_engine(f"sqlite:///{path}")
     migrate(engine, older)
@@ -171,7 +169,7 @@ def test_a_copy_is_kept_before_a_migration_and_only_the_newest_few(tmp_path: Pat
     connection.close()
 
 
-def test_what_is_stored_is_for_its_owner_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stored_files_are_readable_by_their_owner_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", __import__("io").StringIO("three plain words\n"))
     was = os.umask(0o022)
     try:
@@ -196,7 +194,7 @@ def modes(folder: Path) -> set[int]:
     return {path.stat().st_mode & 0o777 for path in (folder, *folder.rglob("*"))}
 
 
-def test_an_engine_of_a_damaged_file_says_so(tmp_path: Path) -> None:
+def test_opening_an_engine_on_a_damaged_file_raises_database_unusable(tmp_path: Path) -> None:
     garbage(tmp_path / "r2c2r.db")
     with pytest.raises(DatabaseUnusable, match="no database"):
         open_engine(tmp_path / "r2c2r.db")

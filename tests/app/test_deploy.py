@@ -162,7 +162,7 @@ def listens(port: int) -> bool:
     return True
 
 
-def test_pages_sockets_and_recordings_come_through(proxied: Proxied, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pages_websockets_and_uploads_pass_the_proxy(proxied: Proxied, monkeypatch: pytest.MonkeyPatch) -> None:
     with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
         entered = client.get(f"/?token={proxied.settings.launch_token}")
         assert "Secure" in entered.headers["set-cookie"]
@@ -183,7 +183,7 @@ def test_pages_sockets_and_recordings_come_through(proxied: Proxied, monkeypatch
     assert (proxied.settings.data_dir / "projects" / project / "source" / "kitchen.r3d").read_bytes() == LARGE
 
 
-def test_what_a_browser_says_of_its_address_is_not_believed(proxied: Proxied) -> None:
+def test_forwarded_address_headers_of_a_browser_are_ignored(proxied: Proxied) -> None:
     with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
         headers = {"X-Requested-With": "tests", "X-Forwarded-For": "203.0.113.9", "X-Forwarded-Proto": "http"}
         assert client.get("/?token=wrong", headers=headers).status_code == 401
@@ -192,7 +192,7 @@ def test_what_a_browser_says_of_its_address_is_not_believed(proxied: Proxied) ->
     assert {line["client"] for line in lines} == {"127.0.0.1"}
 
 
-def test_what_a_browser_says_of_who_it_is_does_not_come_through(proxied: Proxied) -> None:
+def test_user_headers_of_a_browser_do_not_pass_the_proxy(proxied: Proxied) -> None:
     with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
         for headers in ({"X-Forwarded-User": "ann"}, {"x-forwarded-user": "ann"}):
             assert client.get("/api/system", headers=headers).status_code == 401
@@ -200,7 +200,9 @@ def test_what_a_browser_says_of_who_it_is_does_not_come_through(proxied: Proxied
 
 
 @pytest.mark.parametrize("name", ["nginx", "caddy"])
-def test_whom_the_proxy_lets_in_is_in_under_that_name_alone(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_user_authenticated_by_the_proxy_is_signed_in_under_that_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with (
         behind_proxy(name, tmp_path, monkeypatch, signs_in=True) as proxied,
         httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client,
@@ -212,9 +214,7 @@ def test_whom_the_proxy_lets_in_is_in_under_that_name_alone(name: str, tmp_path:
 
 
 @pytest.mark.parametrize("name", ["nginx", "caddy"])
-def test_of_several_servers_one_keeps_a_3d_view_an_upload_or_a_project_and_any_answers_the_rest(
-    name: str, tmp_path: Path
-) -> None:
+def test_the_proxy_pins_views_uploads_and_projects_to_one_server(name: str, tmp_path: Path) -> None:
     program, port = found(name), free_port()
     with named_server("a") as a, named_server("b") as b:
         given = {"nginx": nginx, "caddy": caddy}[name](tmp_path, port, a, beside=b)
@@ -255,7 +255,7 @@ def named_server(name: str) -> Iterator[int]:
             thread.join()
 
 
-def test_the_containers_run_commands_that_exist() -> None:
+def test_compose_services_use_existing_commands_volumes_and_files() -> None:
     compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
     services, server = compose["services"], compose["services"]["r2c2r"]
     given = build_parser().parse_args([part.replace("${R2C2R_NAME:?}", NAME) for part in server["command"]])
@@ -272,7 +272,7 @@ def test_the_containers_run_commands_that_exist() -> None:
     assert "/readyz" in " ".join(server["healthcheck"]["test"])
 
 
-def test_the_containerfile_takes_the_steps_of_the_checkout() -> None:
+def test_the_containerfile_refers_to_existing_scripts_and_extras() -> None:
     text = (DEPLOY / "Containerfile").read_text()
     root = DEPLOY.parent
     for path in re.findall(r"(?:bash|-c) (\S+\.(?:sh|txt))", text):
@@ -284,7 +284,7 @@ def test_the_containerfile_takes_the_steps_of_the_checkout() -> None:
     assert "USER r2c2r" in text
 
 
-def test_kubernetes_objects_follow_the_apis_schema_and_run_commands_that_exist() -> None:
+def test_kubernetes_objects_are_valid_and_use_existing_commands() -> None:
     objects = list(yaml.safe_load_all((DEPLOY / "kubernetes.yaml").read_text()))
     kustomization = yaml.safe_load((DEPLOY / "kustomization.yaml").read_text())
     made = {entry["name"]: entry for entry in kustomization["configMapGenerator"]}
@@ -306,7 +306,7 @@ def test_kubernetes_objects_follow_the_apis_schema_and_run_commands_that_exist()
     assert all(name in known for name in settings)
 
 
-def test_a_probe_by_the_kubelet_is_answered(tmp_path: Path) -> None:
+def test_kubelet_probes_are_answered_with_200(tmp_path: Path) -> None:
     objects = list(yaml.safe_load_all((DEPLOY / "kubernetes.yaml").read_text()))
     (server,) = next(each for each in objects if each["kind"] == "StatefulSet")["spec"]["template"]["spec"]["containers"]
     settings = Settings(data_dir=tmp_path, allowed_hosts=(*LOOPBACK, NAME), accounts_only=True)

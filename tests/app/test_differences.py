@@ -50,7 +50,7 @@ def compared(web: Running) -> tuple[Running, str, int]:
     return web, project, number
 
 
-def test_a_deeper_candidate_differs_behind_its_front(compared: tuple[Running, str, int]) -> None:
+def test_a_deeper_candidate_differs_only_behind_its_front(compared: tuple[Running, str, int]) -> None:
     web, project, number = compared
     found = web.get(f"/api/projects/{project}/objects/{number}/differences?against=c0")
     (other,) = found["candidates"]
@@ -64,7 +64,7 @@ def test_a_deeper_candidate_differs_behind_its_front(compared: tuple[Running, st
     ]
 
 
-def test_the_strip_turns_and_marks_what_differs(compared: tuple[Running, str, int]) -> None:
+def test_the_turntable_strip_highlights_surface_that_differs(compared: tuple[Running, str, int]) -> None:
     web, project, number = compared
     plain, marked = (strip_of(web, f"/media/{project}/candidates/{number}/c1/turns.png?against={name}") for name in ("", "c0"))
     assert plain.shape == (TURN_SIZE, TURN_SIZE * TURNS, 4)
@@ -76,14 +76,14 @@ def test_the_strip_turns_and_marks_what_differs(compared: tuple[Running, str, in
     assert not (itself[..., 2] > itself[..., 0] + 60.0).any()
 
 
-def test_a_candidate_that_is_not_there_is_refused(compared: tuple[Running, str, int]) -> None:
+def test_an_unknown_candidate_is_not_found(compared: tuple[Running, str, int]) -> None:
     web, project, number = compared
     web.get(f"/api/projects/{project}/objects/{number}/differences?against=c9", 404)
     web.get(f"/media/{project}/candidates/{number}/c9/turns.png", 404)
     web.get(f"/media/{project}/candidates/{number}/c0/turns.png?against=c9", 404)
 
 
-def test_a_turned_mesh_stays_in_its_picture() -> None:
+def test_a_turntable_mesh_stays_inside_its_image() -> None:
     image = cv2.imdecode(np.frombuffer(turntable(pieces(), np.eye(3)), np.uint8), cv2.IMREAD_UNCHANGED)
     for side in np.split(image, TURNS, axis=1):
         shown = side[..., 3] > 0

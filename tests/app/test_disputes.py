@@ -107,9 +107,7 @@ def width_m(end: dict[str, Any]) -> float:
     return float(np.linalg.norm(right - left))
 
 
-def test_a_click_on_the_same_panel_parts_both_and_taken_back_leaves_it_whole(
-    desk: Any, said: Lines, doors: list[ObjectPrompt]
-) -> None:
+def test_a_second_click_on_a_panel_splits_its_front_until_removed(desk: Any, said: Lines, doors: list[ObjectPrompt]) -> None:
     first, second = (told(number, door) for number, door in enumerate(doors, 1))
     desk.put(segment(first, [first]))
     alone = ended(said, 1)
@@ -137,7 +135,7 @@ def test_a_click_on_the_same_panel_parts_both_and_taken_back_leaves_it_whole(
     assert not [line for line in said if "again" in line]
 
 
-def test_masks_stored_before_the_process_started_are_drawn_anew_where_clicks_on_others_differ(
+def test_masks_from_before_a_restart_are_recomputed_if_other_clicks_differ(
     desk: Any, said: Lines, doors: list[ObjectPrompt]
 ) -> None:
     objects = [told(1, doors[0], []), told(2, doors[1], on(doors[0]))]
@@ -146,7 +144,7 @@ def test_masks_stored_before_the_process_started_are_drawn_anew_where_clicks_on_
     assert said == [{"object": 1, "key": "key-1", "again": [2]}]
 
 
-def test_masks_on_their_way_end_when_they_are_asked_for_anew(
+def test_a_new_request_cancels_masks_that_are_still_streaming(
     desk: Any, said: Lines, doors: list[ObjectPrompt], session: GeometricSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else what is left of them would be taken for the new ones."""
@@ -192,7 +190,7 @@ def spans(web: Running, project: str, *objects: int) -> list[tuple[int, int] | N
     return [n and (shown[n]["left"], shown[n]["left"] + shown[n]["box_width"]) for n in done]
 
 
-def test_a_neighbours_masks_are_drawn_anew_and_every_tab_hears_why(panels: Callable[..., Any]) -> None:
+def test_masks_of_a_neighbour_are_recomputed_and_every_tab_is_notified(panels: Callable[..., Any]) -> None:
     with panels() as web:
         project = web.sample()
         first = web.post(f"/api/projects/{project}/objects", clicked(20.5), 201)
@@ -220,9 +218,7 @@ def test_a_neighbours_masks_are_drawn_anew_and_every_tab_hears_why(panels: Calla
 @pytest.mark.parametrize(
     "change", ["delete", "undo", *(pytest.param(other, marks=pytest.mark.slow) for other in ("move", "remove", "thing"))]
 )
-def test_a_front_is_whole_again_also_where_the_server_was_started_anew_meanwhile(
-    panels: Callable[..., Any], change: str
-) -> None:
+def test_a_split_front_is_restored_also_after_a_server_restart(panels: Callable[..., Any], change: str) -> None:
     with panels() as web:
         project = web.sample()
         first, second = (web.post(f"/api/projects/{project}/objects", clicked(x), 201) for x in (20.5, 60.5))
@@ -243,7 +239,7 @@ def test_a_front_is_whole_again_also_where_the_server_was_started_anew_meanwhile
         web.until(lambda: spans(web, project, first["id"]) == [(0, 80)])
 
 
-def test_masks_stored_before_a_click_that_parts_them_are_drawn_anew_when_the_page_is_opened(panels: Callable[..., Any]) -> None:
+def test_opening_the_page_recomputes_masks_that_a_later_click_splits(panels: Callable[..., Any]) -> None:
     with panels() as web:
         project = web.sample()
         first = web.post(f"/api/projects/{project}/objects", clicked(20.5), 201)
@@ -255,7 +251,7 @@ def test_masks_stored_before_a_click_that_parts_them_are_drawn_anew_when_the_pag
         web.until(lambda: spans(web, project, first["id"]) == [(0, 40)])
 
 
-def test_objects_of_a_prompts_file_part_each_other(panels: Callable[..., Any]) -> None:
+def test_objects_of_a_prompts_file_split_a_shared_panel(panels: Callable[..., Any]) -> None:
     with panels() as web:
         project = web.sample()
         objects = [{**clicked(x), "name": f"door_{x:.0f}"} for x in (20.5, 60.5)]
@@ -268,7 +264,7 @@ def test_objects_of_a_prompts_file_part_each_other(panels: Callable[..., Any]) -
 
 
 @pytest.mark.parametrize(("parted_at", "source"), [(None, "run"), (130.5, "live")])
-def test_masks_of_a_run_are_drawn_anew_where_it_parted_them_at_a_click_that_is_gone(
+def test_masks_of_a_run_split_at_a_removed_click_are_recomputed(
     panels: Callable[..., Any], parted_at: float | None, source: str
 ) -> None:
     with panels() as web:

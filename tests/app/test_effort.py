@@ -39,7 +39,7 @@ def test_clicks_verdicts_and_minutes_are_counted_by_person_and_object(web: Runni
     assert (found["bea", ""]["comments"], found["bea", ""]["minutes"]) == ("1", "1.0")
 
 
-def test_a_name_that_looks_like_a_formula_is_text(web: Running) -> None:
+def test_a_name_that_looks_like_a_formula_is_escaped_in_the_csv(web: Running) -> None:
     project = web.sample()
     web.patch(f"/api/projects/{project}", {"name": "=HYPERLINK(1)"})
     assert {line["project"] for line in lines(web, project)} == {"'=HYPERLINK(1)"}

@@ -32,7 +32,7 @@ def drawn(web: Running, project: str) -> dict[str, Any]:
     return found
 
 
-def test_planes_are_drawn_when_the_scan_is_prepared(web: Running) -> None:
+def test_preparing_a_scan_renders_its_elevation_planes(web: Running) -> None:
     project = web.sample()
     (plane,) = drawn(web, project)["items"]
     assert (plane["columns"], plane["rows"], plane["cell_m"]) == (240, 90, 0.01)
@@ -53,7 +53,7 @@ def test_a_drawn_front_is_an_object_with_masks_and_no_click(web: Running) -> Non
     assert found["corners_m"] == CORNERS
 
 
-def test_what_is_drawn_is_changed_undone_and_redone(web: Running) -> None:
+def test_a_drawn_front_is_changed_undone_and_redone(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     made = web.post(f"{at}/objects", DRAWN, 201)
@@ -71,7 +71,7 @@ def test_what_is_drawn_is_changed_undone_and_redone(web: Running) -> None:
     assert web.patch(here, {"name": "renamed"})["front"]["corners_m"][1][0] == 0.7  # a missing field is not null
 
 
-def test_a_hinge_computes_no_masks_anew(web: Running) -> None:
+def test_changing_a_hinge_does_not_recompute_the_masks(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     made = web.post(f"{at}/objects", DRAWN, 201)
@@ -85,7 +85,7 @@ def test_a_hinge_computes_no_masks_anew(web: Running) -> None:
     assert turned["segment"] == "done"
 
 
-def test_prompts_json_holds_what_was_drawn_and_is_read_again(web: Running) -> None:
+def test_prompts_json_stores_drawn_fronts_and_is_read_back(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     assert web.get(f"{at}/prompts.json")["version"] == 1
@@ -101,7 +101,7 @@ def test_prompts_json_holds_what_was_drawn_and_is_read_again(web: Running) -> No
 
 
 @pytest.mark.parametrize("corners", [CORNERS[:3], [[0.0, 0.0, 0.0]] * 4, [[0, 0, 1], [1, 0, 2], [1, 0, 0], [0, 0, 0]]])
-def test_what_is_no_rectangle_is_refused(web: Running, corners: Any) -> None:
+def test_a_front_that_is_not_a_rectangle_is_refused(web: Running, corners: Any) -> None:
     project = web.sample()
     web.post(f"/api/projects/{project}/objects", {"front": {"corners_m": corners}}, 422)
 
@@ -109,7 +109,7 @@ def test_what_is_no_rectangle_is_refused(web: Running, corners: Any) -> None:
 OUTSIDE = {"left_m": 0.29, "bottom_m": 0.0, "right_m": 0.31, "top_m": 0.1}
 
 
-def test_a_handle_outside_its_front_is_refused_and_one_stored_before_is_looked_for(web: Running) -> None:
+def test_a_handle_outside_its_front_is_refused_and_a_stored_one_is_dropped(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     made = web.post(f"{at}/objects", DRAWN, 201)
@@ -144,7 +144,7 @@ def without_front(path: Path) -> None:
     path.write_text("\n".join([*lines, json.dumps(older)]) + "\n")
 
 
-def test_a_front_that_the_last_run_measured_is_shown_where_live_masks_have_none(web: Running) -> None:
+def test_a_front_measured_by_the_last_run_is_shown_if_live_masks_have_none(web: Running) -> None:
     at, files, _ = clicked(web)
     assert web.get(f"{at}/elevations/fronts") == []
     front = FrontPanel(world_from_front=Rigid3(), width_m=0.6, height_m=0.7, handle=None, confidence=1.0)
@@ -157,7 +157,7 @@ def test_a_front_that_the_last_run_measured_is_shown_where_live_masks_have_none(
     assert web.get(f"{at}/elevations/fronts") == [shown]
 
 
-def test_masks_of_before_fronts_were_kept_are_made_anew_when_the_scan_is_opened(web: Running) -> None:
+def test_opening_a_scan_recomputes_masks_stored_without_a_front(web: Running) -> None:
     at, _, path = clicked(web)
     without_front(path)
     assert web.get(f"{at}/objects")[0]["segment"] == "partial"
@@ -166,7 +166,7 @@ def test_masks_of_before_fronts_were_kept_are_made_anew_when_the_scan_is_opened(
     assert "front" in json.loads(path.read_text().splitlines()[-1])
 
 
-def test_a_found_front_goes_out_as_it_would_be_drawn() -> None:
+def test_a_detected_front_is_sent_in_the_format_of_a_drawn_one() -> None:
     into_capture = Rigid3(np.eye(3), np.array([1.0, 0.0, 0.0]))
     at = Rigid3(front_rotation(np.array([0.0, -1.0, 0.0])), np.array([0.3, 2.0, 0.45]))
     panel = FrontPanel(world_from_front=at, width_m=0.6, height_m=0.7, handle=None, confidence=1.0)

@@ -16,7 +16,7 @@ def routes(web: Running) -> list[tuple[str, str]]:
     return [(method.upper(), path) for path, methods in document["paths"].items() for method in methods]
 
 
-def test_every_endpoint_says_what_is_wrong_in_the_one_shape(web: Running) -> None:
+def test_every_endpoint_returns_errors_in_the_same_format(web: Running) -> None:
     for method, path in routes(web):
         filled = path.replace("{project}", "none").replace("{object}", "1").replace("{job}", "1").replace("{point}", "1")
         filled = filled.replace("{frame}", "1").replace("{candidate}", "c0").replace("{version}", "1")
@@ -40,20 +40,20 @@ def test_every_endpoint_says_what_is_wrong_in_the_one_shape(web: Running) -> Non
         ("GET", "/api/jobs?limit=99999999999999999999999", 422, "invalid"),
     ],
 )
-def test_errors_of_the_framework_too(web: Running, method: str, path: str, status: int, kind: str) -> None:
+def test_framework_errors_have_the_same_format(web: Running, method: str, path: str, status: int, kind: str) -> None:
     answer = web.client.request(method, path)
     assert (answer.status_code, answer.json()["kind"]) == (status, kind)
     assert set(answer.json()) == SHAPE
 
 
 @pytest.mark.parametrize("body", [b"{", b"[]", b'{"seed": "x"}', b'{"seed": 1, "unknown": 2}', b'{"seed": NaN}', b"\xff\xfe"])
-def test_a_body_that_is_not_what_it_should_be_is_invalid(web: Running, body: bytes) -> None:
+def test_a_malformed_body_is_rejected_as_invalid(web: Running, body: bytes) -> None:
     answer = web.client.post("/api/projects/sample", content=body, headers={"content-type": "application/json"})
     assert (answer.status_code, answer.json()["kind"]) == (422, "invalid")
     assert set(answer.json()) == SHAPE
 
 
-def test_an_unexpected_error_tells_the_log_and_not_the_browser(
+def test_an_unexpected_error_is_detailed_in_the_log_only(
     web: Running, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     def boom(*_: object) -> None:
@@ -66,7 +66,7 @@ def test_an_unexpected_error_tells_the_log_and_not_the_browser(
     assert "secret detail" in caplog.text
 
 
-def test_every_error_of_the_core_has_a_kind_and_a_status() -> None:
+def test_every_core_error_has_a_kind_a_status_and_its_hint() -> None:
     def below(cls: type[core.R2C2RError]) -> list[type[core.R2C2RError]]:
         return [cls, *(found for sub in cls.__subclasses__() for found in below(sub))]
 
@@ -78,19 +78,19 @@ def test_every_error_of_the_core_has_a_kind_and_a_status() -> None:
         assert error_body(error)["hint"] == "next"
 
 
-def test_the_narrowest_class_decides() -> None:
+def test_error_kinds_list_subclasses_before_their_base_classes() -> None:
     seen: list[type[core.R2C2RError]] = []
     for cls, _, _ in KINDS:
         assert not any(issubclass(cls, earlier) for earlier in seen), cls
         seen.append(cls)
 
 
-def test_every_route_has_a_name_of_its_own(web: Running) -> None:
+def test_every_route_has_a_unique_operation_id(web: Running) -> None:
     names = [operation["operationId"] for methods in web.app.openapi()["paths"].values() for operation in methods.values()]
     assert len(names) == len(set(names))
 
 
-def test_a_full_disk_is_said_and_nothing_is_lost(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_reported_and_no_data_is_lost(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     project = web.sample()
 
     def full(*_: object, **__: object) -> None:
@@ -115,7 +115,7 @@ def test_a_full_disk_is_said_and_nothing_is_lost(web: Running, monkeypatch: pyte
         ("disk I/O error", sqlite3.SQLITE_IOERR_READ, 503, "database"),
     ],
 )
-def test_a_database_that_does_not_answer_is_said_wherever_it_is_asked(
+def test_database_failures_are_reported_by_every_kind_of_request(
     web: Running, said: str, code: int, status: int, kind: str
 ) -> None:
     found = sqlite3.OperationalError(said)
@@ -136,7 +136,7 @@ def test_a_database_that_does_not_answer_is_said_wherever_it_is_asked(
     assert web.get("/api/projects") == []
 
 
-def test_the_queue_goes_on_after_an_error_nobody_thought_of(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_queue_continues_after_an_unexpected_error(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     project = web.sample()
 
     def boom(*_: object) -> None:

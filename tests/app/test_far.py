@@ -66,7 +66,7 @@ def state(web: Running, project: str) -> str:
     return str(web.get(f"/api/projects/{project}/objects")[-1]["segment"])
 
 
-def test_masks_are_drawn_at_the_seat_and_shown_and_kept_where_pages_are(shared: dict[str, Any], tmp_path: Path) -> None:
+def test_masks_computed_at_a_seat_are_shown_and_stored_by_the_server(shared: dict[str, Any], tmp_path: Path) -> None:
     with running(tmp_path / "web", **shared) as web:
         project = web.sample()
         web.context.store.keep(project)
@@ -84,7 +84,7 @@ def test_masks_are_drawn_at_the_seat_and_shown_and_kept_where_pages_are(shared: 
         assert (lane["frames"], lane["complete"]) == ([0, 3, 7], True)
 
 
-def test_what_nobody_wants_any_more_ends_at_the_seat(shared: dict[str, Any], tmp_path: Path) -> None:
+def test_cancelling_or_deleting_ends_segmentation_at_the_seat(shared: dict[str, Any], tmp_path: Path) -> None:
     with running(tmp_path / "web", **shared) as web:
         project = web.sample()
         web.context.store.keep(project)
@@ -98,7 +98,7 @@ def test_what_nobody_wants_any_more_ends_at_the_seat(shared: dict[str, Any], tmp
             web.until(lambda: segmenters() == [])
 
 
-def test_a_seat_that_ends_leaves_its_masks_to_the_server(shared: dict[str, Any], tmp_path: Path) -> None:
+def test_the_server_takes_over_masks_of_a_seat_that_ends(shared: dict[str, Any], tmp_path: Path) -> None:
     with running(tmp_path / "web", **shared) as web:
         project = web.sample()
         web.context.store.keep(project)
@@ -110,7 +110,7 @@ def test_a_seat_that_ends_leaves_its_masks_to_the_server(shared: dict[str, Any],
             web.until(lambda: state(web, project) == "running")
 
 
-def test_a_seat_that_goes_while_a_segmenter_is_begun_there_ends_it(tmp_path: Path) -> None:
+def test_a_seat_lost_while_starting_a_segmenter_ends_that_segmenter(tmp_path: Path) -> None:
     channel: Any = SimpleNamespace(hears={}, on_gone=[], on_gap=[], say=lambda *_: None)
     workers = FarWorkers(channel)
     channel.hears["live-seat"]("seat", {"runs": 0})
@@ -122,7 +122,7 @@ def test_a_seat_that_goes_while_a_segmenter_is_begun_there_ends_it(tmp_path: Pat
     assert workers.start("project", files, ()) is None  # no seat is left
 
 
-def test_segmenters_of_a_server_that_is_gone_end(shared: dict[str, Any], tmp_path: Path) -> None:
+def test_segmenters_of_a_stopped_server_end_at_the_seat(shared: dict[str, Any], tmp_path: Path) -> None:
     with running(tmp_path / "other", run_jobs=False, **shared) as other, live_seat(other, tmp_path / "seat"):
         with running(tmp_path / "web", **shared) as web:
             project = web.sample()

@@ -13,7 +13,7 @@ from app.services.media import kept_file
 from r2c2r_core.workspace import Workspace
 
 
-def test_a_file_that_vanishes_while_a_folder_is_measured_counts_nothing(
+def test_a_file_that_vanishes_during_size_measurement_counts_zero_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "kept").write_bytes(b"12345")
@@ -27,7 +27,7 @@ def test_a_file_that_vanishes_while_a_folder_is_measured_counts_nothing(
     assert folder_bytes(tmp_path) == 5
 
 
-def test_what_is_made_for_a_project_does_not_bring_its_folder_back_after_a_deletion(tmp_path: Path) -> None:
+def test_writing_a_cached_file_does_not_recreate_a_deleted_project(tmp_path: Path) -> None:
     files = project_files(tmp_path, "0123456789ab")
     files.root.mkdir(parents=True)
     files.write(files.previews / "frames" / "160" / "000003.jpg", b"there")
@@ -41,7 +41,7 @@ def test_what_is_made_for_a_project_does_not_bring_its_folder_back_after_a_delet
     assert list((tmp_path / "projects").iterdir()) == []
 
 
-def test_a_folder_that_is_written_to_while_it_is_deleted_goes_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_written_to_during_deletion_is_deleted_completely(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     files = project_files(tmp_path, "0123456789ab")
     files.root.mkdir(parents=True)
     files.write(files.description, b"{}")
@@ -57,6 +57,6 @@ def test_a_folder_that_is_written_to_while_it_is_deleted_goes_whole(tmp_path: Pa
     assert list((tmp_path / "projects").iterdir()) == []
 
 
-def test_looking_into_a_workspace_that_is_gone_makes_none(tmp_path: Path) -> None:
+def test_loading_from_a_missing_workspace_creates_no_folder(tmp_path: Path) -> None:
     assert Workspace(tmp_path / "projects" / "0123456789ab" / "work").load_latest("export", "scene") is None
     assert list(tmp_path.iterdir()) == []

@@ -11,7 +11,7 @@ ASSET = re.compile(r'(?:href|src)="(/static/[^"]+)"')
 IMPORT = re.compile(r'(?:^|\n)\s*(?:import|export)\b[^;]*?from\s+"(\.[^"]+)"|(?:^|\n)import\s+"(\.[^"]+)"')
 
 
-def test_the_first_page_is_light_and_asks_no_other_site(web: Running) -> None:
+def test_the_first_page_is_small_and_loads_nothing_from_other_sites(web: Running) -> None:
     page = web.client.get("/").text
     waiting, sizes = ASSET.findall(page), {"/": len(page.encode())}
     while waiting:
@@ -34,7 +34,7 @@ def asked_at_once(page: str, rel: str) -> list[str]:
     return [unescape(found) for found in re.findall(rf'<link rel="{rel}"[^>]*href="([^"]+)"', page)]
 
 
-def test_the_page_asks_at_once_for_every_module_it_needs(web: Running) -> None:
+def test_pages_preload_every_module_they_import(web: Running) -> None:
     for path in ("/", "/people", "/p/any", "/p/any/annotate", "/p/any/review"):
         asked = asked_at_once(web.client.get(path).text, "modulepreload")
         assert len(asked) == len(set(asked)) > 10
@@ -46,7 +46,7 @@ def test_the_page_asks_at_once_for_every_module_it_needs(web: Running) -> None:
             )
 
 
-def test_the_clicking_page_asks_at_once_for_the_frame_it_shows(web: Running) -> None:
+def test_the_annotation_page_preloads_the_frame_it_shows(web: Running) -> None:
     project = web.sample()
     frames = f"/api/projects/{project}/frames"
     indices = [frame["index"] for frame in web.get(frames)]
@@ -67,7 +67,7 @@ def test_the_clicking_page_asks_at_once_for_the_frame_it_shows(web: Running) -> 
         assert page.text.count("<script") == 1, path
 
 
-def test_our_files_are_sent_once_and_packed(web: Running) -> None:
+def test_static_files_are_compressed_and_revalidated_by_etag(web: Running) -> None:
     first = web.client.get("/static/js/main.js")
     assert first.headers["content-encoding"] == "gzip"
     assert first.headers["content-type"].startswith("text/javascript")

@@ -44,7 +44,7 @@ serve.serve(host="127.0.0.1", port=0, data_dir=data)
 """
 
 
-def test_a_flood_of_heavy_requests_keeps_nobody_waiting_and_the_server_ends_in_the_midst_of_it(tmp_path: Path) -> None:
+def test_heavy_requests_of_one_person_do_not_block_others_or_shutdown(tmp_path: Path) -> None:
     with (
         ThreadPoolExecutor(2 * CROWD) as crowd,  # closed last: its requests end with the server
         served(tmp_path) as (server, printed),
@@ -81,7 +81,7 @@ def test_a_flood_of_heavy_requests_keeps_nobody_waiting_and_the_server_ends_in_t
     engine.dispose()
 
 
-def test_a_gate_does_one_piece_of_each_asker_at_a_time_and_refuses_what_is_beyond_their_share() -> None:
+def test_a_gate_runs_one_task_per_person_and_refuses_beyond_their_quota() -> None:
     async def scene() -> None:
         gate = Gate("looks", at_once=2, each=3, retry_s=7)
         going, done, most = threading.Event(), list[str](), list[int]()

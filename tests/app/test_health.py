@@ -8,7 +8,7 @@ from starlette.testclient import TestClient
 from tests.app.conftest import ORIGIN, Running, refusing
 
 
-def test_a_server_whose_database_is_away_lives_and_is_not_ready_until_it_is_back(web: Running) -> None:
+def test_a_server_without_database_is_alive_but_not_ready(web: Running) -> None:
     stranger = TestClient(web.app, base_url=ORIGIN, raise_server_exceptions=False)
 
     def asked(path: str) -> int:
@@ -23,7 +23,7 @@ def test_a_server_whose_database_is_away_lives_and_is_not_ready_until_it_is_back
     assert asked("/readyz") == 200
 
 
-def test_what_a_stranger_may_ask_is_not_more_than_that(web: Running) -> None:
+def test_health_endpoints_reveal_only_the_state_without_a_session(web: Running) -> None:
     stranger = TestClient(web.app, base_url=ORIGIN)
     assert stranger.get("/readyz").json() == {"state": "ready"}
     assert stranger.get("/readyz/projects").status_code in (401, 404)

@@ -155,9 +155,7 @@ def whole(session: Session, scope: history.Scope) -> Any:
 
 
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 6))])
-def test_an_old_history_becomes_differences_that_undo_step_by_step_and_goes_back_to_what_it_was(
-    tmp_path: Path, seed: int
-) -> None:
+def test_an_old_history_migrates_to_undoable_differences_and_back(tmp_path: Path, seed: int) -> None:
     scopes: tuple[history.Scope, ...] = ("prompts", "review")
     path = tmp_path / f"{seed}.db"
     old = old_database(path, seed)
@@ -181,7 +179,7 @@ def test_an_old_history_becomes_differences_that_undo_step_by_step_and_goes_back
     assert events(path) == stored
 
 
-def test_results_that_were_current_stay_so_in_both_directions(tmp_path: Path) -> None:
+def test_current_results_stay_current_after_upgrade_and_downgrade(tmp_path: Path) -> None:
     path = tmp_path / "a.db"
     engine = create_engine(f"sqlite:///{path}")
     migrate(engine, OLD)
@@ -223,7 +221,7 @@ def _old_key(click: dict[str, Any]) -> str:
     return content_key(prompts, {"version": 1, "objects": {"drawer_1": {"hinge": "left"}}}, "geometric")
 
 
-def test_the_history_grows_with_what_is_done_and_not_with_what_is_there(web: Running) -> None:
+def test_the_size_of_a_history_entry_does_not_grow_with_the_object(web: Running) -> None:
     project = web.sample()
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
     for k in range(12):
@@ -236,7 +234,7 @@ def test_the_history_grows_with_what_is_done_and_not_with_what_is_there(web: Run
     assert max(sizes) - min(sizes) <= 4  # only digits of the numbers differ
 
 
-def test_what_is_undone_is_said_so_until_something_else_is_done(web: Running) -> None:
+def test_entries_are_marked_undone_until_the_next_change(web: Running) -> None:
     project = web.sample()
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
     at = f"/api/projects/{project}/objects/{number}"

@@ -40,7 +40,7 @@ def slipped(kept: Kept) -> str:
     return str(answer.json()["project"])
 
 
-def test_it_waits_for_its_person_like_any_project(kept: Kept, slipped: str) -> None:
+def test_a_honeypot_looks_like_any_assigned_project(kept: Kept, slipped: str) -> None:
     assert [row["name"] for row in kept.of["alice"].get("/api/inbox").json()["assigned"]] == ["Flat 7"]
     seen: dict[str, Any] = kept.of["alice"].get(f"/api/projects/{slipped}").json()
     assert (seen["source_name"], seen["status"], seen["counts"]["objects"], seen["job"]) == ("scan.r3d", "ready", 0, None)
@@ -52,7 +52,7 @@ def test_it_waits_for_its_person_like_any_project(kept: Kept, slipped: str) -> N
     assert kept.of["root"].get("/api/audit").json()["entries"][0]["action"] == "honeypot"
 
 
-def test_admins_alone_are_told_and_slip(kept: Kept, slipped: str) -> None:
+def test_only_admins_create_and_see_honeypots(kept: Kept, slipped: str) -> None:
     for name in ("alice", "bob"):
         assert kept.of[name].get("/api/honeypots").status_code == 403
         assert kept.of[name].get(f"/api/projects/{slipped}/honeypot").status_code == 403
@@ -63,7 +63,7 @@ def test_admins_alone_are_told_and_slip(kept: Kept, slipped: str) -> None:
     assert kept.of["root"].get(f"/api/projects/{copy}/honeypot").status_code == 404  # a copy is not a honeypot
 
 
-def test_a_sample_that_is_kept_to_an_admin_is_slipped_in_all_the_same(kept: Kept, slipped: str) -> None:
+def test_a_honeypot_of_a_members_only_sample_is_visible_to_its_person(kept: Kept, slipped: str) -> None:
     own = kept.of["root"].post(f"/api/projects/{kept.project}/duplicate").json()["id"]
     kept.of["root"].put(f"/api/projects/{own}/members", json={"members_only": True})
     made = kept.of["root"].post(f"/api/projects/{own}/honeypot", json={"person": "Bob", "name": "Flat 9"}).json()
@@ -74,14 +74,14 @@ def test_a_sample_that_is_kept_to_an_admin_is_slipped_in_all_the_same(kept: Kept
     assert unknown.status_code == 404
 
 
-def test_a_recording_whose_truth_is_not_known_is_refused(kept: Kept) -> None:
+def test_a_honeypot_without_ground_truth_is_refused(kept: Kept) -> None:
     body = {"person": "alice", "name": "Flat 7"}
     refused = kept.of["root"].post(f"/api/projects/{kept.project}/honeypot", json=body)
     assert (refused.status_code, refused.json()["message"]) == (409, "the truth of Sample kitchen is not known")
     assert len(kept.of["root"].get("/api/projects").json()) == 1
 
 
-def test_objects_found_are_scored_by_mask_and_category(kept: Kept, slipped: str) -> None:
+def test_honeypot_objects_are_scored_by_mask_iou_and_category(kept: Kept, slipped: str) -> None:
     at = f"/api/projects/{slipped}"
     blank: dict[str, Any] = kept.of["root"].get(f"{at}/honeypot").json()
     assert [blank[key] for key in ("found", "extra", "mean_iou", "same_category")] == [0, 0, None, 0]

@@ -8,7 +8,9 @@ BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
 
 
 @pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.slow)])
-def test_each_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, every: int) -> None:
+def test_hostile_uploads_are_refused_in_one_line_and_leave_no_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, every: int
+) -> None:
     monkeypatch.syspath_prepend(BENCHMARKS)
     import hostile_uploads
 

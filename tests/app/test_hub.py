@@ -13,7 +13,7 @@ def presence_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hubs, "PRESENCE_S", 0.0)
 
 
-def test_a_listener_gets_what_it_missed_while_it_is_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_listener_receives_missed_messages_that_are_still_buffered(monkeypatch: pytest.MonkeyPatch) -> None:
     async def scene() -> None:
         hub = Hub()
         first = hub.join("p", None, None)
@@ -35,7 +35,7 @@ def test_a_listener_gets_what_it_missed_while_it_is_remembered(monkeypatch: pyte
     asyncio.run(scene())
 
 
-def test_what_is_remembered_is_bounded_by_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_message_buffer_is_bounded_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hubs, "KEPT_BYTES", 10_000)
 
     async def scene() -> None:
@@ -48,7 +48,7 @@ def test_what_is_remembered_is_bounded_by_bytes(monkeypatch: pytest.MonkeyPatch)
     asyncio.run(scene())
 
 
-def test_a_tab_hears_of_its_own_project_and_of_every_job() -> None:
+def test_a_tab_receives_messages_of_its_own_project_and_of_every_job() -> None:
     async def scene() -> None:
         hub = Hub()
         listener = hub.join("mine", None, None)
@@ -64,7 +64,7 @@ def test_a_tab_hears_of_its_own_project_and_of_every_job() -> None:
     asyncio.run(scene())
 
 
-def test_a_tab_that_comes_to_a_project_reads_what_changed_before_it_was_heard_there() -> None:
+def test_a_tab_entering_a_project_receives_a_project_message_once() -> None:
     async def scene() -> None:
         hub = Hub()
         listener = hub.join(None, None, None)
@@ -80,7 +80,7 @@ def test_a_tab_that_comes_to_a_project_reads_what_changed_before_it_was_heard_th
     asyncio.run(scene())
 
 
-def test_a_tab_that_does_not_keep_up_is_told_to_fetch_everything_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tab_that_falls_behind_receives_a_reset(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hubs, "WAITING_BYTES", 1_000)
 
     async def scene() -> None:
@@ -98,7 +98,7 @@ def test_a_tab_that_does_not_keep_up_is_told_to_fetch_everything_anew(monkeypatc
     asyncio.run(scene())
 
 
-def test_what_was_taken_makes_room_for_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_already_received_do_not_count_as_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hubs, "WAITING_BYTES", 1_000)
 
     async def scene() -> None:
@@ -113,7 +113,7 @@ def test_what_was_taken_makes_room_for_more(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize("text", ["\ud800", "é\U0001f600\x00", "\u2028</script>"])
-def test_no_text_is_beyond_the_wire(text: str) -> None:
+def test_any_text_is_sent_as_ascii_and_decoded_unchanged(text: str) -> None:
     async def scene() -> None:
         hub = Hub()
         listener = hub.join("p", None, None)
@@ -127,7 +127,7 @@ def test_no_text_is_beyond_the_wire(text: str) -> None:
     asyncio.run(scene())
 
 
-def test_everybody_at_a_project_knows_who_else_is_there_and_on_what() -> None:
+def test_presence_lists_everyone_at_a_project_with_page_and_object() -> None:
     async def scene() -> None:
         hub = Hub()
         ann = hub.join("kitchen", None, None, "ann")
@@ -146,7 +146,7 @@ def test_everybody_at_a_project_knows_who_else_is_there_and_on_what() -> None:
     asyncio.run(scene())
 
 
-def test_many_tabs_that_come_at_once_are_told_once_who_is_here() -> None:
+def test_presence_is_sent_once_when_many_tabs_join_together() -> None:
     async def scene() -> None:
         hub = Hub()
         tabs = [hub.join("kitchen", None, None, f"p{number}") for number in range(300)]
@@ -158,7 +158,7 @@ def test_many_tabs_that_come_at_once_are_told_once_who_is_here() -> None:
     asyncio.run(scene())
 
 
-def test_an_older_state_that_comes_late_is_not_told() -> None:
+def test_an_outdated_state_that_arrives_late_is_not_sent() -> None:
     async def scene() -> None:
         hub = Hub()
         tab = hub.join("kitchen", None, None)

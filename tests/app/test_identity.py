@@ -44,7 +44,7 @@ def record(web: Running) -> list[schemas.AuditEntry]:
     return [line for line in audit.entries(web.context.engine, None, 200).entries if line.client != "testclient"]
 
 
-def test_who_a_trusted_proxy_names_is_in_at_first_sight_with_the_default_role(web: Running) -> None:
+def test_a_user_named_by_the_proxy_gets_an_account_with_the_default_role(web: Running) -> None:
     ann = by(web, PROXY, "Ann@lab.example", **{"X-Forwarded-For": "203.0.113.7"})
     said = ann.get("/api/system").json()
     assert (said["user"], said["role"], said["account"], said["sign_out"]) == ("ann@lab.example", "annotator", True, None)
@@ -55,19 +55,19 @@ def test_who_a_trusted_proxy_names_is_in_at_first_sight_with_the_default_role(we
     ]
 
 
-def test_requests_that_come_together_make_one_person_and_one_session(web: Running) -> None:
+def test_concurrent_first_requests_create_one_account_and_one_session(web: Running) -> None:
     ann = by(web, PROXY, "ann")
     with ThreadPoolExecutor(LOOK_UPS) as crowd:  # each has its own event loop here: no look-up may wait for another
         assert {answer.status_code for answer in crowd.map(lambda _: ann.get("/api/projects"), range(24))} == {200}
     assert [line.action for line in record(web)] == ["signed in", "added"]
 
 
-def test_a_person_who_had_an_account_keeps_its_role(web: Running) -> None:
+def test_a_user_with_an_existing_account_keeps_its_role(web: Running) -> None:
     accounts.add(web.context.engine, "ann", "admin", PASSWORD)
     assert by(web, PROXY, "ann").get("/api/accounts").status_code == 200
 
 
-def test_a_role_that_is_changed_holds_on_the_next_request(web: Running) -> None:
+def test_a_changed_role_applies_from_the_next_request(web: Running) -> None:
     accounts.add(web.context.engine, "ann", "admin", PASSWORD)
     ann, bob = by(web, PROXY, "ann"), by(web, PROXY, "bob")
     assert bob.get("/api/audit").status_code == 403
@@ -76,7 +76,9 @@ def test_a_role_that_is_changed_holds_on_the_next_request(web: Running) -> None:
 
 
 @pytest.mark.parametrize("path", ["/api/projects", "/", "/login", "/healthz", "/static/css/base.css"])
-def test_from_anywhere_else_the_header_is_refused_and_said(web: Running, path: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_user_headers_from_untrusted_addresses_are_refused_and_logged(
+    web: Running, path: str, caplog: pytest.LogCaptureFixture
+) -> None:
     accounts.add(web.context.engine, "ann", "admin", PASSWORD)
     with caplog.at_level(logging.WARNING, "app.security"):
         answer = by(web, ELSEWHERE, "ann", **{"X-Forwarded-For": PROXY}).get(path)
@@ -86,12 +88,12 @@ def test_from_anywhere_else_the_header_is_refused_and_said(web: Running, path: s
     assert {line.action for line in record(web)} == {"added"}
 
 
-def test_an_address_that_the_proxy_tells_is_not_taken_for_a_proxy_nor_the_proxy_for_that(web: Running) -> None:
+def test_a_forwarded_client_address_is_not_checked_as_the_proxy(web: Running) -> None:
     told = {"X-Forwarded-For": ELSEWHERE}
     assert by(web, PROXY, "ann", **told).get("/api/system").status_code == 200
 
 
-def test_a_socket_from_anywhere_else_is_refused_and_the_proxys_is_open_until_the_account_ends(web: Running) -> None:
+def test_websockets_are_accepted_from_the_proxy_only_and_follow_the_role(web: Running) -> None:
     at = {"headers": {"Origin": ORIGIN}}
     with (
         pytest.raises(WebSocketDisconnect) as refused,
@@ -106,19 +108,19 @@ def test_a_socket_from_anywhere_else_is_refused_and_the_proxys_is_open_until_the
         assert live.receive_json() == {"type": "you", "seq": 0, "project": None, "name": "ann", "role": "reviewer"}
 
 
-def test_a_header_that_was_added_to_instead_of_replaced_is_refused(web: Running) -> None:
+def test_a_duplicated_user_header_is_refused(web: Running) -> None:
     answer = by(web, PROXY).get("/api/system", headers=[("X-Forwarded-User", "ann"), ("X-Forwarded-User", "root")])
     assert (answer.status_code, answer.json()["message"]) == (403, "X-Forwarded-User occurs twice in the request")
 
 
 @pytest.mark.parametrize("name", ["", "two words", "a" * 61, "../admin", "{http.auth.user.id}"])
-def test_who_has_no_name_gets_no_account(web: Running, name: str) -> None:
+def test_an_empty_or_invalid_user_name_creates_no_account(web: Running, name: str) -> None:
     answer = by(web, PROXY).get("/api/system", headers={"X-Forwarded-User": name})
     assert answer.status_code == (422 if name else 401)
     assert record(web) == []
 
 
-def test_without_the_header_people_sign_in_and_a_token_stays_what_it_is(web: Running) -> None:
+def test_password_sign_in_and_tokens_work_behind_the_proxy(web: Running) -> None:
     accounts.add(web.context.engine, "ann", "admin", PASSWORD)
     browser = by(web, PROXY)
     assert browser.get("/api/projects").status_code == 401
@@ -130,12 +132,12 @@ def test_without_the_header_people_sign_in_and_a_token_stays_what_it_is(web: Run
 
 
 @pytest.mark.parametrize("password", ["", "no such account"])
-def test_no_password_opens_an_account_that_has_none(web: Running, password: str) -> None:
+def test_an_account_without_a_password_accepts_no_password(web: Running, password: str) -> None:
     assert by(web, PROXY, "ann").get("/api/system").status_code == 200
     assert accounts.verified(web.context.engine, "ann", password) is None
 
 
-def test_another_sites_page_makes_no_change_in_the_name_of_who_the_proxy_knows(web: Running) -> None:
+def test_cross_site_requests_of_proxy_users_are_refused(web: Running) -> None:
     foreign = by(web, PROXY, "ann", Origin="http://evil.example")
     assert foreign.post("/api/projects/sample", json={}).status_code == 403
     plain = by(web, PROXY, "ann")
@@ -153,7 +155,7 @@ def test_another_sites_page_makes_no_change_in_the_name_of_who_the_proxy_knows(w
         ("R2C2R_TRUSTED_PROXIES", "proxy.example", "R2C2R_TRUSTED_PROXIES proxy.example"),
     ],
 )
-def test_a_setting_by_which_nobody_could_be_believed_is_said_before_anything_starts(
+def test_invalid_proxy_settings_are_refused_before_the_server_starts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str, value: str, said: str
 ) -> None:
     monkeypatch.setenv(named, value)

@@ -33,7 +33,7 @@ def test_the_import_job_reads_a_zip_of_any_format(kind: str, tmp_path: Path) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("zipped", [True, False])
-def test_a_phones_film_becomes_a_project(zipped: bool, start: Callable[..., Any], tmp_path: Path) -> None:
+def test_a_stray_scanner_recording_becomes_a_project(zipped: bool, start: Callable[..., Any], tmp_path: Path) -> None:
     scan = WRITERS["stray"](tmp_path / "data" / "recordings" / "scan", TinyRoom())
     with start(commands=Commands()) as web:
         if zipped:

@@ -32,7 +32,7 @@ def left_behind(web: Running) -> list[Path]:
     return [path for folder in (web.settings.data_dir / "projects", web.settings.uploads) for path in folder.rglob("*")]
 
 
-def test_an_upload_becomes_a_project_that_knows_its_recording(web: Running) -> None:
+def test_an_upload_becomes_a_ready_project_with_its_frames(web: Running) -> None:
     project = upload(web, R3D, "My kitchen.r3d")
     assert (project["name"], project["status"], project["job"]["kind"]) == ("My kitchen", "importing", "import")
     web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] == "ready")
@@ -41,7 +41,7 @@ def test_an_upload_becomes_a_project_that_knows_its_recording(web: Running) -> N
     assert [f["index"] for f in web.get(f"/api/projects/{project['id']}/frames")] == [0, 3, 7]
 
 
-def test_facts_of_another_version_do_not_hide_a_project(web: Running) -> None:
+def test_capture_facts_of_an_older_version_do_not_hide_a_project(web: Running) -> None:
     project = upload(web, R3D, "My kitchen.r3d")["id"]
     web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")
     with writing(web.context.engine) as session:
@@ -51,13 +51,13 @@ def test_facts_of_another_version_do_not_hide_a_project(web: Running) -> None:
     assert web.get(f"/api/projects/{project}")["capture"]["frame_count"] == 3
 
 
-def test_a_name_cannot_lead_out_of_the_project(web: Running) -> None:
+def test_a_file_name_with_path_traversal_stays_inside_the_project(web: Running) -> None:
     project = upload(web, R3D, "..%2F..%2Fetc%2Fpasswd")
     (stored,) = (web.settings.data_dir / "projects" / project["id"] / "source").iterdir()
     assert stored.name == "passwd"
 
 
-def test_the_limit_is_shown_and_kept_for_announced_and_for_streamed_bytes(start: Callable[..., Any]) -> None:
+def test_the_upload_limit_is_reported_and_enforced_with_and_without_length(start: Callable[..., Any]) -> None:
     with start(max_upload_bytes=5000) as web:
         assert web.get("/api/system")["max_upload_bytes"] == 5000
         assert upload(web, b"PK\3\4" + bytes(6000), status=413)["kind"] == "too-large"
@@ -67,7 +67,7 @@ def test_the_limit_is_shown_and_kept_for_announced_and_for_streamed_bytes(start:
         assert web.get("/api/projects") == []
 
 
-def test_a_full_disk_is_said_before_anything_is_stored(start: Callable[..., Any]) -> None:
+def test_a_full_disk_is_reported_before_an_upload_is_stored(start: Callable[..., Any]) -> None:
     with start(min_free_bytes=1 << 60) as web:
         error = upload(web, R3D, status=507)
         assert (error["kind"], "GB free" in error["message"]) == ("no-space", True)
@@ -98,9 +98,7 @@ def linked() -> bytes:
         (archive(("bomb", bytes(80 << 20))), "times its size"),
     ],
 )
-def test_a_hostile_or_broken_archive_is_refused_in_one_line_and_leaves_nothing(
-    web: Running, content: bytes, words: str
-) -> None:
+def test_hostile_or_broken_archives_are_refused_in_one_line_without_residue(web: Running, content: bytes, words: str) -> None:
     error = upload(web, content, "scan.zip", 422)
     assert set(error) == {"kind", "message", "hint", "current"}
     assert words in error["message"]
@@ -109,12 +107,12 @@ def test_a_hostile_or_broken_archive_is_refused_in_one_line_and_leaves_nothing(
     assert web.get("/api/projects") == []
 
 
-def test_an_implausibly_large_table_of_contents_is_refused_before_it_is_parsed(web: Running) -> None:
+def test_an_archive_with_an_implausibly_large_directory_is_refused(web: Running) -> None:
     end = b"PK\5\6" + bytes(8) + (0xFFFFFF0).to_bytes(4, "little") + bytes(6)
     assert "table of contents" in upload(web, b"PK\3\4" + bytes(100) + end, status=422)["message"]
 
 
-def test_a_recording_is_taken_from_a_path_and_stays_there(web: Running, tmp_path: Path) -> None:
+def test_an_import_by_path_leaves_the_recording_in_place(web: Running, tmp_path: Path) -> None:
     folder = tmp_path / "recordings" / "kitchen"
     folder.mkdir(parents=True)
     (folder / "frame.txt").write_text("x")
@@ -125,7 +123,7 @@ def test_a_recording_is_taken_from_a_path_and_stays_there(web: Running, tmp_path
     assert (folder / "frame.txt").exists()
 
 
-def test_paths_outside_the_roots_are_refused_also_through_links(web: Running, tmp_path: Path) -> None:
+def test_paths_outside_the_import_roots_are_refused_also_through_symlinks(web: Running, tmp_path: Path) -> None:
     (tmp_path / "out").symlink_to("/etc")
     for path in ("/etc", "/etc/passwd", f"{tmp_path}/../..", str(tmp_path / "out"), "/proc/self/environ"):
         assert web.post("/api/projects/import", {"path": path}, 403)["kind"] == "forbidden"
@@ -133,7 +131,7 @@ def test_paths_outside_the_roots_are_refused_also_through_links(web: Running, tm
     assert web.post("/api/projects/import", {"path": str(tmp_path / "absent")}, 404)["kind"] == "not-found"
 
 
-def test_folders_below_a_root_can_be_looked_through(web: Running, tmp_path: Path) -> None:
+def test_folders_below_an_import_root_can_be_browsed(web: Running, tmp_path: Path) -> None:
     (tmp_path / "b.r3d").write_bytes(b"xx")
     (root,) = web.get("/api/browse")["entries"]
     listing = web.get("/api/browse", params={"path": root["path"]})
@@ -142,7 +140,7 @@ def test_folders_below_a_root_can_be_looked_through(web: Running, tmp_path: Path
     assert names["data"] is True
 
 
-def test_a_recording_that_cannot_be_read_leaves_a_failed_project_with_the_reason(web: Running) -> None:
+def test_an_unreadable_recording_leaves_a_failed_project_with_the_reason(web: Running) -> None:
     project = upload(web, R3D, "broken.r3d")["id"]
     web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "failed")
     error = web.get(f"/api/projects/{project}")["error"]
@@ -151,7 +149,7 @@ def test_a_recording_that_cannot_be_read_leaves_a_failed_project_with_the_reason
     assert web.post(f"/api/projects/{project}/run", {}, 409)["kind"] == "not-ready"
 
 
-def test_of_an_upload_that_shows_late_that_it_cannot_be_read_only_the_reason_and_the_log_stay(web: Running) -> None:
+def test_a_failed_import_of_an_upload_keeps_only_the_reason_and_the_log(web: Running) -> None:
     project = upload(web, R3D, "broken.r3d")
     web.until(lambda: web.get(f"/api/projects/{project['id']}")["status"] == "failed")
     log = web.settings.data_dir / "projects" / project["id"] / "logs" / f"job-{project['job']['id']}.log"
@@ -164,7 +162,7 @@ def test_of_an_upload_that_shows_late_that_it_cannot_be_read_only_the_reason_and
     assert left_behind(web) == []
 
 
-def test_a_recording_that_cannot_be_read_where_it_lies_stays_there(web: Running, tmp_path: Path) -> None:
+def test_a_failed_import_by_path_keeps_the_original_recording(web: Running, tmp_path: Path) -> None:
     (tmp_path / "broken.r3d").write_bytes(R3D)
     project = web.post("/api/projects/import", {"path": str(tmp_path / "broken.r3d")}, 202)["id"]
     web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "failed")
@@ -172,7 +170,7 @@ def test_a_recording_that_cannot_be_read_where_it_lies_stays_there(web: Running,
     assert web.get(f"/api/projects/{project}")["job"]["no_retry"] == ""
 
 
-def test_deleting_a_project_deletes_its_files_and_says_how_much(web: Running) -> None:
+def test_deleting_a_project_deletes_its_files_and_reports_the_freed_bytes(web: Running) -> None:
     project = web.sample()
     folder = web.settings.data_dir / "projects" / project
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
@@ -184,13 +182,13 @@ def test_deleting_a_project_deletes_its_files_and_says_how_much(web: Running) ->
     assert web.get("/api/jobs") == []
 
 
-def test_renaming_is_kept_in_the_history(web: Running) -> None:
+def test_renaming_a_project_is_recorded_in_its_history(web: Running) -> None:
     project = web.sample()
     assert web.patch(f"/api/projects/{project}", {"name": "Aunt's kitchen"})["name"] == "Aunt's kitchen"
     assert web.get(f"/api/projects/{project}/history")[0]["action"] == "rename"
 
 
-def test_a_sample_comes_with_its_clicks(web: Running) -> None:
+def test_the_sample_project_has_objects_with_clicks(web: Running) -> None:
     project = web.sample()
     assert [o["name"] for o in web.get(f"/api/projects/{project}/objects")] == ["drawer_1", "mug_1"]
     assert web.get(f"/api/projects/{project}")["counts"] == {
@@ -226,7 +224,7 @@ def break_off(web: Running, method: str, path: str, content: bytes, query: str =
     return said
 
 
-def test_an_upload_in_one_piece_whose_sender_leaves_is_forgotten(web: Running) -> None:
+def test_an_aborted_single_request_upload_leaves_nothing(web: Running) -> None:
     said = break_off(web, "POST", "/api/projects/upload", R3D[:200], query="filename=scan.r3d")
     assert said[0]["status"] == 422
     assert left_behind(web) == []

@@ -26,7 +26,7 @@ __all__ = ["kept"]
         ("bob", False),
     ],
 )
-def test_a_mention_is_a_whole_name_after_a_sign(text: str, said: bool) -> None:
+def test_a_mention_is_an_at_sign_followed_by_the_whole_name(text: str, said: bool) -> None:
     assert inbox.names("bob", text) is said
 
 
@@ -35,7 +35,7 @@ def of(kept: Kept, name: str) -> dict[str, list[dict[str, object]]]:
     return found
 
 
-def test_a_project_waits_for_whom_it_is_assigned_to_and_for_nobody_who_does_not_see_it(kept: Kept) -> None:
+def test_an_assigned_project_is_listed_for_an_assignee_who_may_see_it(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}"
     given = kept.of["alice"].put(f"{at}/assignee", json={"name": "Bob"})
     assert given.json()["assignee"] == "bob"
@@ -50,7 +50,7 @@ def test_a_project_waits_for_whom_it_is_assigned_to_and_for_nobody_who_does_not_
     assert kept.of["alice"].put(f"{at}/assignee", json={"name": None}).json()["assignee"] is None
 
 
-def test_what_is_sent_back_waits_for_its_assignee_else_for_who_had_sent_it(kept: Kept) -> None:
+def test_a_returned_project_is_listed_for_its_assignee_or_else_its_sender(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}"
     for who, was, to in (("alice", "draft", "ready"), ("bob", "ready", "in review"), ("bob", "in review", "changes requested")):
         step = {"from_state": was, "to": to, "reason": "the hinge is on the wrong side"}
@@ -65,7 +65,7 @@ def test_what_is_sent_back_waits_for_its_assignee_else_for_who_had_sent_it(kept:
     assert of(kept, "carol")["returned"] == []
 
 
-def test_a_comment_waits_for_whom_it_names_until_it_is_resolved(kept: Kept) -> None:
+def test_a_mention_is_in_the_inbox_until_its_comment_is_resolved(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}/comments"
     number = kept.of["alice"].post(at, json={"text": "is this a door, @bob?"}).json()["id"]
     kept.of["bob"].post(at, json={"text": "yes, says @bob; not @bobby"})  # Bob's own comment
@@ -76,7 +76,7 @@ def test_a_comment_waits_for_whom_it_names_until_it_is_resolved(kept: Kept) -> N
     assert of(kept, "bob")["mentions"] == []
 
 
-def test_news_are_what_others_did_since_one_read_them_or_did_something(kept: Kept) -> None:
+def test_news_are_changes_by_others_since_the_last_visit_or_own_change(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}"
     carol = kept.of["carol"]
     first = carol.get(f"{at}/news").json()
@@ -97,7 +97,7 @@ def test_news_are_what_others_did_since_one_read_them_or_did_something(kept: Kep
     ]
 
 
-def test_an_older_mark_is_no_step_back(kept: Kept) -> None:
+def test_an_older_read_marker_does_not_bring_old_news_back(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}/news"
     kept.of["alice"].post(f"/api/projects/{kept.project}/comments", json={"text": "one"})
     last = kept.of["carol"].get(at).json()["last"]
@@ -105,7 +105,7 @@ def test_an_older_mark_is_no_step_back(kept: Kept) -> None:
     assert kept.of["carol"].put(at, json={"event": 0}).json()["entries"] == []
 
 
-def test_a_folder_keeps_whose_turn_it_is(kept: Kept) -> None:
+def test_a_project_folder_stores_the_assignee_of_the_project(kept: Kept) -> None:
     kept.of["alice"].put(f"/api/projects/{kept.project}/assignee", json={"name": "bob"})
     context = kept.web.context
     with reading(context.engine) as session:
@@ -119,7 +119,7 @@ def test_a_folder_keeps_whose_turn_it_is(kept: Kept) -> None:
     assert kept.of["bob"].get(f"/api/projects/{kept.project}").json()["assignee"] == "bob"
 
 
-def test_an_object_waits_for_whom_it_is_assigned_to_as_long_as_its_project_is_in_work(kept: Kept) -> None:
+def test_an_assigned_object_is_in_the_inbox_while_its_project_is_open(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}"
     first, second = kept.of["alice"].get(f"{at}/objects").json()
     given = kept.of["alice"].patch(f"{at}/objects/{first['id']}", json={"assignee": "Bob", "version": first["version"]})
@@ -146,7 +146,7 @@ def test_an_object_waits_for_whom_it_is_assigned_to_as_long_as_its_project_is_in
     assert of(kept, "bob")["objects"] == []
 
 
-def test_a_reviewer_sees_whose_turn_an_object_is(kept: Kept) -> None:
+def test_candidates_in_review_show_the_assignee_of_their_object(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}"
     number = kept.of["alice"].get(f"{at}/objects").json()[0]["id"]
     finish(kept.web.settings.data_dir / "projects" / kept.project / "work")
@@ -155,7 +155,7 @@ def test_a_reviewer_sees_whose_turn_an_object_is(kept: Kept) -> None:
     assert (group["object"], group["assignee"]) == (number, "bob")
 
 
-def test_objects_of_whom_is_removed_are_nobodys(kept: Kept) -> None:
+def test_removing_an_account_clears_its_assignments(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}/objects"
     number = kept.of["alice"].get(at).json()[0]["id"]
     kept.of["alice"].patch(f"{at}/{number}", json={"assignee": "carol"})
@@ -163,7 +163,7 @@ def test_objects_of_whom_is_removed_are_nobodys(kept: Kept) -> None:
     assert kept.of["alice"].get(at).json()[0]["assignee"] is None
 
 
-def test_a_folder_keeps_whose_turn_an_object_is_and_a_copy_is_nobodys(kept: Kept) -> None:
+def test_a_folder_stores_object_assignees_and_a_duplicate_has_none(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}"
     number = kept.of["alice"].get(f"{at}/objects").json()[0]["id"]
     kept.of["alice"].patch(f"{at}/objects/{number}", json={"assignee": "bob"})

@@ -45,7 +45,7 @@ def request_of(web: Running, project: str, job: int) -> Path:
     return web.settings.data_dir / "projects" / project / "requests" / str(job)
 
 
-def test_a_run_goes_through_every_stage_in_a_process_each_and_keeps_its_bundle(web: Running) -> None:
+def test_a_run_executes_every_stage_and_stores_its_bundle(web: Running) -> None:
     project = web.sample()
     job = web.job(run(web, project), "done")
     assert [s["name"] for s in job["stages"]] == STAGES
@@ -60,7 +60,7 @@ def test_a_run_goes_through_every_stage_in_a_process_each_and_keeps_its_bundle(w
     assert texts[-1] == "done"
 
 
-def test_a_change_makes_the_result_stale_and_the_next_run_a_new_version(web: Running) -> None:
+def test_a_change_makes_the_result_stale_until_the_next_run(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
@@ -70,7 +70,7 @@ def test_a_change_makes_the_result_stale_and_the_next_run_a_new_version(web: Run
     assert [(b["version"], b["current"]) for b in web.get(f"/api/projects/{project}/bundles")] == [(2, True), (1, False)]
 
 
-def test_a_bundle_that_a_restored_database_does_not_know_is_not_written_over(web: Running) -> None:
+def test_a_bundle_unknown_to_a_restored_database_is_not_overwritten(web: Running) -> None:
     project = web.sample()
     unknown = web.settings.data_dir / "projects" / project / "bundles" / "v1.zip"
     unknown.parent.mkdir(parents=True)
@@ -81,7 +81,7 @@ def test_a_bundle_that_a_restored_database_does_not_know_is_not_written_over(web
 
 
 @about_workers
-def test_the_worker_is_given_the_clicks_and_corrections_of_the_moment(web: Running) -> None:
+def test_the_worker_receives_the_current_clicks_and_corrections(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
@@ -94,7 +94,7 @@ def test_the_worker_is_given_the_clicks_and_corrections_of_the_moment(web: Runni
 
 
 @about_workers
-def test_a_failed_stage_says_why_and_its_log_can_be_read_and_it_can_be_retried(web: Running) -> None:
+def test_a_failed_stage_reports_its_error_and_log_and_can_be_retried(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, align="fail")
     job = web.job(run(web, project), "failed")
@@ -114,7 +114,7 @@ def test_a_failed_stage_says_why_and_its_log_can_be_read_and_it_can_be_retried(w
 
 
 @about_workers
-def test_a_worker_that_dies_is_a_failure_in_one_line(web: Running) -> None:
+def test_a_worker_killed_on_every_attempt_fails_the_job_in_one_line(web: Running) -> None:
     project = web.sample()
     behave(web, project, generate="crash")
     job = web.job(run(web, project), "failed")
@@ -125,7 +125,7 @@ def test_a_worker_that_dies_is_a_failure_in_one_line(web: Running) -> None:
 
 
 @about_workers
-def test_a_worker_that_dies_once_is_replaced_by_itself(web: Running) -> None:
+def test_a_job_resumes_after_its_worker_is_killed_once(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, generate="hang")
     job = run(web, project)
@@ -140,7 +140,7 @@ def test_a_worker_that_dies_once_is_replaced_by_itself(web: Running) -> None:
 
 
 @about_workers
-def test_a_job_waits_for_memory_and_says_so(start: Callable[..., Any]) -> None:
+def test_a_job_waiting_for_memory_reports_the_reason(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
     with start(job_memory_bytes=1 << 60) as web:
@@ -150,14 +150,14 @@ def test_a_job_waits_for_memory_and_says_so(start: Callable[..., Any]) -> None:
 
 
 @about_workers
-def test_a_worker_that_is_done_but_does_not_leave_is_done(web: Running) -> None:
+def test_a_worker_that_finished_but_does_not_exit_counts_as_done(web: Running) -> None:
     project = web.sample()
     behave(web, project, generate="lingers")
     assert web.job(run(web, project), "done", "failed")["error"] is None
 
 
 @about_workers
-def test_cancelling_answers_before_the_worker_stops_and_stops_a_deaf_one_too(web: Running) -> None:
+def test_cancelling_stops_workers_also_if_they_ignore_sigterm(web: Running) -> None:
     for behaviour in ("hang", "deaf"):  # a deaf one ignores SIGTERM
         project = web.sample()
         folder = behave(web, project, generate=behaviour)
@@ -169,7 +169,7 @@ def test_cancelling_answers_before_the_worker_stops_and_stops_a_deaf_one_too(web
         assert web.get(f"/api/projects/{project}")["status"] == "ready"
 
 
-def test_one_heavy_job_at_a_time_and_the_others_know_their_place(web: Running) -> None:
+def test_heavy_jobs_run_one_at_a_time_and_report_their_queue_position(web: Running) -> None:
     first, second, third = web.sample(), web.sample(), web.sample()
     folder = behave(web, first, segment="hang")
     jobs = [run(web, project) for project in (first, second, third)]
@@ -191,7 +191,7 @@ def test_an_import_does_not_wait_for_a_run(web: Running) -> None:
     assert web.get(f"/api/jobs/{waiting}")["position"] == 1
 
 
-def test_a_project_has_one_job_at_a_time_and_what_it_was_given_stays(start: Callable[..., Any]) -> None:
+def test_a_project_runs_one_job_at_a_time_with_unchanged_inputs(start: Callable[..., Any]) -> None:
     with start(heavy_jobs=2) as web:
         project, other = web.sample(), web.sample()
         folder = behave(web, project, segment="hang")
@@ -212,7 +212,7 @@ def test_a_project_has_one_job_at_a_time_and_what_it_was_given_stays(start: Call
         assert [b["current"] for b in web.get(f"/api/projects/{project}/bundles")] == [True]
 
 
-def test_a_run_that_is_taken_up_again_keeps_its_clicks(start: Callable[..., Any]) -> None:
+def test_a_resumed_run_keeps_its_original_clicks(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         folder = behave(web, project, generate="hang")
@@ -228,7 +228,7 @@ def test_a_run_that_is_taken_up_again_keeps_its_clicks(start: Callable[..., Any]
         assert web.get(f"/api/projects/{project}")["result"] == "stale"
 
 
-def test_asking_twice_for_the_same_run_is_asking_once(web: Running) -> None:
+def test_requesting_the_same_run_twice_returns_the_same_job(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, segment="hang")
     job = run(web, project)
@@ -238,7 +238,7 @@ def test_asking_twice_for_the_same_run_is_asking_once(web: Running) -> None:
 
 
 @about_workers
-def test_a_run_needs_a_click_and_known_backends(web: Running) -> None:
+def test_a_run_without_clicks_or_with_unknown_backends_is_rejected(web: Running) -> None:
     project = web.sample()
     assert web.post(f"/api/projects/{project}/run", {"matcher": "magic"}, 422)["kind"] == "input"
     for item in web.get(f"/api/projects/{project}/objects"):
@@ -247,7 +247,7 @@ def test_a_run_needs_a_click_and_known_backends(web: Running) -> None:
 
 
 @about_workers
-def test_deleting_a_project_stops_its_job(web: Running) -> None:
+def test_deleting_a_project_during_its_job_removes_the_folder(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, generate="hang")
     run(web, project)
@@ -257,7 +257,7 @@ def test_deleting_a_project_stops_its_job(web: Running) -> None:
     assert not folder.exists()
 
 
-def test_a_job_that_is_deleted_while_it_runs_is_stopped_and_the_queue_goes_on(web: Running) -> None:
+def test_deleting_a_running_job_stops_it_and_the_queue_continues(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, generate="hang")
     job = run(web, project)
@@ -273,7 +273,7 @@ def test_a_job_that_is_deleted_while_it_runs_is_stopped_and_the_queue_goes_on(we
 
 
 @about_workers
-def test_a_job_goes_on_when_nobody_can_be_told_how_far_it_is(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_job_continues_when_its_progress_cannot_be_stored(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     def busy(*_: object) -> None:
         raise Unavailable("the database does not answer")
 
@@ -284,7 +284,7 @@ def test_a_job_goes_on_when_nobody_can_be_told_how_far_it_is(web: Running, monke
 
 
 @about_workers
-def test_stopping_the_server_in_order_puts_the_job_back_into_the_queue(start: Callable[..., Any]) -> None:
+def test_a_job_is_requeued_when_the_server_stops_normally(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         folder = behave(web, project, generate="hang")
@@ -295,7 +295,7 @@ def test_stopping_the_server_in_order_puts_the_job_back_into_the_queue(start: Ca
         assert web.job(job, "done", "failed")["state"] == "done"
 
 
-def test_a_job_whose_server_was_killed_is_taken_up_again_and_its_worker_ended(start: Callable[..., Any]) -> None:
+def test_a_job_of_a_killed_server_is_resumed_and_its_old_worker_killed(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         settings: Settings = web.settings
@@ -315,7 +315,7 @@ def test_a_job_whose_server_was_killed_is_taken_up_again_and_its_worker_ended(st
             assert orphan.wait(timeout=PATIENCE_S) == -signal.SIGKILL
 
 
-def test_a_job_that_lost_its_server_too_often_fails_with_the_reason(start: Callable[..., Any]) -> None:
+def test_a_job_interrupted_too_often_fails_with_the_reason(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         settings: Settings = web.settings
@@ -329,7 +329,7 @@ def test_a_job_that_lost_its_server_too_often_fails_with_the_reason(start: Calla
 
 
 @about_workers
-def test_a_job_that_lost_servers_survives_the_loss_of_a_process_too(start: Callable[..., Any]) -> None:
+def test_a_job_interrupted_by_restarts_survives_a_killed_worker(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         folder = behave(web, project, segment="hang")
@@ -347,7 +347,7 @@ def test_a_job_that_lost_servers_survives_the_loss_of_a_process_too(start: Calla
         assert web.job(job.id or 0, "done", "failed")["state"] == "done"
 
 
-def test_a_server_killed_outright_loses_no_click_and_the_next_one_goes_on(start: Callable[..., Any], tmp_path: Path) -> None:
+def test_a_killed_server_loses_no_clicks_and_the_next_one_continues(start: Callable[..., Any], tmp_path: Path) -> None:
     with start() as web:
         project = web.sample()
         folder = behave(web, project, generate="hang")

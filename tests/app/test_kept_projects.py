@@ -16,7 +16,7 @@ def clicks(web: Running, project: str) -> list[tuple[str, list[tuple[float, floa
     return [(item["name"], [(point["x"], point["y"]) for point in item["points"]]) for item in found]
 
 
-def test_a_deleted_project_is_seen_by_nobody_and_comes_back_whole(web: Running) -> None:
+def test_a_trashed_project_is_hidden_and_restored_completely(web: Running) -> None:
     project = web.sample()
     before = clicks(web, project)
     drawer = web.get(f"/api/projects/{project}/objects")[0]["id"]
@@ -33,7 +33,7 @@ def test_a_deleted_project_is_seen_by_nobody_and_comes_back_whole(web: Running) 
     assert [entry["action"] for entry in web.get(f"/api/projects/{project}/history")[:2]] == ["restore", "trash"]
 
 
-def test_only_what_is_in_the_trash_is_deleted_for_good(web: Running) -> None:
+def test_only_projects_in_the_trash_are_deleted_permanently(web: Running) -> None:
     project = web.sample()
     web.delete(f"/api/trash/{project}", 404)
     web.post(f"/api/trash/{project}/restore", status=404)
@@ -43,7 +43,7 @@ def test_only_what_is_in_the_trash_is_deleted_for_good(web: Running) -> None:
     web.post(f"/api/trash/{project}/restore", status=404)
 
 
-def test_tags_and_the_archive_are_kept_and_told(web: Running) -> None:
+def test_tags_and_archiving_are_stored_and_recorded_in_the_history(web: Running) -> None:
     project = web.sample()
     changed = web.patch(f"/api/projects/{project}", {"tags": ["oak", "Flat 3", "oak"], "archived": True})
     assert (changed["tags"], changed["archived"]) == (["Flat 3", "oak"], True)
@@ -55,7 +55,7 @@ def test_tags_and_the_archive_are_kept_and_told(web: Running) -> None:
     web.until(lambda: told.exists() and json.loads(told.read_text())["project"]["tags"] == ["Flat 3", "oak"])
 
 
-def test_a_duplicate_is_a_project_of_its_own(web: Running) -> None:
+def test_a_duplicate_is_an_independent_project(web: Running) -> None:
     project = web.sample()
     objects: list[dict[str, Any]] = web.get(f"/api/projects/{project}/objects")
     view = {"mode": "scene", "hidden": [objects[1]["name"]], "opacity": 0.5}

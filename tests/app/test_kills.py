@@ -25,7 +25,7 @@ class Begun(Forked):
 
 
 @pytest.mark.parametrize(("kills", "least"), [(1, 4), pytest.param(3, 12, marks=pytest.mark.slow)])
-def test_nothing_acknowledged_is_lost_and_work_goes_on(
+def test_acknowledged_changes_survive_sigkill_and_work_resumes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kills: int, least: int
 ) -> None:
     monkeypatch.syspath_prepend(BENCHMARKS)

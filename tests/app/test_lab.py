@@ -52,7 +52,7 @@ def lines() -> list[str]:
     return [line for block in re.findall(r"^```bash\n(.*?)^```$", PAGE.read_text(), re.M | re.S) for line in block.splitlines()]
 
 
-def test_every_command_of_the_page_is_understood() -> None:
+def test_every_command_of_the_page_is_parsed_by_the_command_line() -> None:
     commands = [line for line in lines() if "r2c2r " in line]
     given = [found[1] for line in commands if (found := re.search(r"(?:^|\()r2c2r ([^)]*)", line))]
     assert len(given) > 10
@@ -62,7 +62,7 @@ def test_every_command_of_the_page_is_understood() -> None:
 
 
 @pytest.mark.slow
-def test_every_line_of_the_page_does_what_it_says(
+def test_the_commands_of_the_page_run_in_order(
     provider: Identities,  # noqa: F811
     postgres_server: PostgresServer,
     tmp_path: Path,

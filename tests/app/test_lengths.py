@@ -18,7 +18,7 @@ def measured(web: Running) -> tuple[Running, str, int]:
     return web, project, number
 
 
-def test_a_length_is_kept_beside_what_the_scan_says_and_says_by_how_much_to_rescale(measured: tuple[Running, str, int]) -> None:
+def test_a_true_length_is_stored_with_its_error_and_the_resulting_scale(measured: tuple[Running, str, int]) -> None:
     web, project, number = measured
     at = f"/api/projects/{project}/lengths"
     assert web.get(at) == {"lengths": [], "scale": 1.0, "scale_wanted": None, "mean_error": None, "mean_error_scaled": None}
@@ -39,7 +39,7 @@ def test_a_length_is_kept_beside_what_the_scan_says_and_says_by_how_much_to_resc
     assert "removed: width of drawer_1 is 505 mm" in texts
 
 
-def test_points_lie_where_the_rescaled_recording_has_them(measured: tuple[Running, str, int]) -> None:
+def test_rescaling_the_recording_rescales_the_points_of_true_lengths(measured: tuple[Running, str, int]) -> None:
     web, project, _ = measured
     at = f"/api/projects/{project}/lengths"
     web.post(at, {"points_world": [[0, 0, 0], [0, 1.0, 0]], "metres": 1.02}, 201)
@@ -66,17 +66,17 @@ def test_points_lie_where_the_rescaled_recording_has_them(measured: tuple[Runnin
         {"metres": 0.5, "points_world": [[0, 0, 0]]},
     ],
 )
-def test_a_length_is_of_a_side_or_between_two_points(web: Running, wrong: dict) -> None:
+def test_a_length_without_a_valid_side_or_point_pair_is_rejected(web: Running, wrong: dict) -> None:
     web.post(f"/api/projects/{web.sample()}/lengths", wrong, 422)
 
 
-def test_a_length_of_an_object_that_is_not_there_is_refused_whatever_it_is_called(web: Running) -> None:
+def test_a_length_of_an_unknown_object_is_not_found(web: Running) -> None:
     at = f"/api/projects/{web.sample()}/lengths"
     for text in ("", "worktop"):
         refused = web.post(at, {"object": 10**9, "side": "width", "metres": 0.5, "text": text}, 404)
         assert refused["kind"] == "not-found"
 
 
-def test_the_scale_comes_nearest_to_every_length_relative_to_it() -> None:
+def test_the_best_scale_minimises_the_relative_error_of_all_lengths() -> None:
     assert best_scale([(0.99, 1.0), (1.98, 2.0)]) == pytest.approx(1 / 0.99)
     assert 1.0 < best_scale([(1.0, 1.0), (0.98, 1.0)]) < 1.02

@@ -42,7 +42,7 @@ def decoded(mask: dict[str, Any]) -> np.ndarray:
     return bits[: shape[0] * shape[1]].reshape(shape).astype(bool)
 
 
-def test_a_click_brings_its_masks_the_clicked_frame_first_and_they_stay(start: Callable[..., Any]) -> None:
+def test_a_click_sends_masks_clicked_frame_first_and_stores_them(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         with listening(web, project) as socket:
@@ -62,7 +62,7 @@ def test_a_click_brings_its_masks_the_clicked_frame_first_and_they_stay(start: C
         assert shown["mask"] == masks[2]["mask"]
 
 
-def test_the_end_of_masks_is_told_last_however_the_threads_meet(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_done_state_is_sent_after_all_mask_updates(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     project = web.sample()
     prompts_tell, ended = prompts._tell, threading.Event()
 
@@ -83,7 +83,7 @@ def test_the_end_of_masks_is_told_last_however_the_threads_meet(web: Running, mo
     assert told[-1] == "done"
 
 
-def test_a_newer_click_supersedes_the_masks_of_the_older(web: Running) -> None:
+def test_a_newer_click_replaces_the_masks_of_an_older_one(web: Running) -> None:
     project = web.sample()
     made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [HELD]}, 201)
     address = f"/api/projects/{project}/objects/{made['id']}/points/{made['points'][0]['id']}"
@@ -94,7 +94,7 @@ def test_a_newer_click_supersedes_the_masks_of_the_older(web: Running) -> None:
     assert mask["mask"]["left"] == 25
 
 
-def test_undo_brings_the_older_masks_back_without_computing(web: Running) -> None:
+def test_undo_restores_the_older_masks_without_recomputing(web: Running) -> None:
     project = web.sample()
     made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
     number = made["id"]
@@ -105,7 +105,7 @@ def test_undo_brings_the_older_masks_back_without_computing(web: Running) -> Non
     assert (back["segment"], back["mask_frames"]) == ("done", 3)
 
 
-def test_a_batch_of_clicks_waits_to_be_asked(web: Running) -> None:
+def test_clicks_without_inference_are_segmented_on_request(web: Running) -> None:
     project = web.sample()
     made = web.post(f"/api/projects/{project}/objects?infer=false", {"category": "drawer", "points": [CLICK]}, 201)
     assert made["segment"] == "none"
@@ -115,7 +115,7 @@ def test_a_batch_of_clicks_waits_to_be_asked(web: Running) -> None:
     assert web.get(f"/api/projects/{project}/live")["state"] == "ready"
 
 
-def test_a_click_that_finds_nothing_says_so_on_the_object(web: Running) -> None:
+def test_a_click_that_finds_nothing_adds_a_notice_to_the_object(web: Running) -> None:
     project = web.sample()
     points = [{**CLICK, "label": 0}, CLICK]
     made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": points}, 201)
@@ -123,7 +123,7 @@ def test_a_click_that_finds_nothing_says_so_on_the_object(web: Running) -> None:
     assert _object(web, project, made["id"])["notices"] == ["nothing there; click on it"]
 
 
-def test_cancelling_keeps_the_masks_that_are_there(web: Running) -> None:
+def test_cancelling_keeps_masks_that_are_already_computed(web: Running) -> None:
     project = web.sample()
     made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [HELD]}, 201)
     web.until(lambda: _object(web, project, made["id"])["mask_frames"] > 0)
@@ -132,7 +132,7 @@ def test_cancelling_keeps_the_masks_that_are_there(web: Running) -> None:
     assert stopped["mask_frames"] >= 1
 
 
-def test_masks_that_were_still_to_come_go_on_after_an_orderly_restart(start: Callable[..., Any]) -> None:
+def test_unfinished_masks_continue_after_a_normal_restart(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [HELD]}, 201)
@@ -141,7 +141,7 @@ def test_masks_that_were_still_to_come_go_on_after_an_orderly_restart(start: Cal
         web.until(lambda: _object(web, project, made["id"])["segment"] == "running")
 
 
-def test_the_time_of_preparing_proposing_and_drawing_masks_is_computing(start: Callable[..., Any]) -> None:
+def test_preparation_and_segmentation_count_as_computing_time(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         before = web.get(f"/api/projects/{project}/figures")["computing_s"]
@@ -162,7 +162,9 @@ def test_the_time_of_preparing_proposing_and_drawing_masks_is_computing(start: C
         assert web.get(f"/api/projects/{project}/figures")["computing_s"] >= ready + 0.3
 
 
-def test_an_idle_segmenter_is_stopped_and_comes_back(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_idle_segmenter_is_stopped_and_restarted_by_a_click(
+    start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("app.jobs.live.IDLE_LOOK_S", 0.05)
     with start() as web:
         project = web.sample()
@@ -175,7 +177,7 @@ def test_an_idle_segmenter_is_stopped_and_comes_back(start: Callable[..., Any], 
         web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
 
 
-def test_a_preparation_nobody_looks_at_any_more_is_stopped(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_preparation_stops_when_the_last_tab_leaves(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.jobs.live.LEFT_S", 0.3)
     with start() as web:
         project = web.sample()
@@ -193,7 +195,7 @@ def test_a_preparation_nobody_looks_at_any_more_is_stopped(start: Callable[..., 
         web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
 
 
-def test_clicks_that_came_with_a_recording_get_their_masks_when_it_is_opened(web: Running) -> None:
+def test_opening_a_recording_segments_its_imported_clicks(web: Running) -> None:
     project = web.sample()
     items = web.get(f"/api/projects/{project}/objects")
     assert [item["segment"] for item in items] == ["none", "none"]
@@ -206,7 +208,7 @@ def test_clicks_that_came_with_a_recording_get_their_masks_when_it_is_opened(web
     web.until(lambda: {item["segment"] for item in web.get(f"/api/projects/{project}/objects")} == {"done"})
 
 
-def test_masks_that_a_person_stopped_are_not_begun_again_by_opening(web: Running) -> None:
+def test_opening_does_not_restart_cancelled_masks(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}/objects"
     stopped = web.post(at, {"category": "drawer", "points": [HELD]}, 201)["id"]
@@ -216,14 +218,14 @@ def test_masks_that_a_person_stopped_are_not_begun_again_by_opening(web: Running
     assert web.get(at)[-1]["segment"] == "partial"
 
 
-def test_a_recording_is_prepared_once_it_was_read(start: Callable[..., Any]) -> None:
+def test_an_imported_recording_is_prepared_automatically(start: Callable[..., Any]) -> None:
     with start(prepare_imports=True) as web:
         project = web.sample()
         web.until(lambda: web.get(f"/api/projects/{project}/live")["state"] == "ready")
         web.until(lambda: {item["segment"] for item in web.get(f"/api/projects/{project}/objects")} == {"done"})
 
 
-def test_one_recording_is_prepared_at_a_time(start: Callable[..., Any]) -> None:
+def test_only_one_recording_is_prepared_at_a_time(start: Callable[..., Any]) -> None:
     with start() as web:
         first, second = web.sample(), web.sample()
         unclick(web, first)
@@ -240,7 +242,7 @@ def unclick(web: Running, project: str) -> None:
         web.delete(f"/api/projects/{project}/objects/{item['id']}")
 
 
-def test_a_tab_that_was_away_gets_what_it_missed_or_is_told_to_fetch_anew(web: Running) -> None:
+def test_a_reconnecting_tab_receives_missed_messages_or_a_reset(web: Running) -> None:
     project = web.sample()
     with listening(web, project) as socket:
         hello = socket.receive_json()
@@ -255,7 +257,7 @@ def test_a_tab_that_was_away_gets_what_it_missed_or_is_told_to_fetch_anew(web: R
         assert socket.receive_json()["reset"] is True
 
 
-def test_jobs_reach_every_tab_and_masks_only_those_that_look(web: Running) -> None:
+def test_job_messages_reach_every_tab_and_masks_only_watching_tabs(web: Running) -> None:
     first, second = web.sample(), web.sample()
     with listening(web, second) as socket:
         socket.receive_json()
@@ -291,7 +293,7 @@ BAD = (
 )
 
 
-def test_a_bad_message_is_answered_to_its_sender_and_to_nobody_else(web: Running) -> None:
+def test_an_invalid_message_is_answered_to_its_sender_only(web: Running) -> None:
     project = web.sample()
     with listening(web, project) as other, listening(web, project) as socket:
         for message in BAD:
@@ -308,7 +310,7 @@ def test_a_bad_message_is_answered_to_its_sender_and_to_nobody_else(web: Running
         assert {message["type"] for message in seen} <= {"hello", "project", "presence"}
 
 
-def test_the_tabs_of_a_person_are_bounded(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_tabs_of_a_person_is_limited(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.routes.live.MOST_TABS", 2)
     with listening(web, None) as first, listening(web, None) as second:
         first.receive_json(), second.receive_json()

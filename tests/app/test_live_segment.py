@@ -86,7 +86,7 @@ def click(number: int, x: float, category: str = "drawer") -> dict[str, Any]:
     return {"cmd": "segment", "object": number, "key": f"{number}-{x:g}", "prompt": prompt}
 
 
-def test_a_first_look_comes_first_and_again_only_when_the_mask_differs(desk: Any, said: list[dict[str, Any]]) -> None:
+def test_the_clicked_frame_is_sent_first_and_again_if_its_mask_changes(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.session.gate.set()
     desk.start()
     desk.put(click(1, 20.0))
@@ -98,7 +98,7 @@ def test_a_first_look_comes_first_and_again_only_when_the_mask_differs(desk: Any
     assert [line.get("frame") for line in said] == [0, 0, 1, 2, 3, None]
 
 
-def test_a_click_is_answered_while_another_objects_frames_are_at_work(desk: Any, said: list[dict[str, Any]]) -> None:
+def test_a_click_is_answered_while_another_object_is_being_segmented(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.start()
     desk.put(click(1, 20.0))
     assert desk.session.begun.wait(PATIENCE_S)
@@ -107,7 +107,7 @@ def test_a_click_is_answered_while_another_objects_frames_are_at_work(desk: Any,
     assert (said[1]["object"], said[1]["frame"]) == (2, 0)
 
 
-def test_a_newer_click_ends_the_older_masks_at_once(desk: Any, said: list[dict[str, Any]]) -> None:
+def test_a_newer_click_stops_masks_of_an_older_one_immediately(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.start()
     desk.put(click(1, 20.0))
     assert desk.session.begun.wait(PATIENCE_S)
@@ -118,7 +118,7 @@ def test_a_newer_click_ends_the_older_masks_at_once(desk: Any, said: list[dict[s
     assert [line["key"] for line in said] == ["1-20"] + ["1-10"] * 5
 
 
-def test_clicks_that_a_later_one_replaces_are_not_looked_at(desk: Any, said: list[dict[str, Any]]) -> None:
+def test_clicks_replaced_by_a_later_one_are_not_segmented(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.session.gate.set()
     for x in (5.0, 6.0, 7.0):
         desk.put(click(1, x))
@@ -128,7 +128,7 @@ def test_clicks_that_a_later_one_replaces_are_not_looked_at(desk: Any, said: lis
     assert {line["key"] for line in said} == {"1-7"}
 
 
-def test_one_whose_masks_or_front_cannot_be_shown_fails_alone(
+def test_an_object_with_a_failing_mask_or_front_fails_alone(
     desk: Any, said: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def panel(prompt: ObjectPrompt) -> None:
@@ -152,7 +152,7 @@ def test_one_whose_masks_or_front_cannot_be_shown_fails_alone(
         said.clear()
 
 
-def test_a_first_look_that_cannot_be_shown_fails_its_object_alone(desk: Any, said: list[dict[str, Any]]) -> None:
+def test_an_object_with_a_failing_first_mask_fails_alone(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.session.gate.set()
     desk.start()
     broken = SimpleNamespace(area_px=1, width=80, height=60)  # lacks its bits
@@ -165,7 +165,7 @@ def test_a_first_look_that_cannot_be_shown_fails_its_object_alone(desk: Any, sai
     until(lambda: said[-1].get("end") == "done")
 
 
-def test_a_cancelled_object_says_so_and_nothing_after(desk: Any, said: list[dict[str, Any]]) -> None:
+def test_a_cancelled_object_reports_cancelled_as_its_last_message(desk: Any, said: list[dict[str, Any]]) -> None:
     desk.start()
     desk.put(click(1, 20.0))
     assert desk.session.begun.wait(PATIENCE_S)

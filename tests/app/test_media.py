@@ -3,7 +3,7 @@ from tests.app.conftest import Running
 from tests.app.test_jobs import run
 
 
-def test_frames_are_cached_for_ever_under_their_version(web: Running) -> None:
+def test_versioned_frames_are_immutable_and_others_are_revalidated(web: Running) -> None:
     project = web.sample()
     version = web.get(f"/api/projects/{project}")["media_version"]
     answer = web.client.get(f"/media/{project}/frames/3.jpg?w=100&v={version}")
@@ -16,7 +16,7 @@ def test_frames_are_cached_for_ever_under_their_version(web: Running) -> None:
     assert "immutable" not in again.headers["cache-control"]
 
 
-def test_a_frame_comes_at_its_stored_bytes_or_at_a_kept_width(web: Running) -> None:
+def test_frames_are_sent_unchanged_and_never_enlarged(web: Running) -> None:
     project = web.sample()
     stored = web.settings.data_dir / "projects" / project / "work" / "capture" / "rgb" / "000003.jpg"
     assert web.client.get(f"/media/{project}/frames/3.jpg").content == stored.read_bytes()
@@ -26,7 +26,7 @@ def test_a_frame_comes_at_its_stored_bytes_or_at_a_kept_width(web: Running) -> N
     assert web.client.get(f"/media/{project}/thumbnail.jpg").status_code == 200
 
 
-def test_what_is_not_there_is_said_in_the_one_shape(web: Running) -> None:
+def test_missing_media_return_errors_with_a_kind(web: Running) -> None:
     project = web.sample()
     for path in ("frames/1.jpg", "frames/99.jpg", "depth/1.png", "preview.png", "scene.glb", "bundles/1.zip"):
         answer = web.client.get(f"/media/{project}/{path}")
@@ -34,12 +34,12 @@ def test_what_is_not_there_is_said_in_the_one_shape(web: Running) -> None:
         assert answer.json()["kind"] in ("not-found", "not-ready")
 
 
-def test_depth_is_a_coloured_picture(web: Running) -> None:
+def test_depth_is_sent_as_a_png_image(web: Running) -> None:
     answer = web.client.get(f"/media/{web.sample()}/depth/3.png")
     assert answer.content.startswith(b"\x89PNG")
 
 
-def test_the_scan_drawn_when_it_was_read_is_sent(web: Running) -> None:
+def test_the_scan_plan_rendered_at_import_is_sent(web: Running) -> None:
     project = web.sample()
     assert web.client.get(f"/media/{project}/scan/plan.png").json()["kind"] == "not-found"  # an older version's project
     drawn = web.settings.data_dir / "projects" / project / "scan-plan.png"
@@ -49,7 +49,7 @@ def test_the_scan_drawn_when_it_was_read_is_sent(web: Running) -> None:
     assert web.client.get(f"/media/{project}/scan/elsewhere.png").status_code == 422
 
 
-def test_a_bundle_download_can_go_on_where_it_stopped_and_is_known_by_its_checksum(web: Running) -> None:
+def test_a_bundle_download_is_resumable_and_has_its_checksum_as_etag(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     (bundle,) = web.get(f"/api/projects/{project}/bundles")
@@ -62,7 +62,7 @@ def test_a_bundle_download_can_go_on_where_it_stopped_and_is_known_by_its_checks
     assert (tail.status_code, tail.content) == (206, whole.content[100:])
 
 
-def test_the_report_may_not_run_anything(web: Running) -> None:
+def test_the_report_is_sandboxed_without_scripts(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     policy = web.client.get(f"/media/{project}/report.html").headers["content-security-policy"]
@@ -70,7 +70,7 @@ def test_the_report_may_not_run_anything(web: Running) -> None:
     assert "script" not in policy
 
 
-def test_the_scenes_page_runs_in_an_origin_of_its_own_and_reaches_nothing(web: Running) -> None:
+def test_the_scene_page_is_sandboxed_without_same_origin_or_network_access(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     policy = web.client.get(f"/media/{project}/review.html").headers["content-security-policy"]
@@ -79,7 +79,7 @@ def test_the_scenes_page_runs_in_an_origin_of_its_own_and_reaches_nothing(web: R
     assert "connect-src" not in policy
 
 
-def test_chosen_formats_are_a_download_of_their_own_that_can_go_on(web: Running) -> None:
+def test_a_download_of_selected_formats_has_its_own_etag_and_is_resumable(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     address = f"/media/{project}/bundles/1.zip?formats=urdf"

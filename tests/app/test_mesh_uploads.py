@@ -41,7 +41,7 @@ def left_behind(web: Running, project: str) -> list[Path]:
     return [path for folder in folders for path in folder.rglob("*") if path.is_file() or not any(path.iterdir())]
 
 
-def test_it_is_kept_under_a_name_of_its_own(shared: Reviewed) -> None:
+def test_uploaded_meshes_are_stored_under_unique_names(shared: Reviewed) -> None:
     web, project, number = shared
     before = left_behind(web, project)
     names = [
@@ -53,7 +53,7 @@ def test_it_is_kept_under_a_name_of_its_own(shared: Reviewed) -> None:
         assert path.is_relative_to(web.settings.data_dir / "projects" / project / "uploads")
 
 
-def test_it_is_looked_at_before_it_is_used_and_not_kept(shared: Reviewed) -> None:
+def test_inspecting_a_mesh_reports_its_size_and_stores_nothing(shared: Reviewed) -> None:
     web, project, number = shared
     before = left_behind(web, project)
     at = f"/api/projects/{project}/objects/{number}"
@@ -78,7 +78,7 @@ def test_it_is_looked_at_before_it_is_used_and_not_kept(shared: Reviewed) -> Non
         ("x.glb", b"unreadable", "x.glb: no triangles found"),
     ],
 )
-def test_what_is_no_usable_mesh_is_refused_and_leaves_nothing(shared: Reviewed, name: str, content: bytes, words: str) -> None:
+def test_an_unusable_mesh_is_refused_and_leaves_no_files(shared: Reviewed, name: str, content: bytes, words: str) -> None:
     web, project, number = shared
     before = left_behind(web, project)
     refused = send(web, address(project, number), content, 422, name)
@@ -86,7 +86,7 @@ def test_what_is_no_usable_mesh_is_refused_and_leaves_nothing(shared: Reviewed, 
     assert left_behind(web, project) == before
 
 
-def test_one_that_is_too_large_leaves_nothing(shared: Reviewed, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_that_is_too_large_is_refused_and_leaves_no_files(shared: Reviewed, monkeypatch: pytest.MonkeyPatch) -> None:
     web, project, number = shared
     before = left_behind(web, project)
     monkeypatch.setattr(mesh_uploads, "MOST_BYTES", 100)
@@ -94,7 +94,7 @@ def test_one_that_is_too_large_leaves_nothing(shared: Reviewed, monkeypatch: pyt
     assert left_behind(web, project) == before
 
 
-def test_one_whose_sender_leaves_leaves_nothing(shared: Reviewed) -> None:
+def test_an_aborted_mesh_upload_leaves_no_files(shared: Reviewed) -> None:
     web, project, number = shared
     before = left_behind(web, project)
     said = break_off(web, "POST", address(project, number), b"half", query="filename=mine.glb")
@@ -102,7 +102,7 @@ def test_one_whose_sender_leaves_leaves_nothing(shared: Reviewed) -> None:
     assert left_behind(web, project) == before
 
 
-def test_one_that_somebody_overtook_is_refused_and_leaves_nothing(shared: Reviewed, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_uploaded_for_an_outdated_version_is_refused(shared: Reviewed, monkeypatch: pytest.MonkeyPatch) -> None:
     web, project, number = shared
     before = left_behind(web, project)
     at = f"/api/projects/{project}/objects/{number}"
@@ -126,7 +126,7 @@ def test_one_that_somebody_overtook_is_refused_and_leaves_nothing(shared: Review
     assert send(web, f"{at}/candidates", b"glTF", 201, version=now)["group"]["version"] > now
 
 
-def test_an_approved_project_takes_none(shared: Reviewed) -> None:
+def test_an_approved_project_rejects_mesh_uploads(shared: Reviewed) -> None:
     web, project, number = shared
     before = left_behind(web, project)
     for to in ("ready", "in review", "approved"):

@@ -24,7 +24,7 @@ def cupboard() -> TexturedMesh:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_candidate_is_turned_until_it_looks_like_the_one_that_was_placed(seed: int) -> None:
+def test_a_candidate_is_rotated_to_match_the_placed_mesh(seed: int) -> None:
     model = cupboard()
     rng = np.random.default_rng(seed)
     unknown = Rotation.random(rng=rng).as_matrix()
@@ -34,7 +34,7 @@ def test_a_candidate_is_turned_until_it_looks_like_the_one_that_was_placed(seed:
     assert angle < 1.0  # degrees: the box is exact, the error is from sampling
 
 
-def test_the_picture_shows_the_front_from_its_side() -> None:
+def test_the_mesh_picture_shows_mostly_the_front() -> None:
     import cv2
 
     image = cv2.imdecode(np.frombuffer(mesh_picture(cupboard(), np.eye(3)), np.uint8), cv2.IMREAD_UNCHANGED)
@@ -46,7 +46,7 @@ def test_the_picture_shows_the_front_from_its_side() -> None:
     assert 0.05 < blue.mean() < red.mean()
 
 
-def test_the_glb_is_upright_in_gltf_axes() -> None:
+def test_the_glb_has_y_up_as_gltf_requires() -> None:
     import io
 
     import trimesh

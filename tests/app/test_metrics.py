@@ -28,7 +28,7 @@ def samples(web: Running) -> dict[str, float]:
     return found
 
 
-def test_requests_count_by_route_whatever_is_asked_for(web: Running) -> None:
+def test_requests_are_counted_by_route_and_not_by_path(web: Running) -> None:
     project = web.sample()
     for number in range(3):
         web.get(f"/api/projects/nothing-{number}", 404)
@@ -41,7 +41,7 @@ def test_requests_count_by_route_whatever_is_asked_for(web: Running) -> None:
     assert not any("nothing" in name or "/no/such" in name for name in found)
 
 
-def test_stages_and_the_queue_are_told(web: Running) -> None:
+def test_stages_and_the_queue_are_exported_as_metrics(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, generate="hang")
     job = run(web, project)
@@ -57,11 +57,11 @@ def test_stages_and_the_queue_are_told(web: Running) -> None:
     assert found['r2c2r_jobs{state="running"}'] == 0
 
 
-def test_a_stranger_reads_no_metrics(web: Running) -> None:
+def test_metrics_require_a_session(web: Running) -> None:
     assert TestClient(web.app, base_url=ORIGIN).get("/metrics").status_code == 401
 
 
-def test_a_bucket_counts_what_takes_at_most_as_long() -> None:
+def test_a_histogram_bucket_counts_values_up_to_its_bound() -> None:
     times = Histogram("t", "help", ("kind",), (1.0, 2.0))
     for seconds in (0.5, 1.0, 1.5, 5.0):
         times.observe(seconds, 'a "name"')
@@ -95,7 +95,7 @@ def lines(monkeypatch: pytest.MonkeyPatch) -> Lines:
     return found
 
 
-def test_a_line_names_its_request_and_its_job(web: Running, lines: Lines) -> None:
+def test_log_lines_contain_the_request_id_and_the_job_id(web: Running, lines: Lines) -> None:
     project = web.sample()
     job = run(web, project)
     web.job(job, "done")
@@ -108,12 +108,12 @@ def test_a_line_names_its_request_and_its_job(web: Running, lines: Lines) -> Non
 
 
 @pytest.mark.parametrize("given", ["", "two words", "x" * 65, "a\tb"])
-def test_an_id_that_is_none_is_replaced(web: Running, given: str) -> None:
+def test_an_invalid_request_id_is_replaced(web: Running, given: str) -> None:
     told = web.client.get("/healthz", headers={"X-Request-ID": given}).headers["x-request-id"]
     assert re.fullmatch(r"[0-9a-f]{16}", told)
 
 
-def test_another_kind_of_log_is_refused_in_a_line(
+def test_an_unknown_log_format_is_refused_in_one_line(
     tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("R2C2R_LOG", "xml")

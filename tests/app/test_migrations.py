@@ -13,7 +13,7 @@ from app.settings import shipped
 FIRST_TABLES = ("projects", "objects", "prompt_points", "verdicts", "overrides", "jobs", "job_events", "events", "bundles")
 
 
-def test_an_empty_file_becomes_what_tables_py_says(tmp_path: Path) -> None:
+def test_migrating_an_empty_file_gives_the_schema_of_the_models(tmp_path: Path) -> None:
     engine = open_engine(tmp_path / "empty.db")
     with engine.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True, "render_as_batch": True})
@@ -21,14 +21,14 @@ def test_an_empty_file_becomes_what_tables_py_says(tmp_path: Path) -> None:
     engine.dispose()
 
 
-def test_migrations_can_go_down_and_up_again(tmp_path: Path) -> None:
+def test_migrating_a_migrated_database_again_keeps_its_tables(tmp_path: Path) -> None:
     engine = open_engine(tmp_path / "round.db")
     migrate(engine)  # a repeated migration does nothing
     engine.dispose()
     assert {"projects", "objects", "events", "jobs"} <= _tables(tmp_path / "round.db")
 
 
-def test_no_migration_deletes_what_refers_to_a_table_it_makes_anew(tmp_path: Path) -> None:
+def test_migrations_keep_rows_that_refer_to_a_recreated_table(tmp_path: Path) -> None:
     path = tmp_path / "first.db"
     engine = create_engine(f"sqlite:///{path}")
     migrate(engine, "0001")
@@ -41,7 +41,7 @@ def test_no_migration_deletes_what_refers_to_a_table_it_makes_anew(tmp_path: Pat
     assert before == after == dict.fromkeys(before, 1)
 
 
-def test_the_database_is_in_wal_mode_and_keeps_foreign_keys(tmp_path: Path) -> None:
+def test_the_database_uses_wal_mode_and_enforces_foreign_keys(tmp_path: Path) -> None:
     engine = open_engine(tmp_path / "wal.db")
     with engine.connect() as connection:
         assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
@@ -49,7 +49,7 @@ def test_the_database_is_in_wal_mode_and_keeps_foreign_keys(tmp_path: Path) -> N
     engine.dispose()
 
 
-def test_the_migrations_travel_with_the_app() -> None:
+def test_the_migrations_are_packaged_with_the_app() -> None:
     folder = shipped("alembic", "env.py")
     assert (folder / "script.py.mako").is_file()
     assert not (folder / "__init__.py").exists()

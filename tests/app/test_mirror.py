@@ -56,7 +56,7 @@ def read_all(folder: Path) -> dict[str, str]:
     return {path.relative_to(root).as_posix(): path.read_text() for path in root.rglob("*") if path.is_file()}
 
 
-def test_what_one_machine_keeps_another_fetches_with_its_time(objects: Objects, tmp_path: Path) -> None:
+def test_files_stored_by_one_machine_are_fetched_with_their_time_by_another(objects: Objects, tmp_path: Path) -> None:
     here, there = machines(objects, tmp_path)
     write(tmp_path / "a", "work/nouns/a.noun", "noun")
     scan = write(tmp_path / "a", "source/scan.r3d", "scan")
@@ -72,7 +72,7 @@ def test_what_one_machine_keeps_another_fetches_with_its_time(objects: Objects, 
     assert there.size("p") == len("nounscan")
 
 
-def test_changes_and_deletions_cross_and_nothing_fetched_in_part_is_taken_for_deleted(objects: Objects, tmp_path: Path) -> None:
+def test_changes_and_deletions_propagate_also_from_partial_copies(objects: Objects, tmp_path: Path) -> None:
     here, there = machines(objects, tmp_path)
     write(tmp_path / "a", "source/scan.r3d", "scan")
     gone = write(tmp_path / "a", "facts.json", "old")
@@ -88,7 +88,7 @@ def test_changes_and_deletions_cross_and_nothing_fetched_in_part_is_taken_for_de
     assert read_all(tmp_path / "a") == {"source/scan.r3d": "scan", "masks/1": "mask", "work/x": "x"} == read_all(tmp_path / "b")
 
 
-def test_of_many_that_keep_at_once_nobody_loses_anything(objects: Objects, tmp_path: Path) -> None:
+def test_concurrent_writers_to_one_store_lose_no_files(objects: Objects, tmp_path: Path) -> None:
     mirrors = [Mirror(objects, tmp_path / str(number)) for number in range(6)]
     for number in range(6):
         write(tmp_path / str(number), f"masks/{number}", str(number))
@@ -102,7 +102,7 @@ def test_of_many_that_keep_at_once_nobody_loses_anything(objects: Objects, tmp_p
     assert read_all(tmp_path / "last") == {f"masks/{number}": str(number) for number in range(6)}
 
 
-def test_who_kept_while_others_did_fetches_what_they_kept(objects: Objects, tmp_path: Path) -> None:
+def test_a_machine_fetches_files_stored_by_others_meanwhile(objects: Objects, tmp_path: Path) -> None:
     here, there = machines(objects, tmp_path)
     write(tmp_path / "a", "masks/1", "1")
     write(tmp_path / "b", "masks/2", "2")
@@ -112,7 +112,7 @@ def test_who_kept_while_others_did_fetches_what_they_kept(objects: Objects, tmp_
     assert read_all(tmp_path / "b") == {"masks/1": "1", "masks/2": "2"}
 
 
-def test_who_lost_a_job_keeps_nothing_it_made_and_still_what_pages_wrote(objects: Objects, tmp_path: Path) -> None:
+def test_a_machine_that_lost_its_job_stores_page_changes_but_no_results(objects: Objects, tmp_path: Path) -> None:
     here, there = machines(objects, tmp_path)
     write(tmp_path / "a", "project.json", "{}")
     here.keep("p")
@@ -143,7 +143,7 @@ def test_who_lost_a_job_keeps_nothing_it_made_and_still_what_pages_wrote(objects
     here.keep("p")
 
 
-def test_a_machine_makes_a_part_for_who_holds_the_project(objects: Objects, tmp_path: Path) -> None:
+def test_a_helper_stores_results_only_while_its_job_owns_the_project(objects: Objects, tmp_path: Path) -> None:
     here, there = machines(objects, tmp_path)
     write(tmp_path / "a", "project.json", "{}")
     here.keep("p")
@@ -157,7 +157,7 @@ def test_a_machine_makes_a_part_for_who_holds_the_project(objects: Objects, tmp_
         there.keep("p")
 
 
-def test_a_project_deleted_for_good_leaves_nothing_and_does_not_come_back(objects: Objects, tmp_path: Path) -> None:
+def test_a_permanently_deleted_project_cannot_be_stored_again(objects: Objects, tmp_path: Path) -> None:
     here, there = machines(objects, tmp_path)
     write(tmp_path / "a", "work/x", "x")
     here.keep("p")
@@ -173,7 +173,7 @@ def test_a_project_deleted_for_good_leaves_nothing_and_does_not_come_back(object
     assert objects.has("projects/p/manifest.json") is False
 
 
-def test_room_is_made_by_what_the_store_holds_and_not_by_what_is_in_use(
+def test_the_cache_evicts_only_stored_projects_that_are_not_in_use(
     objects: Objects, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cache = Mirror(objects, tmp_path / "a", quota_bytes=3)
@@ -193,7 +193,7 @@ def test_room_is_made_by_what_the_store_holds_and_not_by_what_is_in_use(
     assert read_all(tmp_path / "a") == {"work/x": "four", "masks/1": "not kept yet"}
 
 
-def test_a_log_is_shown_while_it_is_written(objects: Objects, tmp_path: Path) -> None:
+def test_a_log_is_readable_on_another_machine_while_it_is_written(objects: Objects, tmp_path: Path) -> None:
     here, there = machines(objects, tmp_path)
     here.keep_log("p", write(tmp_path / "a", "logs/job-1.log", "one line"))
     log = tmp_path / "b/projects/p/logs/job-1.log"
@@ -201,7 +201,7 @@ def test_a_log_is_shown_while_it_is_written(objects: Objects, tmp_path: Path) ->
     assert log.read_text() == "one line"
 
 
-def test_other_bytes_than_were_kept_are_refused(objects: Objects, tmp_path: Path) -> None:
+def test_stored_files_with_a_wrong_checksum_are_refused(objects: Objects, tmp_path: Path) -> None:
     here, there = machines(objects, tmp_path)
     write(tmp_path / "a", "work/x", "x")
     here.keep("p")
@@ -212,7 +212,7 @@ def test_other_bytes_than_were_kept_are_refused(objects: Objects, tmp_path: Path
     assert read_all(tmp_path / "b") == {}
 
 
-def test_a_browser_takes_a_kept_file_from_the_store_under_its_name(
+def test_a_browser_downloads_from_the_store_by_a_link_with_the_file_name(
     s3: ObjectServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in s3.environment.items():
@@ -229,7 +229,7 @@ def test_a_browser_takes_a_kept_file_from_the_store_under_its_name(
 
 
 @pytest.mark.parametrize("address", ["nonsense", "ftp://host/x", "s3://"])
-def test_an_address_that_is_none_is_refused_in_one_line(address: str) -> None:
+def test_an_invalid_store_address_is_refused_in_one_line(address: str) -> None:
     with pytest.raises(InputError, match="R2C2R_STORE") as refused:
         open_objects(address)
     assert "\n" not in str(refused.value)

@@ -34,7 +34,7 @@ def worked_on(tmp_path: Path) -> Path:
     return data
 
 
-def test_rows_move_to_a_postgres_and_back_and_are_the_same(
+def test_rows_moved_to_postgres_and_back_are_unchanged(
     worked_on: Path, postgres_server: PostgresServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     address, back = postgres_server.of_folder(tmp_path), tmp_path / "back" / "r2c2r.db"
@@ -68,7 +68,7 @@ def test_rows_move_to_a_postgres_and_back_and_are_the_same(
     postgres_server.drop_all()
 
 
-def test_nothing_is_written_over(
+def test_moving_and_restoring_never_overwrite_existing_rows(
     worked_on: Path, postgres_server: PostgresServer, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, address = str(worked_on / "r2c2r.db"), postgres_server.of_folder(tmp_path)
@@ -86,7 +86,7 @@ def test_nothing_is_written_over(
     postgres_server.drop_all()
 
 
-def test_rows_that_do_not_arrive_as_they_left_are_not_stored(
+def test_a_move_that_loses_rows_is_rolled_back(
     worked_on: Path, postgres_server: PostgresServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     address, portions = postgres_server.of_folder(tmp_path), moving._rows
@@ -103,7 +103,7 @@ def test_rows_that_do_not_arrive_as_they_left_are_not_stored(
     postgres_server.drop_all()
 
 
-def test_a_backup_of_a_postgres_is_restored_into_an_empty_one(
+def test_a_postgres_backup_is_restored_into_an_empty_database(
     worked_on: Path,
     postgres_server: PostgresServer,
     tmp_path: Path,

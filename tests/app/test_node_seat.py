@@ -64,7 +64,7 @@ def heard_to_the_end(seat: NodeSeat) -> Heard:
     return Heard(lines, b"".join(each.log for each in heard), heard[-1].status)
 
 
-def test_what_a_node_made_is_in_the_store_when_its_last_word_is_heard(order: Order, tmp_path: Path) -> None:
+def test_results_of_a_node_are_in_the_store_when_its_step_ends(order: Order, tmp_path: Path) -> None:
     seat = NodeSeat(order)
     assert seat.start() is None
     heard = heard_to_the_end(seat)
@@ -76,7 +76,7 @@ def test_what_a_node_made_is_in_the_store_when_its_last_word_is_heard(order: Ord
     assert (tmp_path / "other/projects/p" / "work/made.noun").read_text() == "made"
 
 
-def test_two_steps_on_a_node_have_a_cache_each(order: Order, tmp_path: Path) -> None:
+def test_concurrent_steps_on_a_node_have_separate_caches(order: Order, tmp_path: Path) -> None:
     first, second = NodeSeat(order), NodeSeat(order)
     assert (first.start(), second.start()) == (None, None)
     assert heard_to_the_end(first).status == heard_to_the_end(second).status == 0
@@ -87,7 +87,7 @@ def test_two_steps_on_a_node_have_a_cache_each(order: Order, tmp_path: Path) -> 
     assert not (tmp_path / "web/ray/2").exists()
 
 
-def test_a_step_whose_job_was_lost_meanwhile_keeps_nothing(order: Order, tmp_path: Path) -> None:
+def test_a_step_of_a_lost_job_stores_no_results(order: Order, tmp_path: Path) -> None:
     seat = NodeSeat(order)
     assert seat.start() is None
     other = open_store(Settings(data_dir=tmp_path / "other", store=order.store))
@@ -98,7 +98,7 @@ def test_a_step_whose_job_was_lost_meanwhile_keeps_nothing(order: Order, tmp_pat
     assert not (tmp_path / "other/projects/p" / "work/made.noun").exists()
 
 
-def test_a_step_is_asked_to_stop(order: Order) -> None:
+def test_a_step_is_stopped_by_sigterm(order: Order) -> None:
     seat = NodeSeat(replace(order, command=(sys.executable, "-c", WAITS)))
     assert seat.start() is None
     until(lambda: seat.hear().lines)
@@ -106,13 +106,13 @@ def test_a_step_is_asked_to_stop(order: Order) -> None:
     assert heard_to_the_end(seat).status == -15
 
 
-def test_another_version_is_refused(order: Order) -> None:
+def test_a_step_of_another_version_is_refused(order: Order) -> None:
     wrong = NodeSeat(replace(order, version="9.9")).start()
     assert wrong is not None
     assert wrong["error"]["message"] == f"this is r2c2r 9.9, and the Ray node's is {version()}"
 
 
-def test_a_process_group_ends_with_who_began_it() -> None:
+def test_a_tethered_process_group_ends_with_its_starter() -> None:
     script = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']); " + WAITS
     with subprocess.Popen(
         [*python_module("app.tethered"), sys.executable, "-c", script],
@@ -136,7 +136,7 @@ def test_a_process_group_ends_with_who_began_it() -> None:
 
 
 @pytest.mark.parametrize(("code", "status"), [("raise SystemExit(3)", 3), ("import os; os.kill(os.getpid(), 9)", -9)])
-def test_it_ends_as_its_program_does_and_hands_on_what_it_is_told(code: str, status: int) -> None:
+def test_a_tethered_program_keeps_its_exit_status_and_receives_stdin(code: str, status: int) -> None:
     echo = "import sys; sys.stdout.write(sys.stdin.readline()); sys.stdout.flush(); "
     with subprocess.Popen(
         [*python_module("app.tethered"), sys.executable, "-c", echo + code], stdin=subprocess.PIPE, stdout=subprocess.PIPE

@@ -99,7 +99,7 @@ def refusal(web: Running) -> str:
     return next(line.detail for line in audit.entries(web.context.engine, None, 50).entries if line.action == "refused")
 
 
-def test_whom_the_provider_names_is_in_with_the_highest_role_of_their_groups(web: Running, provider: Identities) -> None:
+def test_a_provider_user_gets_the_highest_role_of_their_groups(web: Running, provider: Identities) -> None:
     provider.knows("1", **ANN)
     client, answer = sign_in(web, provider, "1", "/p/x/annotate?frame=3")
     assert (answer.status_code, answer.headers["location"]) == (303, f"{ORIGIN}/p/x/annotate?frame=3")
@@ -109,14 +109,14 @@ def test_whom_the_provider_names_is_in_with_the_highest_role_of_their_groups(web
     assert lines == [("signed in", "ann", f"by {provider.issuer}"), ("added", provider.issuer, "admin")]
 
 
-def test_the_sign_in_page_has_the_button_where_there_is_a_provider(web: Running, provider: Identities) -> None:
+def test_the_sign_in_page_has_a_button_for_a_configured_provider(web: Running, provider: Identities) -> None:
     page = browser(web).get("/login").text
     assert f'href="/login/provider">Sign in at {urlsplit(provider.issuer).netloc}<' in page
     web.context.provider.issuer = "https://<b>"  # type: ignore[union-attr]
     assert "&lt;b&gt;" in browser(web).get("/login").text
 
 
-def test_without_a_provider_there_is_neither_button_nor_way(start: Callable[..., Any]) -> None:
+def test_without_a_provider_its_button_and_routes_are_absent(start: Callable[..., Any]) -> None:
     with start(accounts_only=True) as web:
         stranger = browser(web)
         assert 'href="/login/provider" hidden' in stranger.get("/login").text
@@ -124,7 +124,7 @@ def test_without_a_provider_there_is_neither_button_nor_way(start: Callable[...,
             assert stranger.get(path, follow_redirects=False).status_code == 404
 
 
-def test_groups_decide_the_role_each_time_and_a_new_name_stays_the_same_person(web: Running, provider: Identities) -> None:
+def test_each_sign_in_updates_the_role_and_a_renamed_user_keeps_the_account(web: Running, provider: Identities) -> None:
     for claims, role in (
         (ANN, "admin"),
         ({**ANN, "groups": ["cn=reviewers"]}, "reviewer"),
@@ -138,9 +138,7 @@ def test_groups_decide_the_role_each_time_and_a_new_name_stays_the_same_person(w
 
 
 @pytest.mark.parametrize("groups", [[], ["choir"], None, {"lab": 1}, [["lab"]]])
-def test_who_is_in_no_group_that_may_is_refused_on_the_page_and_recorded(
-    web: Running, provider: Identities, groups: Any
-) -> None:
+def test_a_user_without_an_allowed_group_is_refused_and_recorded(web: Running, provider: Identities, groups: Any) -> None:
     provider.knows("2", preferred_username="bob", groups=groups)
     client, answer = sign_in(web, provider, "2")
     assert (answer.status_code, COOKIE in client.cookies) == (403, False)
@@ -149,9 +147,7 @@ def test_who_is_in_no_group_that_may_is_refused_on_the_page_and_recorded(
     assert accounts.everyone(web.context.engine) == []
 
 
-def test_without_groups_the_default_role_is_given_once_and_then_an_admins_to_change(
-    start: Callable[..., Any], provider: Identities
-) -> None:
+def test_the_default_role_is_assigned_only_at_the_first_sign_in(start: Callable[..., Any], provider: Identities) -> None:
     with start(**asking(provider, oidc_roles="", default_role="reviewer")) as web:
         provider.knows("3", email="Cleo@lab.example", email_verified=True)
         client, _ = sign_in(web, provider, "3")
@@ -162,12 +158,12 @@ def test_without_groups_the_default_role_is_given_once_and_then_an_admins_to_cha
 
 
 @pytest.mark.parametrize("claims", [{}, {"email": "ann@lab.example"}, {"email": "a@b.c", "email_verified": "true"}])
-def test_an_email_that_nobody_verified_is_no_name(web: Running, provider: Identities, claims: dict[str, Any]) -> None:
+def test_an_unverified_email_is_not_accepted_as_a_name(web: Running, provider: Identities, claims: dict[str, Any]) -> None:
     provider.knows("4", groups=["lab"], **claims)
     assert sign_in(web, provider, "4")[1].status_code == 403
 
 
-def test_who_chooses_somebody_elses_name_at_the_provider_does_not_become_them(web: Running, provider: Identities) -> None:
+def test_a_provider_user_cannot_take_over_an_account_by_its_name(web: Running, provider: Identities) -> None:
     accounts.add(web.context.engine, "root", "admin", PASSWORD)
     provider.knows("5", preferred_username="root", groups=["lab"])
     client, answer = sign_in(web, provider, "5")
@@ -175,7 +171,7 @@ def test_who_chooses_somebody_elses_name_at_the_provider_does_not_become_them(we
     assert "the account root belongs to somebody else" in answer.text
 
 
-def test_an_answer_is_of_use_to_the_browser_alone_that_began_and_once(web: Running, provider: Identities) -> None:
+def test_a_provider_response_is_valid_once_and_in_its_own_browser_only(web: Running, provider: Identities) -> None:
     provider.knows("1", **ANN)
     client, page = begin(web)
     back = provider.lets_in(page, "1")
@@ -188,7 +184,7 @@ def test_an_answer_is_of_use_to_the_browser_alone_that_began_and_once(web: Runni
     assert client.get(back, follow_redirects=False).status_code == 401
 
 
-def test_a_code_is_of_use_to_the_verifier_alone_that_it_was_asked_with(web: Running, provider: Identities) -> None:
+def test_an_authorization_code_with_a_wrong_pkce_verifier_is_refused(web: Running, provider: Identities) -> None:
     provider.knows("1", **ANN)
     client, page = begin(web)
     assert parse_qs(urlsplit(page).query)["code_challenge_method"] == ["S256"]
@@ -204,9 +200,7 @@ def test_a_code_is_of_use_to_the_verifier_alone_that_it_was_asked_with(web: Runn
     ("claim", "value"),
     [("nonce", "another"), ("aud", "another-client"), ("iss", "https://evil.example"), ("exp", -1000), ("at_hash", "AAAA")],
 )
-def test_a_token_that_says_otherwise_than_was_asked_is_not_believed(
-    web: Running, provider: Identities, claim: str, value: Any
-) -> None:
+def test_an_id_token_with_a_wrong_claim_is_refused(web: Running, provider: Identities, claim: str, value: Any) -> None:
     provider.knows("1", **ANN)
     client, page = begin(web)
     provider.bend(**{claim: value})
@@ -215,9 +209,7 @@ def test_a_token_that_says_otherwise_than_was_asked_is_not_believed(
     assert "is not valid" in answer.text
 
 
-def test_algorithms_without_a_public_key_are_none_even_where_the_provider_offers_them(
-    web: Running, provider: Identities
-) -> None:
+def test_symmetric_and_none_signing_algorithms_are_not_accepted(web: Running, provider: Identities) -> None:
     begin(web)
     offered = web.context.provider._app.server_metadata  # type: ignore[union-attr]
     offered["id_token_signing_alg_values_supported"] = ["none", "HS256", "RS256"]
@@ -226,7 +218,7 @@ def test_algorithms_without_a_public_key_are_none_even_where_the_provider_offers
 
 
 @pytest.mark.parametrize("said", ["error=access_denied", "iss=https://evil.example&code=x"])
-def test_what_the_provider_refuses_or_another_one_says_lets_nobody_in(web: Running, said: str) -> None:
+def test_provider_errors_and_foreign_issuers_do_not_sign_in(web: Running, said: str) -> None:
     client, page = begin(web)
     state = parse_qs(urlsplit(page).query)["state"][0]
     answer = client.get(f"/login/provider/back?{said}&state={state}", follow_redirects=False)
@@ -237,13 +229,13 @@ def test_what_the_provider_refuses_or_another_one_says_lets_nobody_in(web: Runni
 @pytest.mark.parametrize(
     "wanted", ["https://evil.example/", "//evil.example/", "/\\evil.example", "javascript:1", "/" + "a" * 2000]
 )
-def test_after_signing_in_a_browser_stays_here(web: Running, provider: Identities, wanted: str) -> None:
+def test_sign_in_redirects_stay_on_this_site(web: Running, provider: Identities, wanted: str) -> None:
     provider.knows("1", **ANN)
     _, answer = sign_in(web, provider, "1", wanted)
     assert answer.headers["location"].startswith(f"{ORIGIN}/")
 
 
-def test_signing_out_ends_the_session_here_and_goes_on_to_the_providers(web: Running, provider: Identities) -> None:
+def test_signing_out_ends_the_session_here_and_at_the_provider(web: Running, provider: Identities) -> None:
     provider.knows("1", **ANN)
     client, _ = sign_in(web, provider, "1")
     session, page = client.cookies[COOKIE], client.get("/api/system").json()["sign_out"]
@@ -256,7 +248,7 @@ def test_signing_out_ends_the_session_here_and_goes_on_to_the_providers(web: Run
     assert provider.client.get(there).status_code == 200
 
 
-def test_the_provider_is_asked_again_after_a_day_and_a_password_is_not(
+def test_provider_sessions_expire_before_password_sessions(
     web: Running, provider: Identities, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     provider.knows("1", **ANN)
@@ -269,13 +261,13 @@ def test_the_provider_is_asked_again_after_a_day_and_a_password_is_not(
     assert (ann.get("/api/projects").status_code, bob.get("/api/projects").status_code) == (401, 200)
 
 
-def test_a_provider_that_does_not_answer_is_said_on_the_page(start: Callable[..., Any], provider: Identities) -> None:
+def test_an_unreachable_provider_is_reported_on_the_page(start: Callable[..., Any], provider: Identities) -> None:
     with start(**asking(provider, identity="oidc:http://127.0.0.1:9")) as web:
         answer = browser(web).get("/login/provider", follow_redirects=False)
         assert (answer.status_code, "http://127.0.0.1:9 does not answer" in answer.text) == (503, True)
 
 
-def test_a_provider_that_calls_itself_otherwise_is_not_asked(start: Callable[..., Any], provider: Identities) -> None:
+def test_a_provider_with_a_different_issuer_is_refused(start: Callable[..., Any], provider: Identities) -> None:
     with start(**asking(provider, identity=f"oidc:{provider.issuer.replace('127.0.0.1', 'localhost')}")) as web:
         web.context.provider._app._server_metadata_url = f"{provider.issuer}/.well-known/openid-configuration"
         answer = browser(web).get("/login/provider", follow_redirects=False)
@@ -283,7 +275,7 @@ def test_a_provider_that_calls_itself_otherwise_is_not_asked(start: Callable[...
 
 
 @pytest.mark.parametrize("text", ["lab", "=admin", "lab=owner"])
-def test_groups_without_a_role_are_said(text: str) -> None:
+def test_an_invalid_mapping_of_groups_to_roles_raises(text: str) -> None:
     with pytest.raises(InputError):
         roles_of_groups(text)
 
@@ -291,15 +283,13 @@ def test_groups_without_a_role_are_said(text: str) -> None:
 @pytest.mark.parametrize(
     "issuer", ["", "http://id.lab.example", "https://", "ftp://id.lab.example", "https://id.lab.example?x"]
 )
-def test_an_issuer_without_tls_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, issuer: str) -> None:
+def test_an_issuer_without_tls_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, issuer: str) -> None:
     monkeypatch.setenv("R2C2R_IDENTITY", f"oidc:{issuer}")
     with pytest.raises(InputError, match="R2C2R_IDENTITY"):
         serve(host="127.0.0.1", port=0, data_dir=tmp_path / "data")
 
 
-def test_a_provider_to_which_this_server_is_nobody_is_said_before_anything_starts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_oidc_client_id_is_refused_before_the_server_starts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("R2C2R_IDENTITY", "oidc:https://id.lab.example")
     with pytest.raises(InputError, match="R2C2R_OIDC_CLIENT"):
         serve(host="127.0.0.1", port=0, data_dir=tmp_path / "data")

@@ -52,7 +52,7 @@ def keyed(web: Running, method: str, path: str, key: str, body: Any = None) -> A
     return web.client.request(method, path, json=body, headers={"Idempotency-Key": key})
 
 
-def test_a_click_sent_twice_is_one_click(web: Running, at: str) -> None:
+def test_a_click_sent_twice_with_one_key_is_added_once(web: Running, at: str) -> None:
     first = keyed(web, "POST", f"{at}/objects/1/points", "k1", CLICK)
     again = keyed(web, "POST", f"{at}/objects/1/points", "k1", CLICK)
     assert (first.status_code, again.status_code) == (201, 201)
@@ -61,7 +61,7 @@ def test_a_click_sent_twice_is_one_click(web: Running, at: str) -> None:
     assert web.get(f"{at}/objects")[0]["points"] == first.json()["points"]
 
 
-def test_two_keys_and_no_key_are_changes_of_their_own(web: Running, at: str) -> None:
+def test_requests_with_different_keys_or_none_are_separate_changes(web: Running, at: str) -> None:
     before = len(web.get(f"{at}/objects")[0]["points"])
     for key in ("a", "b"):
         keyed(web, "POST", f"{at}/objects/1/points", key, CLICK)
@@ -70,7 +70,7 @@ def test_two_keys_and_no_key_are_changes_of_their_own(web: Running, at: str) -> 
     assert len(web.get(f"{at}/objects")[0]["points"]) == before + 4
 
 
-def test_a_change_kept_for_one_person_is_not_made_by_another(web: Running, at: str) -> None:
+def test_a_change_queued_by_one_person_is_refused_for_another(web: Running, at: str) -> None:
     before = web.get(f"{at}/objects")[0]["points"]
     headers = {"Idempotency-Key": "whose", "X-R2C2R-Person": "J%C3%BCrgen"}
     refused = web.client.post(f"{at}/objects/1/points", json=CLICK, headers=headers)
@@ -81,7 +81,7 @@ def test_a_change_kept_for_one_person_is_not_made_by_another(web: Running, at: s
     assert web.client.post(f"{at}/objects/1/points", json=CLICK, headers=own).status_code == 201
 
 
-def test_the_answer_is_lost_on_the_way_and_the_undo_is_still_one(web: Running, at: str) -> None:
+def test_an_undo_repeated_after_a_lost_response_is_applied_once(web: Running, at: str) -> None:
     for _ in range(3):
         web.post(f"{at}/objects/1/points", CLICK)
     before = len(web.get(f"{at}/objects")[0]["points"])
@@ -91,7 +91,7 @@ def test_the_answer_is_lost_on_the_way_and_the_undo_is_still_one(web: Running, a
     assert len(web.get(f"{at}/objects")[0]["points"]) == before - 1
 
 
-def test_a_server_that_died_before_it_could_answer_says_that_the_change_is_stored(
+def test_a_repeat_after_a_crash_reports_that_the_change_is_stored(
     start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with start() as web:
@@ -105,7 +105,9 @@ def test_a_server_that_died_before_it_could_answer_says_that_the_change_is_store
         assert len(web.get(f"{at}/comments")) == 1
 
 
-def test_a_click_and_its_answer_are_one_transaction(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_click_and_its_response_are_stored_in_one_transaction(
+    start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     with start() as web:
         at = f"/api/projects/{web.sample()}"
         monkeypatch.setattr(sending, "keep", lambda *_: None)  # the server dies after the change is stored
@@ -121,14 +123,14 @@ def test_a_click_and_its_answer_are_one_transaction(start: Callable[..., Any], m
         assert web.get(f"{at}/objects")[0]["points"] == undone.json()["object"]["points"]
 
 
-def test_what_was_refused_is_not_remembered(web: Running, at: str) -> None:
+def test_refused_requests_do_not_consume_their_key(web: Running, at: str) -> None:
     assert keyed(web, "POST", f"{at}/redo", "r", {"object": 1}).status_code == 409
     web.post(f"{at}/objects/1/points", CLICK)
     web.post(f"{at}/undo", {"object": 1})
     assert keyed(web, "POST", f"{at}/redo", "r", {"object": 1}).status_code == 200
 
 
-def test_a_key_is_for_one_change(web: Running, at: str) -> None:
+def test_a_key_reused_for_another_change_is_rejected(web: Running, at: str) -> None:
     keyed(web, "POST", f"{at}/objects/1/points", "k", CLICK)
     refused = keyed(web, "POST", f"{at}/objects/2/points", "k", CLICK)
     assert (refused.status_code, refused.json()["kind"]) == (422, "input")
@@ -136,9 +138,7 @@ def test_a_key_is_for_one_change(web: Running, at: str) -> None:
     assert keyed(web, "POST", f"{at}/objects/1/points", "k" * 200, CLICK).status_code == 422
 
 
-def test_the_same_change_sent_at_once_is_made_once_and_answered_each_time(
-    web: Running, at: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_concurrent_repeats_apply_once_and_are_all_answered(web: Running, at: str, monkeypatch: pytest.MonkeyPatch) -> None:
     before = len(web.get(f"{at}/objects")[0]["points"])
     came: list[int] = []
     check, add = sending.check_person, prompts.add_point
@@ -162,9 +162,7 @@ def test_the_same_change_sent_at_once_is_made_once_and_answered_each_time(
     assert len(web.get(f"{at}/objects")[0]["points"]) == before + 1
 
 
-def test_keys_are_forgotten_after_a_while_and_with_their_project(
-    web: Running, at: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_keys_expire_and_are_deleted_with_their_project(web: Running, at: str, monkeypatch: pytest.MonkeyPatch) -> None:
     keyed(web, "POST", f"{at}/objects/1/points", "k", CLICK)
     assert _kept(web) == 1
     sending.tidy(web.context)
@@ -181,7 +179,7 @@ def test_keys_are_forgotten_after_a_while_and_with_their_project(
 
 
 @pytest.mark.both_databases(quick=False)
-def test_whatever_may_be_sent_again_changes_nothing_the_second_time(start: Callable[..., Any], tmp_path: Path) -> None:
+def test_every_repeatable_operation_is_idempotent(start: Callable[..., Any], tmp_path: Path) -> None:
     viewer = Viewer(Settings(data_dir=tmp_path / "data", **PATIENT), fake("viewer"))
     with start(viewer=viewer) as web:
         tried = set()
@@ -316,7 +314,7 @@ def send_marked(web: Running, method: str, path: str, key: str, sent: Any) -> An
     return keyed(web, method, path, key, sent)
 
 
-def test_a_second_transaction_of_one_change_is_refused_by_the_database(web: Running, at: str) -> None:
+def test_the_database_rejects_a_second_transaction_of_one_change(web: Running, at: str) -> None:
     change = Sending("digest", "POST /x", None)
     with once.marked(change):
         with writing(web.context.engine) as session:

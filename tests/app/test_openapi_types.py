@@ -5,13 +5,13 @@ from app.openapi_types import app_document, declarations
 STATIC = Path(__file__).parents[2] / "static"
 
 
-def test_the_front_ends_types_are_those_of_the_app() -> None:
+def test_the_committed_typescript_types_match_the_api() -> None:
     committed = (STATIC / "js" / "api-types.d.ts").read_text()
     hint = "run: python -m app.openapi_types > static/js/api-types.d.ts"
     assert committed == declarations(app_document()), hint
 
 
-def test_unions_arrays_and_tables_become_typescript() -> None:
+def test_unions_arrays_and_objects_are_converted_to_typescript() -> None:
     shape = {
         "type": "object",
         "required": ["a", "b"],
