@@ -28,7 +28,7 @@ def click(kept: Kept, project: str, name: str, category: str, x: float) -> None:
     kept.web.until(done)
 
 
-def test_an_opinion_has_the_recording_and_nothing_that_anybody_made_of_it(kept: Kept) -> None:
+def test_a_second_opinion_has_the_recording_without_any_annotations(kept: Kept) -> None:
     at = f"/api/projects/{kept.project}"
     kept.of["alice"].post(f"{at}/comments", json={"text": "the hinge is on the left"})
     made = kept.of["alice"].post(f"{at}/opinions", json={"name": "Bob"}).json()
@@ -46,7 +46,7 @@ def test_an_opinion_has_the_recording_and_nothing_that_anybody_made_of_it(kept: 
     assert (refused.status_code, refused.json()["message"]) == (422, "nobody called stranger sees this project")
 
 
-def test_agreement_is_told_by_object_and_what_one_alone_has(kept: Kept) -> None:
+def test_agreement_is_reported_by_object_with_unmatched_objects(kept: Kept) -> None:
     other = ask(kept)
     for item in kept.of["alice"].get(f"/api/projects/{kept.project}/objects").json():
         kept.of["alice"].delete(f"/api/projects/{kept.project}/objects/{item['id']}")
@@ -76,7 +76,7 @@ def test_agreement_is_told_by_object_and_what_one_alone_has(kept: Kept) -> None:
     assert (lines[1]["mask IoU"], lines[1]["same category"], lines[0]["second object"]) == ("0.667", "yes", "")
 
 
-def test_opinions_of_one_recording_know_each_other_and_nobody_is_told_of_what_they_do_not_see(kept: Kept) -> None:
+def test_opinions_list_the_others_that_the_person_may_see(kept: Kept) -> None:
     second, third = ask(kept), ask(kept, None)
     of_copy = kept.of["bob"].post(f"/api/projects/{second}/opinions", json={"name": "carol"}).json()["id"]
     copy = kept.of["bob"].post(f"/api/projects/{second}/duplicate").json()["id"]  # a copy is not an opinion

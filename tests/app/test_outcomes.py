@@ -20,7 +20,7 @@ from tests.app.test_jobs import run
 from tests.core.export.test_report import certificate
 
 
-def test_the_clicks_of_the_last_run_are_replaced_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_clicks_of_the_last_run_are_replaced_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A server killed meanwhile leaves the former ones: whoever has them open still reads all of them."""
     monkeypatch.setattr(outcomes, "keep_bundle", lambda *_: None)
     files = project_files(tmp_path, "p")
@@ -39,7 +39,7 @@ def test_the_clicks_of_the_last_run_are_replaced_whole(tmp_path: Path, monkeypat
     engine.dispose()
 
 
-def test_others_may_write_while_a_bundle_is_copied(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_database_is_not_locked_while_a_bundle_is_copied(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     project, digest = web.sample(), outcomes._sha256
     looked: list[Path] = []
 
@@ -59,7 +59,9 @@ def test_others_may_write_while_a_bundle_is_copied(web: Running, monkeypatch: py
 
 
 @pytest.mark.parametrize("stored_as_pairs", [False, True])
-def test_the_doubts_of_a_certificate_are_shown(web: Running, monkeypatch: pytest.MonkeyPatch, stored_as_pairs: bool) -> None:
+def test_certificate_doubts_are_returned_with_object_and_reason(
+    web: Running, monkeypatch: pytest.MonkeyPatch, stored_as_pairs: bool
+) -> None:
     """Those of a bundle are; and those of a row that an older version wrote, which holds pairs."""
     made = replace(certificate(), likeness=Likeness(state="doubtful", doubts=(("drawer_1", "is 40 % sure"),)))
     project = web.sample()

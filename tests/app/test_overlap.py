@@ -23,7 +23,7 @@ def bits(mask: np.ndarray) -> Bits:
     return mask_bits(pack_mask(mask), SHAPE[1])
 
 
-def test_an_iou_over_frames_is_that_of_all_their_pixels_together() -> None:
+def test_the_iou_over_frames_is_that_of_all_pixels_together() -> None:
     rng = np.random.default_rng(0)
     for _ in range(100):
         first, second = ([random_mask(rng) for _ in range(3)] for _ in range(2))
@@ -35,7 +35,7 @@ def test_an_iou_over_frames_is_that_of_all_their_pixels_together() -> None:
         assert (found[0].iou if found else 0.0) == pytest.approx(wanted, abs=1e-12)
 
 
-def test_frames_in_which_one_has_no_mask_count_against_them() -> None:
+def test_frames_with_only_one_mask_lower_the_iou() -> None:
     mask = np.zeros(SHAPE, bool)
     mask[:10, :10] = True
     overlaps = Overlaps()
@@ -45,7 +45,7 @@ def test_frames_in_which_one_has_no_mask_count_against_them() -> None:
     assert (pair.iou, pair.frames) == (0.5, 1)
 
 
-def test_each_object_has_one_other_at_most_the_most_alike_whatever_their_order() -> None:
+def test_each_object_matches_at_most_the_most_similar_one_in_any_order() -> None:
     masks = {name: np.zeros(SHAPE, bool) for name in ("left", "whole", "right")}
     masks["left"][:, :12] = masks["right"][:, 12:20] = masks["whole"][:, :20] = True
     drawn = {name: bits(mask) for name, mask in masks.items()}
@@ -59,7 +59,7 @@ def test_each_object_has_one_other_at_most_the_most_alike_whatever_their_order()
         assert overlaps.matched(0.61) == []
 
 
-def test_frames_that_are_too_many_are_left_out_evenly() -> None:
+def test_frames_beyond_the_limit_are_subsampled_evenly() -> None:
     assert spread([5, 1, 3], 3) == [1, 3, 5]
     few = spread(range(1000), 5)
     assert (few[0], few[-1], len(few)) == (0, 999, 5)

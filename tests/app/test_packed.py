@@ -5,7 +5,7 @@ from tests.app.conftest import Running
 PLAIN = {"accept-encoding": "identity"}
 
 
-def test_an_answer_in_words_is_packed_for_who_takes_that_and_pictures_are_not(web: Running) -> None:
+def test_text_is_gzipped_if_accepted_and_images_are_not(web: Running) -> None:
     project = web.sample()
     plain = web.client.get("/api/openapi.json", headers=PLAIN)
     assert "content-encoding" not in plain.headers
@@ -20,7 +20,7 @@ def test_an_answer_in_words_is_packed_for_who_takes_that_and_pictures_are_not(we
         assert "content-encoding" not in web.client.get(path).headers  # already compressed, or small
 
 
-def test_what_an_answer_says_beside_its_bytes_stays(web: Running) -> None:
+def test_compression_keeps_headers_errors_and_replayed_responses(web: Running) -> None:
     project = web.sample()
     page = web.client.get("/")
     assert page.headers["content-encoding"] == "gzip"

@@ -69,7 +69,7 @@ def test_every_operation_needs_a_session(shared: Running) -> None:
 
 
 @pytest.mark.parametrize(("role", "forbidden"), [("annotator", REVIEWER | ADMIN), ("reviewer", ADMIN), ("admin", set())])
-def test_every_operation_knows_who_may(shared: Running, role: str, forbidden: set[str]) -> None:
+def test_every_operation_allows_exactly_its_roles(shared: Running, role: str, forbidden: set[str]) -> None:
     found = operations(shared)
     assert {operation for operation, _, _ in found} >= REVIEWER | ADMIN | OPEN
     with signed_in(shared, f"the-{role}") as client:
@@ -80,13 +80,13 @@ def test_every_operation_knows_who_may(shared: Running, role: str, forbidden: se
             assert refused == (operation in forbidden), operation
 
 
-def test_undoing_a_review_is_reviewing(shared: Running) -> None:
+def test_undoing_a_review_needs_the_role_of_a_reviewer(shared: Running) -> None:
     with signed_in(shared, "the-annotator") as client:
         assert client.post("/api/projects/x/undo", json={"scope": "review"}).status_code == 403
         assert client.post("/api/projects/x/undo", json={"scope": "prompts"}).status_code == 404
 
 
-def test_the_history_says_who_did_what(shared: Running) -> None:
+def test_the_history_names_the_person_of_a_change(shared: Running) -> None:
     with signed_in(shared, "the-reviewer") as client:
         project = client.post("/api/projects/sample", json={}).json()["id"]
         Running.until(lambda: client.get(f"/api/projects/{project}").json()["status"] == "ready")
@@ -122,7 +122,7 @@ def connection(client: TestClient) -> Any:
     return client.websocket_connect(f"{SOCKETS}/api/live", headers={"origin": ORIGIN})
 
 
-def test_signing_out_closes_the_open_connections_of_that_session_and_no_other(shared: Running) -> None:
+def test_signing_out_closes_only_the_connections_of_that_session(shared: Running) -> None:
     with (
         signed_in(shared, "the-reviewer") as leaving,
         signed_in(shared, "the-reviewer") as staying,
@@ -136,7 +136,7 @@ def test_signing_out_closes_the_open_connections_of_that_session_and_no_other(sh
         assert {kept.receive_json()["type"] for _ in range(3)} == {"hello", "project", "presence"}
 
 
-def test_an_admin_lets_somebody_in_changes_what_they_may_and_removes_them(shared: Running) -> None:
+def test_an_admin_adds_an_account_changes_its_role_and_removes_it(shared: Running) -> None:
     with signed_in(shared, "the-admin") as admin:
         new = {"name": "Eve", "role": "annotator", "password": PASSWORD}
         assert admin.post("/api/accounts", json=new).json()["name"] == "eve"
@@ -156,7 +156,7 @@ def test_an_admin_lets_somebody_in_changes_what_they_may_and_removes_them(shared
         assert {each["name"]: each["you"] for each in admin.get("/api/accounts").json()}["the-admin"] is True
 
 
-def test_what_the_command_line_changes_reaches_open_connections(shared: Running) -> None:
+def test_removing_an_account_outside_the_api_closes_its_connections(shared: Running) -> None:
     engine = shared.context.engine
     accounts.add(engine, "visitor", "annotator", PASSWORD)
     client = browser(shared)
@@ -167,14 +167,14 @@ def test_what_the_command_line_changes_reaches_open_connections(shared: Running)
         assert closed_with(socket) == 4401
 
 
-def test_who_has_no_account_is_not_found(shared: Running) -> None:
+def test_an_unknown_account_is_not_found(shared: Running) -> None:
     with signed_in(shared, "the-admin") as admin:
         for body in ({}, {"role": "reviewer"}, {"password": PASSWORD}):
             assert admin.patch("/api/accounts/nobody", json=body).status_code == 404
         assert admin.delete("/api/accounts/nobody").status_code == 404
 
 
-def test_the_last_admin_stays(shared: Running) -> None:
+def test_the_last_admin_cannot_be_removed_or_demoted(shared: Running) -> None:
     with signed_in(shared, "the-admin") as admin:
         assert admin.delete("/api/accounts/the-admin").status_code == 409
         assert admin.patch("/api/accounts/the-admin", json={"role": "annotator"}).status_code == 409
@@ -183,7 +183,7 @@ def test_the_last_admin_stays(shared: Running) -> None:
             change(shared.context.engine, "the-admin")
 
 
-def test_of_two_admins_who_remove_each_other_at_once_one_stays(shared: Running) -> None:
+def test_concurrent_demotion_of_both_admins_keeps_one(shared: Running) -> None:
     engine = shared.context.engine
     accounts.add(engine, "second", "admin", PASSWORD)
 
@@ -200,7 +200,7 @@ def test_of_two_admins_who_remove_each_other_at_once_one_stays(shared: Running) 
         accounts.change(engine, name, role=role)
 
 
-def test_ones_own_password_needs_the_old_one_and_ends_other_sessions(shared: Running) -> None:
+def test_changing_a_password_needs_the_old_one_and_ends_other_sessions(shared: Running) -> None:
     accounts.add(shared.context.engine, "careful", "annotator", PASSWORD)
     here, there = browser(shared), browser(shared)
     for client in (here, there):
@@ -212,7 +212,7 @@ def test_ones_own_password_needs_the_old_one_and_ends_other_sessions(shared: Run
     assert there.get("/api/projects").status_code == 401
 
 
-def test_a_local_session_is_worth_nothing_once_others_can_reach_the_server(start: Callable[..., Any]) -> None:
+def test_a_local_session_is_invalid_once_accounts_are_required(start: Callable[..., Any]) -> None:
     with start() as web:
         cookie = web.client.cookies[COOKIE]
     with start(accounts_only=True) as web:

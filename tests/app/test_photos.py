@@ -57,7 +57,7 @@ def store(work: Path, made: ArticulatedScene, motion: JointMotion | None) -> Non
 
 
 @pytest.mark.parametrize(("frame", "out_m"), [(0, 0.0), (3, 0.25), (7, 0.0)])
-def test_a_leaf_is_drawn_where_it_stood_in_the_photo(reviewed: Reviewed, frame: int, out_m: float) -> None:
+def test_a_leaf_is_placed_at_its_joint_state_in_the_photo(reviewed: Reviewed, frame: int, out_m: float) -> None:
     web, project, _ = reviewed
     filmed(reviewed, FILMED)
     with reading(web.context.engine) as session:
@@ -66,7 +66,7 @@ def test_a_leaf_is_drawn_where_it_stood_in_the_photo(reviewed: Reviewed, frame: 
     np.testing.assert_allclose(front.vertices_world - base.vertices_world, np.tile([0.0, -out_m, 0.0], (8, 1)), atol=1e-12)
 
 
-def test_a_hinged_leaf_turns_about_its_hinge(reviewed: Reviewed) -> None:
+def test_a_hinged_leaf_rotates_about_its_hinge(reviewed: Reviewed) -> None:
     web, project, _ = reviewed
     made = scene("drawer_1")
     (item,) = made.objects
@@ -83,7 +83,7 @@ def test_a_hinged_leaf_turns_about_its_hinge(reviewed: Reviewed) -> None:
     np.testing.assert_allclose(front.vertices_world, np.stack([-y, x, z], axis=1) + origin, atol=1e-9)
 
 
-def test_photos_say_how_far_it_was_open_and_where_it_is_in_them(reviewed: Reviewed) -> None:
+def test_photos_report_joint_states_and_the_bounding_box_of_the_object(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     filmed(reviewed, FILMED)
     photos = web.get(f"/api/projects/{project}/objects/{number}/photos")["photos"]
@@ -97,7 +97,7 @@ def test_photos_say_how_far_it_was_open_and_where_it_is_in_them(reviewed: Review
         assert 0 <= top < bottom <= 1
 
 
-def test_what_something_covers_in_the_photo_is_drawn_faintly(reviewed: Reviewed) -> None:
+def test_occluded_surface_is_drawn_faintly_over_the_photo(reviewed: Reviewed) -> None:
     web, project, drawer = reviewed
     filmed(reviewed, None)
     with reading(web.context.engine) as session:
@@ -121,7 +121,7 @@ def test_what_something_covers_in_the_photo_is_drawn_faintly(reviewed: Reviewed)
     assert 0 < alpha(1.0) < 100
 
 
-def test_marks_are_shown_at_once_and_taken_back(reviewed: Reviewed) -> None:
+def test_marked_joint_states_are_shown_immediately_and_undone(reviewed: Reviewed) -> None:
     """Closed here, open by so much there: the leaf over the photos, its lane and its limit follow before any run."""
     web, project, number = reviewed
     filmed(reviewed, FILMED)
@@ -150,7 +150,7 @@ def test_marks_are_shown_at_once_and_taken_back(reviewed: Reviewed) -> None:
     assert web.client.get(f"{picture}&v={version}").content != drawn
 
 
-def test_a_leaf_that_was_never_seen_to_move_can_be_marked(reviewed: Reviewed) -> None:
+def test_a_leaf_without_observed_motion_can_be_marked(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     filmed(reviewed, None)
     address = f"/api/projects/{project}/objects/{number}"

@@ -31,7 +31,7 @@ def rita(web: Running) -> TestClient:
     return client
 
 
-def test_messages_name_the_file_and_to_admins_the_way_to_it(
+def test_error_messages_show_full_server_paths_to_admins_only(
     web: Running, rita: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place = str(web.settings.data_dir)
@@ -48,12 +48,12 @@ def test_messages_name_the_file_and_to_admins_the_way_to_it(
     assert place in web.client.get("/api/projects/ab").text
 
 
-def test_folders_that_recordings_come_from_are_the_admins(web: Running, rita: TestClient) -> None:
+def test_import_roots_are_listed_for_admins_only(web: Running, rita: TestClient) -> None:
     assert web.get("/api/system")["import_roots"] == [str(root) for root in web.settings.roots]
     assert rita.get("/api/system").json()["import_roots"] == []
 
 
-def test_hidden_folders_are_not_listed_by_their_path_either(web: Running, tmp_path: Path) -> None:
+def test_hidden_folders_cannot_be_browsed_or_imported_by_path(web: Running, tmp_path: Path) -> None:
     (tmp_path / ".ssh" / "inner").mkdir(parents=True)
     for folder in (".ssh", ".ssh/inner"):
         assert web.client.get("/api/browse", params={"path": str(tmp_path / folder)}).status_code == 403
@@ -61,7 +61,7 @@ def test_hidden_folders_are_not_listed_by_their_path_either(web: Running, tmp_pa
     assert web.client.get("/api/browse", params={"path": str(tmp_path)}).status_code == 200
 
 
-def test_only_the_way_is_left_out(web: Running) -> None:
+def test_only_the_prefix_of_the_data_folder_is_removed_from_messages(web: Running) -> None:
     text = f"{web.settings.data_dir}/projects/ab/clicks/overrides.json: a/b is no pose; see /api/openapi.json"
     assert without_places(f"{web.settings.data_dir}-2/x", web.settings) != "…-2/x"
     assert without_places(text, web.settings) == "…/projects/ab/clicks/overrides.json: a/b is no pose; see /api/openapi.json"

@@ -29,7 +29,7 @@ PROBE = Commands().probe
         ("noise", "kettle.glb: not a readable GLB mesh"),
     ],
 )
-def test_a_mesh_is_refused_when_no_candidate_can_be_made_of_it(tmp_path: Path, content: str, words: str) -> None:
+def test_the_probe_refuses_a_mesh_that_cannot_become_a_candidate(tmp_path: Path, content: str, words: str) -> None:
     file = tmp_path / "a1b2.glb"
     size = [1.0, 0.6, 0.4 if content == "box" else 0.0]
     made = trimesh.creation.box(size).export(file_type="glb")
@@ -50,7 +50,7 @@ def test_a_mesh_is_refused_when_no_candidate_can_be_made_of_it(tmp_path: Path, c
 
 
 @pytest.mark.parametrize("forged", [True, False], ids=["forged", "whole"])
-def test_a_video_that_names_one_in_the_servers_folder_is_refused(tmp_path: Path, forged: bool) -> None:
+def test_a_video_that_refers_to_a_file_of_the_server_is_refused(tmp_path: Path, forged: bool) -> None:
     folder = write_stray(tmp_path / "scan", TinyRoom(count=3))
     shutil.copy(folder / "rgb.mp4", tmp_path / "secret.mp4")
     if forged:
@@ -64,12 +64,12 @@ def test_a_video_that_names_one_in_the_servers_folder_is_refused(tmp_path: Path,
     assert not forged or "an MP4 was expected" in last["error"]["message"]
 
 
-def test_whatever_decodes_uploads_is_started_alone() -> None:
+def test_probe_and_ingest_start_in_an_isolated_process() -> None:
     commands = Commands()
     assert [command[1:3] for command in (commands.probe, commands.ingest)] == [("-m", "r2c2r_core.alone")] * 2
 
 
-def test_what_a_killed_worker_leaves_in_its_temporary_folder_goes(tmp_path: Path) -> None:
+def test_the_temporary_folder_of_a_killed_worker_is_deleted(tmp_path: Path) -> None:
     leaves = "import json, tempfile, time; print(json.dumps({'at': tempfile.mkdtemp()}), flush=True); time.sleep(600)"
     worker = Worker((sys.executable, "-c", leaves), tmp_path / "log")
     try:

@@ -94,7 +94,7 @@ def given(web: Running, project: str) -> tuple[Any, Any]:
     return json.loads(found["prompts.json"]), json.loads(found["overrides.json"])
 
 
-def test_all_that_people_made_comes_back_on_another_server(first: tuple[Running, str], second: Running) -> None:
+def test_a_project_file_restores_all_annotations_on_another_server(first: tuple[Running, str], second: Running) -> None:
     content = exported(first)
     made = take_in(second, content)
     assert (made["name"], made["tags"], made["checklist"], made["job"]["kind"]) == ("Old kitchen", ["oak"], LISTED, "import")
@@ -120,9 +120,7 @@ def test_all_that_people_made_comes_back_on_another_server(first: tuple[Running,
     assert not (stored / "half-made").exists()
 
 
-def test_what_was_approved_there_is_a_draft_here_and_nothing_is_said_by_people_of_there(
-    first: tuple[Running, str], second: Running
-) -> None:
+def test_an_imported_project_is_a_draft_without_foreign_names(first: tuple[Running, str], second: Running) -> None:
     accounts.add(second.context.engine, "ann", "admin", "three plain words")  # a different person of the same name
     made = take_in(second, exported(first))
     second.until(lambda: second.get(f"/api/projects/{made['id']}")["status"] == "ready")
@@ -133,7 +131,7 @@ def test_what_was_approved_there_is_a_draft_here_and_nothing_is_said_by_people_o
     assert "approved" not in json.dumps([members(exported(first))[n].decode() for n in ("project.json", "overrides.json")])
 
 
-def test_without_its_recording_it_waits_for_it(first: tuple[Running, str], second: Running) -> None:
+def test_a_project_file_without_recording_waits_for_its_upload(first: tuple[Running, str], second: Running) -> None:
     content = exported(first, recording=False)
     assert sorted(name.split("/")[0] for name in members(content)) == [
         "meshes",
@@ -158,7 +156,7 @@ def test_without_its_recording_it_waits_for_it(first: tuple[Running, str], secon
     assert second.client.put(f"{at}/recording", json={"upload": sent}).json()["kind"] == "conflict"
 
 
-def test_it_is_told_how_large_it_would_be(first: tuple[Running, str]) -> None:
+def test_the_export_offer_reports_the_size_of_the_file(first: tuple[Running, str]) -> None:
     web, project = first
     offer = web.get(f"/api/projects/{project}/file")
     assert offer["recording_bytes"] == len(R3D)
@@ -197,7 +195,7 @@ REFUSED: list[tuple[str, Callable[[Any], Any], str]] = [
 
 
 @pytest.mark.parametrize(("document", "change", "words"), REFUSED)
-def test_a_file_that_says_what_cannot_be_is_refused_in_one_line(
+def test_a_project_file_with_invalid_contents_is_refused_in_one_line(
     first: tuple[Running, str], web: Running, document: str, change: Callable[[Any], Any], words: str
 ) -> None:
     error = take_in(web, changed(exported(first, recording=False), document, change), 422)
@@ -209,7 +207,7 @@ def test_a_file_that_says_what_cannot_be_is_refused_in_one_line(
     assert left_behind(web) == []
 
 
-def test_a_damaged_or_hostile_file_leaves_nothing(first: tuple[Running, str], start: Callable[..., Any]) -> None:
+def test_a_damaged_or_hostile_project_file_leaves_nothing(first: tuple[Running, str], start: Callable[..., Any]) -> None:
     content = exported(first)
     found = members(content)
     link = zipfile.ZipInfo("recording/link")
@@ -242,7 +240,7 @@ def test_a_damaged_or_hostile_file_leaves_nothing(first: tuple[Running, str], st
         assert "unpacks to" in take_in(web, content, 422)["message"]
 
 
-def test_a_recording_in_a_folder_goes_as_a_zip(tmp_path: Path, first: tuple[Running, str], second: Running) -> None:
+def test_a_folder_recording_is_exported_as_a_zip(tmp_path: Path, first: tuple[Running, str], second: Running) -> None:
     folder = tmp_path / "My scan"
     for name in ("depth/0.png", "rgb/0.jpg"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -259,7 +257,7 @@ def test_a_recording_in_a_folder_goes_as_a_zip(tmp_path: Path, first: tuple[Runn
     second.until(lambda: second.get(f"/api/projects/{made['id']}")["status"] == "ready")
 
 
-def test_no_more_than_a_piece_of_it_is_in_memory(tmp_path: Path) -> None:
+def test_the_export_is_streamed_in_small_pieces(tmp_path: Path) -> None:
     large = tmp_path / "scan.r3d"
     with large.open("wb") as sparse:
         sparse.truncate(64 << 20)
@@ -269,7 +267,7 @@ def test_no_more_than_a_piece_of_it_is_in_memory(tmp_path: Path) -> None:
     assert max(pieces) < 2 << 20
 
 
-def test_a_recording_that_is_gone_is_said_to_be(tmp_path: Path, second: Running) -> None:
+def test_exporting_a_missing_recording_is_not_found_with_a_hint(tmp_path: Path, second: Running) -> None:
     project = upload(second, R3D)["id"]
     second.until(lambda: second.get(f"/api/projects/{project}")["status"] == "ready")
     (second.settings.data_dir / "projects" / project / "source" / "scan.r3d").unlink()
@@ -278,7 +276,7 @@ def test_a_recording_that_is_gone_is_said_to_be(tmp_path: Path, second: Running)
     assert second.client.get(f"/media/{project}/project.zip").status_code == 200
 
 
-def test_who_does_not_see_a_project_gets_no_file_of_it(first: tuple[Running, str], second: Running) -> None:
+def test_people_without_access_cannot_export_a_project(first: tuple[Running, str], second: Running) -> None:
     made = take_in(second, exported(first))["id"]
     second.until(lambda: second.get(f"/api/projects/{made}")["status"] == "ready")
     assert second.client.put(f"/api/projects/{made}/members", json={"members_only": True, "members": []}).status_code == 200
@@ -292,7 +290,7 @@ def test_who_does_not_see_a_project_gets_no_file_of_it(first: tuple[Running, str
     assert own.json()["review_state"] == "draft"
 
 
-def test_an_import_that_was_interrupted_is_finished_by_asking_again(
+def test_an_interrupted_import_is_completed_by_a_retry(
     first: tuple[Running, str], second: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     content = exported(first)
@@ -305,7 +303,7 @@ def test_an_import_that_was_interrupted_is_finished_by_asking_again(
     second.until(lambda: second.get(f"/api/projects/{sent}")["status"] == "ready")
 
 
-def test_another_recording_is_refused_by_its_frames() -> None:
+def test_a_different_recording_is_refused_by_its_frames() -> None:
     def table(*cameras: float, width: int = 160) -> list[dict[str, Any]]:
         return [{"index": k, "width": width, "height": 120, "camera": [x, 0.0, 1.5]} for k, x in enumerate(cameras)]
 

@@ -65,7 +65,7 @@ def about(kept: Kept) -> list[tuple[str, str, str]]:
 
 
 @pytest.mark.both_databases(quick=False)
-def test_every_operation_about_the_project_is_not_found_by_others(kept: Kept) -> None:
+def test_every_operation_on_the_project_is_not_found_by_non_members(kept: Kept) -> None:
     assert kept.keep_to("bob").json()["members"] == ["bob"]
     operations = about(kept)
     assert len(operations) > 60
@@ -80,7 +80,7 @@ def test_every_operation_about_the_project_is_not_found_by_others(kept: Kept) ->
 
 
 @pytest.mark.both_databases(quick=False)
-def test_lists_and_pages_do_not_tell_of_it(kept: Kept) -> None:
+def test_lists_and_pages_hide_the_project_from_non_members(kept: Kept) -> None:
     kept.keep_to("bob")
     for name, seen in (("alice", 1), ("bob", 1), ("root", 1), ("carol", 0)):
         assert len(kept.of[name].get("/api/projects").json()) == seen
@@ -92,7 +92,7 @@ def test_lists_and_pages_do_not_tell_of_it(kept: Kept) -> None:
 
 
 @pytest.mark.both_databases(quick=False)
-def test_live_connections_tell_members_only(kept: Kept) -> None:
+def test_live_messages_are_sent_to_members_only(kept: Kept) -> None:
     address, sockets = f"{SOCKETS}/api/live?project={kept.project}", {"headers": {"origin": ORIGIN}}
     with (
         kept.of["carol"].websocket_connect(address, **sockets) as carol,
@@ -114,7 +114,7 @@ def test_live_connections_tell_members_only(kept: Kept) -> None:
 
 
 @pytest.mark.both_databases(quick=False)
-def test_who_is_at_a_project_and_loses_sight_of_it_is_told(kept: Kept) -> None:
+def test_a_person_who_loses_access_to_an_open_project_is_notified(kept: Kept) -> None:
     address, sockets = f"{SOCKETS}/api/live?project={kept.project}", {"headers": {"origin": ORIGIN}}
 
     def told_gone(socket: Any) -> bool:
@@ -142,7 +142,7 @@ def test_who_is_at_a_project_and_loses_sight_of_it_is_told(kept: Kept) -> None:
 
 
 @pytest.mark.both_databases(quick=False)
-def test_who_is_at_a_project_that_is_deleted_is_told(kept: Kept) -> None:
+def test_a_person_in_a_project_that_is_deleted_is_notified(kept: Kept) -> None:
     with kept.of["carol"].websocket_connect(f"{SOCKETS}/api/live?project={kept.project}", headers={"origin": ORIGIN}) as carol:
         assert kept.of["root"].delete(f"/api/projects/{kept.project}").status_code == 200
         while (message := carol.receive_json())["type"] != "gone":
@@ -151,7 +151,7 @@ def test_who_is_at_a_project_that_is_deleted_is_told(kept: Kept) -> None:
 
 
 @pytest.mark.both_databases(quick=False)
-def test_a_3d_view_that_was_open_is_closed_to_who_may_not_look_any_more(kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_person_without_access_cannot_reach_a_3d_view(kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
     kept.keep_to("bob")
     monkeypatch.setattr(type(kept.web.context.viewer), "project_of", lambda _, token: kept.project)
     assert kept.of["carol"].get("/viewer/token/").status_code == 404
@@ -164,7 +164,7 @@ def test_a_3d_view_that_was_open_is_closed_to_who_may_not_look_any_more(kept: Ke
 
 
 @pytest.mark.both_databases(quick=False)
-def test_naming_members_closes_the_3d_views_of_others_only(kept: Kept) -> None:
+def test_restricting_a_project_closes_the_3d_views_of_non_members(kept: Kept) -> None:
     project, viewer = kept.project, kept.web.context.viewer
     sessions = {name: next(iter(kept.of[name].cookies.values())) for name in PEOPLE}
     views = {name: Opened(project, session, Path()) for name, session in sessions.items()}
@@ -173,7 +173,7 @@ def test_naming_members_closes_the_3d_views_of_others_only(kept: Kept) -> None:
     assert {name for name in PEOPLE if viewer.project_of(views[name].token) == project} == {"alice", "bob", "root"}
 
 
-def test_only_the_owner_and_admins_name_members(kept: Kept) -> None:
+def test_only_the_owner_and_admins_set_members(kept: Kept) -> None:
     assert kept.keep_to("bob", by="bob").status_code == 403
     assert kept.keep_to("nobody").status_code == 422
     assert kept.keep_to("bob", by="root").json()["owner"] == "alice"
@@ -186,7 +186,7 @@ def test_only_the_owner_and_admins_name_members(kept: Kept) -> None:
 
 
 @pytest.mark.both_databases(quick=False)
-def test_a_project_is_open_until_members_are_named_and_opens_again(kept: Kept) -> None:
+def test_a_project_is_restricted_only_while_members_only_is_set(kept: Kept) -> None:
     for change in ((), (True,), (False,)):
         if change:
             kept.keep_to(members_only=change[0])
@@ -194,7 +194,7 @@ def test_a_project_is_open_until_members_are_named_and_opens_again(kept: Kept) -
         assert kept.of["carol"].get(f"/api/projects/{kept.project}").status_code == expected
 
 
-def test_an_account_that_goes_takes_its_membership_and_opens_nothing(kept: Kept) -> None:
+def test_a_recreated_account_does_not_inherit_membership(kept: Kept) -> None:
     kept.keep_to("bob")
     for name in ("bob", "alice"):
         assert kept.of["root"].delete(f"/api/accounts/{name}").status_code == 204
@@ -204,7 +204,7 @@ def test_an_account_that_goes_takes_its_membership_and_opens_nothing(kept: Kept)
     assert kept.of["root"].get(kept.members).json()["owner"] is None
 
 
-def test_members_hold_after_a_restart(kept: Kept) -> None:
+def test_members_are_kept_after_a_restart(kept: Kept) -> None:
     kept.keep_to("bob")
     kept.web.context.access.look_again()  # as at a restart
     assert kept.of["carol"].get(f"/api/projects/{kept.project}").status_code == 404

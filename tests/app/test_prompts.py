@@ -13,7 +13,7 @@ pytestmark = pytest.mark.both_databases
 CLICK = {"frame": 3, "x": 80.5, "y": 60.5, "label": 1}
 
 
-def test_a_click_is_stored_and_undone_and_redone_also_after_a_restart(start: Callable[..., Any]) -> None:
+def test_clicks_are_stored_and_can_be_undone_and_redone_after_a_restart(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
@@ -36,7 +36,7 @@ def test_a_click_is_stored_and_undone_and_redone_also_after_a_restart(start: Cal
         web.post(f"/api/projects/{project}/redo", {"object": number}, 409)
 
 
-def test_a_click_is_not_undone_over_what_somebody_changed_meanwhile(web: Running) -> None:
+def test_undo_of_an_outdated_version_is_a_conflict(web: Running) -> None:
     project = web.sample()
     item = web.get(f"/api/projects/{project}/objects")[0]
     at = f"/api/projects/{project}/objects/{item['id']}"
@@ -48,7 +48,7 @@ def test_a_click_is_not_undone_over_what_somebody_changed_meanwhile(web: Running
     assert undone["version"] == undone["object"]["version"] > renamed["version"]
 
 
-def test_undo_of_the_project_takes_the_last_change_of_any_object(web: Running) -> None:
+def test_undo_without_an_object_reverts_the_last_change_of_any_object(web: Running) -> None:
     project = web.sample()
     first, second = (o["id"] for o in web.get(f"/api/projects/{project}/objects"))
     web.post(f"/api/projects/{project}/objects/{first}/points", CLICK, 201)
@@ -60,7 +60,7 @@ def test_undo_of_the_project_takes_the_last_change_of_any_object(web: Running) -
     assert web.post(f"/api/projects/{project}/redo", {})["object"]["category"] == "oven"
 
 
-def test_a_new_change_ends_what_could_be_redone(web: Running) -> None:
+def test_a_new_change_clears_the_redo_stack(web: Running) -> None:
     project = web.sample()
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
     web.post(f"/api/projects/{project}/objects/{number}/points", CLICK, 201)
@@ -70,7 +70,7 @@ def test_a_new_change_ends_what_could_be_redone(web: Running) -> None:
     web.post(f"/api/projects/{project}/redo", {"object": number}, 409)
 
 
-def test_a_deleted_object_comes_back_whole(web: Running) -> None:
+def test_undo_restores_a_deleted_object_completely(web: Running) -> None:
     project = web.sample()
     before = web.get(f"/api/projects/{project}/objects")[0]
     assert web.delete(f"/api/projects/{project}/objects/{before['id']}")["deleted"]
@@ -79,7 +79,7 @@ def test_a_deleted_object_comes_back_whole(web: Running) -> None:
     assert (back["name"], back["points"], back["deleted"]) == (before["name"], before["points"], False)
 
 
-def test_undoing_a_deletion_whose_name_was_taken_says_so(web: Running) -> None:
+def test_undoing_a_deletion_with_a_reused_name_is_a_conflict(web: Running) -> None:
     project = web.sample()
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
     web.delete(f"/api/projects/{project}/objects/{number}")
@@ -89,7 +89,7 @@ def test_undoing_a_deletion_whose_name_was_taken_says_so(web: Running) -> None:
 
 
 @pytest.mark.both_databases(quick=False)
-def test_points_move_flip_and_go(web: Running) -> None:
+def test_points_are_moved_relabelled_and_deleted(web: Running) -> None:
     project = web.sample()
     made = web.get(f"/api/projects/{project}/objects")[0]
     base, point = f"/api/projects/{project}/objects/{made['id']}", made["points"][0]["id"]
@@ -111,7 +111,7 @@ def test_a_click_outside_the_recording_is_refused_in_one_line(web: Running) -> N
 
 
 @pytest.mark.both_databases(quick=False)
-def test_names_are_unique_and_usable_in_simulators(web: Running) -> None:
+def test_object_names_are_unique_and_valid_in_simulators(web: Running) -> None:
     project = web.sample()
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
     assert "mug_1" in web.patch(f"/api/projects/{project}/objects/{number}", {"name": "mug_1"}, 422)["message"]
@@ -126,7 +126,7 @@ def test_names_are_unique_and_usable_in_simulators(web: Running) -> None:
     assert made["category"] == "2-door cabinet"
 
 
-def test_an_old_version_is_a_conflict_that_shows_what_is_stored(web: Running) -> None:
+def test_changing_an_outdated_version_returns_the_stored_object(web: Running) -> None:
     project = web.sample()
     seen = web.get(f"/api/projects/{project}/objects")[0]
     address = f"/api/projects/{project}/objects/{seen['id']}"
@@ -136,7 +136,7 @@ def test_an_old_version_is_a_conflict_that_shows_what_is_stored(web: Running) ->
 
 
 @pytest.mark.both_databases(quick=False)
-def test_a_category_of_ones_own_is_kept_with_a_notice(web: Running) -> None:
+def test_a_custom_category_is_kept_with_a_notice(web: Running) -> None:
     project = web.sample()
     made = web.post(f"/api/projects/{project}/objects", {"category": "  tea   towel "}, 201)
     assert (made["name"], made["category"]) == ("tea_towel_1", "tea towel")
@@ -144,7 +144,7 @@ def test_a_category_of_ones_own_is_kept_with_a_notice(web: Running) -> None:
 
 
 @pytest.mark.both_databases(quick=False)
-def test_what_people_call_things_is_offered_and_says_what_it_is_taken_for(web: Running) -> None:
+def test_common_category_names_are_offered_with_label_and_joint(web: Running) -> None:
     offered = {entry["name"]: (entry["label"], entry["joint"]) for entry in web.get("/api/system")["categories"]}
     for name in ("drawer", "bottle", "mug", "chair"):
         assert offered[name][0] == name
@@ -157,7 +157,7 @@ def test_what_people_call_things_is_offered_and_says_what_it_is_taken_for(web: R
 
 
 @pytest.mark.both_databases(quick=False)
-def test_prompts_file_goes_out_and_in(web: Running) -> None:
+def test_the_prompts_file_is_exported_and_imported(web: Running) -> None:
     project = web.sample()
     file = web.get(f"/api/projects/{project}/prompts.json")
     assert file["objects"][0] == {"name": "drawer_1", "category": "drawer", "points": [CLICK]}
@@ -170,7 +170,7 @@ def test_prompts_file_goes_out_and_in(web: Running) -> None:
     assert web.post(f"/api/projects/{project}/prompts.json", twice, 422)["kind"] == "invalid"
 
 
-def test_history_says_who_did_what_and_what_was_undone(web: Running) -> None:
+def test_the_history_names_the_person_and_marks_undone_changes(web: Running) -> None:
     project = web.sample()
     number = web.get(f"/api/projects/{project}/objects")[0]["id"]
     web.post(f"/api/projects/{project}/objects/{number}/points", CLICK, 201)
@@ -179,7 +179,7 @@ def test_history_says_who_did_what_and_what_was_undone(web: Running) -> None:
     assert (undo["action"], click["action"], click["who"], click["undone"]) == ("undo", "add point", "tester", True)
 
 
-def test_two_people_clicking_at_once_lose_nothing(web: Running) -> None:
+def test_concurrent_clicks_are_all_stored(web: Running) -> None:
     from concurrent.futures import ThreadPoolExecutor
 
     project = web.sample()
@@ -192,7 +192,7 @@ def test_two_people_clicking_at_once_lose_nothing(web: Running) -> None:
     assert kept["version"] == 2 + 12
 
 
-def test_what_is_said_of_a_frame_is_stored_exported_undone_and_taken_back(web: Running) -> None:
+def test_frame_corrections_are_stored_exported_undone_and_removed(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     item = web.get(f"{at}/objects")[0]
@@ -222,7 +222,7 @@ def test_what_is_said_of_a_frame_is_stored_exported_undone_and_taken_back(web: R
 
 
 @pytest.mark.both_databases(quick=False)
-def test_a_mask_of_other_proportions_than_its_frame_is_refused(web: Running) -> None:
+def test_a_mask_with_another_aspect_ratio_than_its_frame_is_refused(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     item = web.get(f"{at}/objects")[0]
@@ -235,7 +235,7 @@ def test_a_mask_of_other_proportions_than_its_frame_is_refused(web: Running) -> 
 
 
 @pytest.mark.both_databases(quick=False)
-def test_what_is_said_of_a_frame_that_the_recording_lacks_is_neither_imported_nor_kept_for_good(web: Running) -> None:
+def test_corrections_of_missing_frames_are_refused_and_can_be_deleted(web: Running) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     entry = {"name": "mug_9", "category": "mug", "points": [CLICK], "frames": [{"frame": 999, "mask": None}]}

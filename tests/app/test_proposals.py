@@ -23,12 +23,12 @@ def names(web: Running, project: str) -> list[str]:
     return [item["name"] for item in web.get(f"/api/projects/{project}/objects")]
 
 
-def test_nothing_is_proposed_before_the_segmenter_has_looked(web: Running) -> None:
+def test_there_are_no_proposals_before_the_segmenter_has_run(web: Running) -> None:
     project = web.sample()
     assert web.get(f"/api/projects/{project}/proposals") == {"state": "none", "fraction": 0.0, "items": [], "dismissed": 0}
 
 
-def test_a_confirmed_proposal_is_an_object_with_its_click_and_undo_brings_it_back(web: Running) -> None:
+def test_confirming_a_proposal_creates_an_object_and_can_be_undone(web: Running) -> None:
     project = web.sample()
     before = names(web, project)
     first, *rest = proposed(web, project)
@@ -44,7 +44,7 @@ def test_a_confirmed_proposal_is_an_object_with_its_click_and_undo_brings_it_bac
     assert [item["id"] for item in proposed(web, project)] == [first["id"], *(item["id"] for item in rest)]
 
 
-def test_several_are_confirmed_at_once(web: Running) -> None:
+def test_several_proposals_are_confirmed_in_one_request(web: Running) -> None:
     project = web.sample()
     ids = [item["id"] for item in proposed(web, project)]
     made = web.post(f"/api/projects/{project}/proposals/confirm", {"ids": [*ids, ids[0]]}, 201)
@@ -53,7 +53,7 @@ def test_several_are_confirmed_at_once(web: Running) -> None:
     assert web.get(f"/api/projects/{project}/proposals")["items"] == []
 
 
-def test_an_object_clicked_by_hand_takes_its_proposal(web: Running) -> None:
+def test_an_object_clicked_by_hand_removes_its_proposal(web: Running) -> None:
     project = web.sample()
     proposed(web, project)
     click = {**CLICK, "x": 102.5}  # beside the proposal's own click, within its outline
@@ -62,7 +62,7 @@ def test_an_object_clicked_by_hand_takes_its_proposal(web: Running) -> None:
     assert [item["category"] for item in left] == ["drawer", "drawer"]
 
 
-def test_a_proposal_that_an_object_covers_in_part_is_doubted(web: Running) -> None:
+def test_a_proposal_partly_covered_by_an_object_is_doubtful(web: Running) -> None:
     project = web.sample()
     assert {tuple(item["doubts"]) for item in proposed(web, project)} == {()}
     click = {**CLICK, "x": 107.5}  # 3 of 10 columns of the bottle's outline, of which 4 would be the same object
@@ -73,14 +73,14 @@ def test_a_proposal_that_an_object_covers_in_part_is_doubted(web: Running) -> No
     assert [item["doubts"] for item in drawers] == [[], []]
 
 
-def test_those_like_an_object_are_confirmed_under_its_category(web: Running) -> None:
+def test_proposals_are_confirmed_with_a_given_category(web: Running) -> None:
     project = web.sample()
     ids = [item["id"] for item in proposed(web, project)[:2]]
     made = web.post(f"/api/projects/{project}/proposals/confirm", {"ids": ids, "category": "pull_out"}, 201)
     assert [(item["name"], item["category"]) for item in made] == [("pull_out_1", "pull_out"), ("pull_out_2", "pull_out")]
 
 
-def test_dismissals_outlive_the_server_and_can_be_taken_back(start: Callable[..., Any]) -> None:
+def test_dismissals_survive_a_restart_and_can_be_restored(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         first = proposed(web, project)[0]
@@ -94,7 +94,7 @@ def test_dismissals_outlive_the_server_and_can_be_taken_back(start: Callable[...
         assert (len(back["items"]), back["dismissed"]) == (3, 0)
 
 
-def test_a_proposal_that_is_gone_is_refused(web: Running) -> None:
+def test_confirming_a_dismissed_proposal_is_not_found(web: Running) -> None:
     project = web.sample()
     first = proposed(web, project)[0]
     web.post(f"/api/projects/{project}/proposals/dismiss", {"ids": [first["id"]]})

@@ -51,7 +51,7 @@ def sample(client: TestClient) -> Any:
     return client.post("/api/projects/sample", json={})
 
 
-def test_jobs_that_wait_are_counted_a_person(web: Running) -> None:
+def test_unfinished_jobs_are_limited_per_person(web: Running) -> None:
     alice, bob = browser(web, "alice"), browser(web, "bob")
     made = [sample(alice).json()["job"]["id"] for _ in range(2)]
     refused(sample(alice), 429, "2 of your jobs", "the limit is 2", "cancel")
@@ -61,7 +61,7 @@ def test_jobs_that_wait_are_counted_a_person(web: Running) -> None:
     refused(alice.post(f"/api/jobs/{made[0]}/retry"), 429, "jobs")
 
 
-def test_samples_and_projects_are_counted_a_person(web: Running) -> None:
+def test_samples_and_projects_are_limited_per_person(web: Running) -> None:
     alice = browser(web, "alice")
 
     def make() -> None:
@@ -78,7 +78,7 @@ def test_samples_and_projects_are_counted_a_person(web: Running) -> None:
     assert sample(browser(web, "bob")).status_code == 202
 
 
-def test_uploads_under_way_are_counted_and_weighed_a_person(web: Running) -> None:
+def test_open_uploads_are_limited_per_person_in_number_and_bytes(web: Running) -> None:
     alice = browser(web, "alice")
     begun = alice.post("/api/uploads", json={"file_name": "a.r3d", "size": 2**29})
     assert begun.status_code == 201
@@ -90,12 +90,12 @@ def test_uploads_under_way_are_counted_and_weighed_a_person(web: Running) -> Non
     assert len(list((web.settings.data_dir / "uploads").iterdir())) == 2
 
 
-def test_admins_take_what_they_need(web: Running) -> None:
+def test_admins_have_no_quotas(web: Running) -> None:
     root = browser(web, "root")
     assert [sample(root).status_code for _ in range(5)] == [202] * 5
 
 
-def test_quotas_are_given_by_name() -> None:
+def test_quotas_are_parsed_from_name_and_number() -> None:
     assert quotas_from([]) == Quotas()
     assert quotas_from(["jobs=3", "upload_gb=500"]) == Quotas(jobs=3, upload_gb=500)
     for wish in ("jobs", "jobs=-1", "jobs=1.5", "clicks=3", "=", "jobs=9999999999"):

@@ -37,7 +37,7 @@ def processes_of(folder: Path) -> list[psutil.Process]:
     return [found for found, said in words.items() if folder.name in said and "ray_relay" not in said]
 
 
-def test_a_step_whose_node_dies_ends_with_it_is_begun_anew_and_is_cancelled(node: RayNode, tmp_path: Path) -> None:
+def test_a_step_of_a_killed_actor_ends_restarts_and_can_be_cancelled(node: RayNode, tmp_path: Path) -> None:
     with running(tmp_path / "web", compute="ray", store=f"file://{tmp_path / 'store'}") as web:
         project = web.sample()  # fetched here from the node's own folder
         cache = tmp_path / f"web/ray/0/projects/{project}"
@@ -60,13 +60,13 @@ def test_a_step_whose_node_dies_ends_with_it_is_begun_anew_and_is_cancelled(node
         assert "vanished" in web.client.get(f"/api/jobs/{job}/log").text
 
 
-def test_without_a_store_nodes_work_in_the_folder_that_all_share(node: RayNode, tmp_path: Path) -> None:
+def test_nodes_use_the_shared_folder_if_there_is_no_store(node: RayNode, tmp_path: Path) -> None:
     with running(tmp_path / "web", compute="ray") as web:
         web.sample()
         assert not (tmp_path / "web/ray").exists()
 
 
-def test_the_objects_of_one_job_are_computed_by_actors_side_by_side(node: RayNode, tmp_path: Path) -> None:
+def test_objects_of_one_job_are_computed_by_parallel_actors(node: RayNode, tmp_path: Path) -> None:
     with running(tmp_path / "web", compute="ray", store=f"file://{tmp_path / 'store'}", heavy_jobs=2, **FREE) as web:
         project, folder = held(web, *NAMES)
         web.context.store.keep(project)
@@ -95,7 +95,7 @@ def test_nodes_of_another_version_are_refused_in_one_line(
     assert "\n" not in said["message"]
 
 
-def test_a_step_asks_for_what_it_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_requests_the_cpus_gpu_and_memory_it_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[tuple[str, ...]] = []
     monkeypatch.setattr(compute, "Worker", lambda command, log: started.append(command))
     settings = Settings(data_dir=tmp_path, compute="ray", workers=4, job_memory_bytes=2 << 30)
@@ -109,6 +109,6 @@ def test_a_step_asks_for_what_it_needs(tmp_path: Path, monkeypatch: pytest.Monke
     assert seat.memory_bytes < 1 << 30  # only the relay runs here
 
 
-def test_what_is_no_way_to_compute_is_one_line(tmp_path: Path) -> None:
+def test_an_unknown_compute_backend_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="R2C2R_COMPUTE 'slurm': not known"):
         _ = Settings(data_dir=tmp_path, compute="slurm").on_ray

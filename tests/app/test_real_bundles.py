@@ -68,14 +68,14 @@ def readers(web: Running, project: str) -> list[tuple[str, str]]:
     return found
 
 
-def test_what_changed_is_said_of_kitchens_with_something_made_from_the_scan(made: tuple[Running, str]) -> None:
+def test_changes_between_bundles_list_a_new_object(made: tuple[Running, str]) -> None:
     web, project = made
     said = web.get(f"/api/projects/{project}/bundles/2/changes?since=1")
     assert {"object": "drawer_1", "text": "new: drawer"} in said
     assert web.get(f"/api/projects/{project}/bundles/2/changes?since=2") == []
 
 
-def test_every_address_answers_about_a_real_bundle(made: tuple[Running, str]) -> None:
+def test_every_endpoint_that_reads_a_bundle_answers(made: tuple[Running, str]) -> None:
     web, project = made
     answers = {name: web.client.get(address) for name, address in readers(web, project) if name != "compareBundles"}
     assert [f"{name}: {answer.text}" for name, answer in answers.items() if answer.status_code >= 500] == []
@@ -88,7 +88,7 @@ def test_every_address_answers_about_a_real_bundle(made: tuple[Running, str]) ->
     assert answers["checkBundle"].json() == {"version": 1, "intact": True, "findings": []}
 
 
-def test_the_scene_table_tells_everything_in_it(made: tuple[Running, str]) -> None:
+def test_the_scene_table_includes_objects_without_masks(made: tuple[Running, str]) -> None:
     web, project = made
     scene = web.get(f"/api/projects/{project}/scene")
     items = {item["name"]: item for item in scene["items"]}
@@ -99,7 +99,7 @@ def test_the_scene_table_tells_everything_in_it(made: tuple[Running, str]) -> No
 
 
 @pytest.mark.parametrize("mode", ["cloud", "candidate", "aligned", "scene"])
-def test_what_the_3d_view_is_asked_to_show_can_be_read(
+def test_every_mode_of_the_3d_view_is_passed_to_the_viewer(
     made: tuple[Running, str], monkeypatch: pytest.MonkeyPatch, mode: str
 ) -> None:
     web, project = made
@@ -115,7 +115,7 @@ def test_what_the_3d_view_is_asked_to_show_can_be_read(
     assert wishes
 
 
-def test_what_is_inside_for_robots(made: tuple[Running, str]) -> None:
+def test_the_contents_of_a_bundle_list_assets_robots_and_simulators(made: tuple[Running, str]) -> None:
     web, project = made
     inside = web.get(f"/api/projects/{project}/bundles/2/inside")
     assert {asset["name"] for asset in inside["assets"]} == {"cabinet_1", "drawer_1", "double_1", "counter_1", "bottle_1"}
@@ -130,7 +130,7 @@ def test_what_is_inside_for_robots(made: tuple[Running, str]) -> None:
     assert "MuJoCo" in {lines["simulator"] for lines in inside["simulators"]}
 
 
-def test_an_object_downloaded_alone_loads_with_its_texture(made: tuple[Running, str], tmp_path: Path) -> None:
+def test_a_single_downloaded_object_loads_in_mujoco_with_its_texture(made: tuple[Running, str], tmp_path: Path) -> None:
     import mujoco
 
     web, project = made
@@ -143,7 +143,7 @@ def test_an_object_downloaded_alone_loads_with_its_texture(made: tuple[Running, 
 
 
 @pytest.mark.slow
-def test_variants_are_made_of_it_again_the_same_and_load(made: tuple[Running, str], tmp_path: Path) -> None:
+def test_variants_of_one_seed_are_identical_and_load_in_mujoco(made: tuple[Running, str], tmp_path: Path) -> None:
     import mujoco
 
     web, project = made

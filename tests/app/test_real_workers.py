@@ -9,7 +9,7 @@ from app.jobs.plans import Commands
 
 
 @pytest.mark.slow
-def test_a_sample_is_made_read_and_segmented_by_the_real_processes(start: Callable[..., Any]) -> None:
+def test_a_sample_is_generated_imported_and_segmented_by_real_workers(start: Callable[..., Any]) -> None:
     with start(commands=Commands()) as web:
         wish = {"seed": 1, "frames": 10, "width": 320, "height": 240}
         project = web.post("/api/projects/sample", wish, 202)["id"]

@@ -56,7 +56,7 @@ def scan(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_script_goes_from_recording_to_bundle(
+def test_the_remote_commands_turn_a_recording_into_a_bundle(
     remote: Served, scan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     prompts, bundle = tmp_path / "prompts.json", tmp_path / "kitchen.zip"
@@ -76,7 +76,7 @@ def test_a_script_goes_from_recording_to_bundle(
     assert not bundle.with_name("kitchen.zip.part").exists()
 
 
-def test_a_project_is_taken_to_another_server_as_one_file(
+def test_a_project_is_exported_and_uploaded_as_one_file(
     remote: Served, scan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     prompts, file = tmp_path / "prompts.json", tmp_path / "kitchen.r2c2r.zip"
@@ -96,7 +96,7 @@ def test_a_project_is_taken_to_another_server_as_one_file(
     assert main(["remote", "export", "none", "-o", str(file)]) == 2
 
 
-def test_a_job_that_fails_says_why(remote: Served, scan: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_waiting_for_a_failed_job_prints_its_reason(remote: Served, scan: Path, capsys: pytest.CaptureFixture[str]) -> None:
     broken = scan.with_name("broken.r3d")
     scan.rename(broken)
     assert main(["remote", "upload", str(broken)]) == 0
@@ -105,7 +105,7 @@ def test_a_job_that_fails_says_why(remote: Served, scan: Path, capsys: pytest.Ca
     assert "no depth in it; record again" in capsys.readouterr().err
 
 
-def test_a_token_that_reaches_less_far_is_told_so(
+def test_missing_wrong_and_read_only_tokens_are_refused(
     remote: Served, scan: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
     monkeypatch.setenv("R2C2R_TOKEN", remote.token("read"))
@@ -118,7 +118,7 @@ def test_a_token_that_reaches_less_far_is_told_so(
     assert "R2C2R_TOKEN is not set" in capsys.readouterr().err
 
 
-def test_an_upload_goes_on_where_it_broke_off(
+def test_an_interrupted_upload_resumes_at_its_offset(
     remote: Served, scan: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(client, "PIECE_BYTES", 100)
@@ -185,7 +185,7 @@ def hangs_up(stub: Stub) -> None:
     stub.close_connection = True
 
 
-def test_what_is_asked_again_keeps_its_key(stub: tuple[Server, type[Stub]]) -> None:
+def test_retried_requests_keep_their_idempotency_key(stub: tuple[Server, type[Stub]]) -> None:
     server, handler = stub
     handler.answers = [hangs_up, says(503, b"a proxy's page"), says(202, {"id": 7})]
     assert server.run("p") == 7
@@ -193,7 +193,7 @@ def test_what_is_asked_again_keeps_its_key(stub: tuple[Server, type[Stub]]) -> N
     assert (len(handler.asked), len(keys)) == (3, 1)
 
 
-def test_the_token_does_not_follow_to_another_host(stub: tuple[Server, type[Stub]], tmp_path: Path) -> None:
+def test_the_token_is_not_sent_to_another_host_on_redirect(stub: tuple[Server, type[Stub]], tmp_path: Path) -> None:
     server, handler = stub
     content, elsewhere = b"PK of a bundle", server.address.replace("127.0.0.1", "localhost")
     handler.answers = [
@@ -206,7 +206,7 @@ def test_the_token_does_not_follow_to_another_host(stub: tuple[Server, type[Stub
     assert ["authorization" in headers for _, headers in handler.asked] == [True, True, False]
 
 
-def test_a_download_that_breaks_off_leaves_what_was_there(stub: tuple[Server, type[Stub]], tmp_path: Path) -> None:
+def test_an_incomplete_download_keeps_the_existing_file(stub: tuple[Server, type[Stub]], tmp_path: Path) -> None:
     server, handler = stub
     kept = tmp_path / "kitchen.zip"
     kept.write_bytes(b"the one before")
@@ -217,7 +217,7 @@ def test_a_download_that_breaks_off_leaves_what_was_there(stub: tuple[Server, ty
     assert kept.read_bytes() == b"the one before"
 
 
-def test_another_thing_at_the_address_is_said(stub: tuple[Server, type[Stub]]) -> None:
+def test_responses_that_are_not_from_r2c2r_raise(stub: tuple[Server, type[Stub]]) -> None:
     server, handler = stub
     handler.answers = [says(404, b"<html>nginx"), says(200, b"<html>hello")]
     with pytest.raises(Refused, match="404"):
@@ -227,6 +227,6 @@ def test_another_thing_at_the_address_is_said(stub: tuple[Server, type[Stub]]) -
 
 
 @pytest.mark.parametrize("address", ["kitchens.example", "ftp://kitchens.example", "http://", "file:///etc/passwd"])
-def test_what_is_no_address_is_refused(address: str) -> None:
+def test_an_invalid_server_address_is_rejected(address: str) -> None:
     with pytest.raises(InputError, match="not a server's address"):
         Server(address, "r2c2r_x")

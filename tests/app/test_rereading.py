@@ -19,7 +19,7 @@ def requests(web: Running) -> list[dict]:
     return [json.loads(path.read_text()) for path in paths]
 
 
-def test_a_project_is_read_again_with_registered_depth_and_its_result_is_stale(web: Running) -> None:
+def test_rereading_with_registered_depth_makes_the_result_stale(web: Running) -> None:
     project = web.sample()
     web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "done")
     found = read_again(web, project, True)
@@ -37,14 +37,14 @@ def test_a_project_is_read_again_with_registered_depth_and_its_result_is_stale(w
     assert texts == ["depth read as it was recorded", "depth registered to the colour images"]
 
 
-def test_asking_for_what_is_so_reads_nothing(web: Running) -> None:
+def test_requesting_the_current_reading_starts_no_job(web: Running) -> None:
     project = web.sample()
     before = len(web.get(f"/api/jobs?project={project}"))
     assert read_again(web, project, False)["status"] == "ready"
     assert len(web.get(f"/api/jobs?project={project}")) == before
 
 
-def test_a_recording_is_not_read_again_under_a_job(web: Running) -> None:
+def test_rereading_during_a_job_is_a_conflict(web: Running) -> None:
     project = web.sample()
     with writing(web.context.engine) as session:
         session.add(Job(project_id=project, kind="run", state="running", payload={}, who="x", created=0.0))

@@ -34,7 +34,7 @@ def overrides(web: Running, project: str) -> Any:
     return json.loads(path.read_text())["objects"].get("drawer_1", {})
 
 
-def test_candidates_come_with_their_evidence_the_choice_and_its_reason(reviewed: Reviewed) -> None:
+def test_candidates_are_returned_with_metrics_choice_and_reason(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     (group,) = web.get(f"/api/projects/{project}/candidates")
     assert (group["object"], group["chosen"], group["chosen_by"], group["reason"]) == (
@@ -58,7 +58,7 @@ def test_candidates_come_with_their_evidence_the_choice_and_its_reason(reviewed:
     web.get(f"/api/projects/{project}/objects/{number + 1}/candidates", 409)
 
 
-def test_a_candidates_mesh_and_picture_are_made_once_and_cached(reviewed: Reviewed) -> None:
+def test_the_mesh_and_thumbnail_of_a_candidate_are_served_as_immutable(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     (first, second) = web.get(f"/api/projects/{project}/objects/{number}/candidates")["candidates"]
     mesh = web.client.get(first["glb"])
@@ -68,7 +68,7 @@ def test_a_candidates_mesh_and_picture_are_made_once_and_cached(reviewed: Review
     assert web.client.get(f"/media/{project}/candidates/{number}/c9.glb").status_code == 404
 
 
-def test_accepting_the_chosen_one_is_recorded_and_needs_no_run(reviewed: Reviewed) -> None:
+def test_accepting_the_chosen_candidate_needs_no_run(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     said = web.post(
         f"/api/projects/{project}/objects/{number}/verdicts", {"candidate": "c0", "verdict": "accepted", "reason": "fits"}
@@ -78,7 +78,7 @@ def test_accepting_the_chosen_one_is_recorded_and_needs_no_run(reviewed: Reviewe
     assert web.get(f"/api/projects/{project}")["counts"]["accepted"] == 1
 
 
-def test_accepting_another_one_overrides_the_choice_and_runs(reviewed: Reviewed) -> None:
+def test_accepting_another_candidate_overrides_the_choice_and_runs(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     said = web.post(f"/api/projects/{project}/objects/{number}/verdicts", {"candidate": "c1", "verdict": "accepted"})
     assert (said["group"]["chosen"], said["group"]["chosen_by"]) == ("c1", "person")
@@ -86,7 +86,7 @@ def test_accepting_another_one_overrides_the_choice_and_runs(reviewed: Reviewed)
     assert overrides(web, project) == {"candidate": "c1"}
 
 
-def test_rejecting_is_recorded_with_its_reason_and_makes_new_ones(reviewed: Reviewed) -> None:
+def test_rejecting_a_candidate_records_the_reason_and_runs(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     body = {"candidate": "c0", "verdict": "rejected", "reason": "the handle is missing"}
     said = web.post(f"/api/projects/{project}/objects/{number}/verdicts", body)
@@ -95,7 +95,7 @@ def test_rejecting_is_recorded_with_its_reason_and_makes_new_ones(reviewed: Revi
     assert overrides(web, project) == {"rejected": ["c0"]}
 
 
-def test_the_candidate_that_is_shown_as_used_is_the_one_that_the_run_takes_after_every_verdict(reviewed: Reviewed) -> None:
+def test_the_candidate_shown_as_chosen_is_the_one_a_run_uses(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     address = f"/api/projects/{project}/objects/{number}"
     work = Workspace(web.settings.data_dir / "projects" / project / "work")
@@ -120,7 +120,7 @@ def test_the_candidate_that_is_shown_as_used_is_the_one_that_the_run_takes_after
     assert "every candidate was rejected" in group["reason"]
 
 
-def test_rejecting_the_last_candidate_or_asking_makes_further_ones(reviewed: Reviewed) -> None:
+def test_rejecting_every_candidate_or_a_request_generates_more(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     address = f"/api/projects/{project}/objects/{number}"
     known = [candidate["id"] for candidate in web.get(f"{address}/candidates")["candidates"]]
@@ -134,7 +134,7 @@ def test_rejecting_the_last_candidate_or_asking_makes_further_ones(reviewed: Rev
     web.patch(f"{address}/override", {"regenerate": 21}, 422)
 
 
-def test_verdicts_are_undone_and_redone_apart_from_clicks(reviewed: Reviewed) -> None:
+def test_verdicts_are_undone_and_redone_independently_of_clicks(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     address = f"/api/projects/{project}/objects/{number}"
     web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "rejected", "rerun": False})
@@ -150,7 +150,7 @@ def test_verdicts_are_undone_and_redone_apart_from_clicks(reviewed: Reviewed) ->
     assert web.get(f"/api/projects/{project}/objects")[0]["points"]  # the clicks are kept
 
 
-def test_a_verdict_can_be_taken_back(reviewed: Reviewed) -> None:
+def test_a_verdict_can_be_cleared(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     address = f"/api/projects/{project}/objects/{number}"
     web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "rejected", "rerun": False})
@@ -160,7 +160,7 @@ def test_a_verdict_can_be_taken_back(reviewed: Reviewed) -> None:
     web.post(f"{address}/verdicts", {"candidate": "c7", "verdict": "rejected"}, 404)
 
 
-def test_corrections_are_checked_kept_and_cleared(reviewed: Reviewed) -> None:
+def test_corrections_are_validated_stored_and_cleared(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     address = f"/api/projects/{project}/objects/{number}/override"
     web.patch(address, {"hinge": "left", "dimensions_m": [0.5, 0.6, 0.2], "rerun": False})
@@ -205,7 +205,7 @@ def test_frames_marked_closed_or_open_reach_the_run_and_are_undone(reviewed: Rev
     assert web.get(f"{address}/override")["states"] == {}
 
 
-def test_the_scene_is_a_table(reviewed: Reviewed) -> None:
+def test_the_scene_endpoint_lists_objects_joints_and_stages(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     scene = web.get(f"/api/projects/{project}/scene")
     (item,) = scene["items"]
@@ -221,7 +221,7 @@ def test_the_scene_is_a_table(reviewed: Reviewed) -> None:
     assert web.client.get(scene["glb"]).status_code == 200
 
 
-def test_masks_of_the_last_run_are_shown_while_its_clicks_are(reviewed: Reviewed) -> None:
+def test_masks_of_the_last_run_are_shown_until_the_clicks_change(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     (lane,) = [lane for lane in web.get(f"/api/projects/{project}/lanes") if lane["object"] == number]
     assert (lane["frames"], lane["source"]) == ([3, 7], "run")
@@ -232,7 +232,7 @@ def test_masks_of_the_last_run_are_shown_while_its_clicks_are(reviewed: Reviewed
     assert web.get(f"/api/projects/{project}/masks/7") == []
 
 
-def test_a_finished_workspace_becomes_a_project_once(start: Callable[..., Any], tmp_path: Path) -> None:
+def test_registering_a_finished_workspace_twice_creates_one_project(start: Callable[..., Any], tmp_path: Path) -> None:
     work = tmp_path / "demo" / "work"
     work.mkdir(parents=True)
     finish(work)
@@ -254,7 +254,7 @@ def test_a_finished_workspace_becomes_a_project_once(start: Callable[..., Any], 
     assert work.exists()  # outside the data folder: not ours to delete
 
 
-def test_only_what_changes_the_result_makes_it_stale(reviewed: Reviewed) -> None:
+def test_only_changes_that_affect_the_result_make_it_stale(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     address = f"/api/projects/{project}/objects/{number}"
     web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "accepted"})
@@ -267,7 +267,7 @@ def test_only_what_changes_the_result_makes_it_stale(reviewed: Reviewed) -> None
     assert web.get(f"/api/projects/{project}")["result"] == "current"
 
 
-def test_a_verdict_or_correction_on_what_somebody_changed_meanwhile_is_refused_with_both(reviewed: Reviewed) -> None:
+def test_a_review_of_an_outdated_version_is_refused_with_both_states(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     at = f"/api/projects/{project}/objects/{number}"
     seen = web.get(f"{at}/candidates")["version"]
@@ -286,7 +286,7 @@ def test_a_verdict_or_correction_on_what_somebody_changed_meanwhile_is_refused_w
 
 
 @pytest.mark.parametrize("direction", ["undo", "redo"])
-def test_nothing_is_undone_or_redone_over_what_somebody_said_meanwhile(reviewed: Reviewed, direction: str) -> None:
+def test_undo_and_redo_of_an_outdated_review_are_conflicts(reviewed: Reviewed, direction: str) -> None:
     web, project, number = reviewed
     base, at = f"/api/projects/{project}", f"/api/projects/{project}/objects/{number}"
     mine = {"object": number, "scope": "review"}
@@ -304,7 +304,7 @@ def test_nothing_is_undone_or_redone_over_what_somebody_said_meanwhile(reviewed:
     assert undone["version"] == web.get(f"{at}/candidates")["version"] > stored["version"]
 
 
-def test_a_new_name_is_no_change_of_the_review(reviewed: Reviewed) -> None:
+def test_changing_a_category_does_not_change_the_review_version(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     at = f"/api/projects/{project}/objects/{number}"
     seen = web.get(f"{at}/candidates")["version"]
@@ -313,7 +313,7 @@ def test_a_new_name_is_no_change_of_the_review(reviewed: Reviewed) -> None:
 
 
 @pytest.mark.parametrize("what", ["dimensions_m", "pose"])
-def test_a_correction_that_is_no_number_is_refused(reviewed: Reviewed, what: str) -> None:
+def test_a_correction_with_nan_is_refused(reviewed: Reviewed, what: str) -> None:
     web, project, number = reviewed
     at = f"/api/projects/{project}/objects/{number}/override"
     value = {"dimensions_m": [1, 1, "nan"], "pose": [[1, 0, 0, "nan"], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}[what]
@@ -322,7 +322,7 @@ def test_a_correction_that_is_no_number_is_refused(reviewed: Reviewed, what: str
     assert (refused.status_code, web.get(at)[what]) == (422, None)
 
 
-def test_a_rename_keeps_masks_candidates_verdicts_and_the_scenes_object_until_the_next_run(reviewed: Reviewed) -> None:
+def test_a_rename_keeps_masks_candidates_verdicts_and_scene_objects(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     at, address = f"/api/projects/{project}", f"/api/projects/{project}/objects/{number}"
     web.post(f"{address}/verdicts", {"candidate": "c0", "verdict": "accepted"})
@@ -352,7 +352,7 @@ def test_a_rename_keeps_masks_candidates_verdicts_and_the_scenes_object_until_th
     assert [(group["name"], group["run_name"]) for group in web.get(f"{at}/candidates")] == [("cutlery", "cutlery")]
 
 
-def test_what_nobody_clicked_is_corrected_by_its_name_left_out_and_brought_back(reviewed: Reviewed) -> None:
+def test_objects_without_clicks_are_corrected_and_left_out_by_name(reviewed: Reviewed) -> None:
     web, project, _ = reviewed
     made = scene("drawer_1")
     (drawer,) = made.objects
@@ -388,7 +388,7 @@ def clicked(web: Running, project: str) -> dict[str, int]:
     return {entry["name"]: len(entry["points"]) for entry in json.loads(path.read_text())["objects"]}
 
 
-def test_a_correction_runs_its_object_and_leaves_out_what_is_clicked_meanwhile(web: Running) -> None:
+def test_a_correction_run_ignores_clicks_made_since_the_last_run(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     first, second = (item["id"] for item in web.get(f"/api/projects/{project}/objects")[:2])
@@ -412,7 +412,7 @@ def test_a_correction_runs_its_object_and_leaves_out_what_is_clicked_meanwhile(w
     assert web.get(f"/api/projects/{project}")["result"] == "current"
 
 
-def test_a_correction_of_what_nobody_is_clicking_leaves_the_result_current(web: Running) -> None:
+def test_a_correction_run_without_new_clicks_gives_a_current_result(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     first = web.get(f"/api/projects/{project}/objects")[0]["id"]

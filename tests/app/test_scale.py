@@ -93,7 +93,7 @@ def finished(web: Running, monkeypatch: pytest.MonkeyPatch) -> tuple[Running, st
 
 
 @pytest.mark.both_databases(quick=False)
-def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_is_more(
+def test_get_requests_need_no_more_queries_or_bytes_with_more_data(
     finished: tuple[Running, str, int],
 ) -> None:
     web, project, item = finished
@@ -117,7 +117,7 @@ def test_no_question_asks_the_database_more_often_or_says_too_much_where_there_i
 
 
 @pytest.mark.both_databases(quick=False)
-def test_no_question_reads_what_events_replaced_nor_the_events_to_say_what_stands(finished: tuple[Running, str, int]) -> None:
+def test_get_requests_do_not_load_the_stored_states_of_events(finished: tuple[Running, str, int]) -> None:
     """A list of objects says what can be undone, the history who did what: neither reads a state, neither replays."""
     web, project, item = finished
     grow(web, project)
@@ -146,7 +146,7 @@ QUEUE = {"/api/projects": 1, "/api/jobs": 1}  # a waiting job's position in the 
 
 
 @pytest.mark.both_databases(quick=False)
-def test_what_is_sent_as_it_is_stored_is_what_its_schema_says(finished: tuple[Running, str, int]) -> None:
+def test_masks_and_objects_sent_as_stored_match_their_schemas(finished: tuple[Running, str, int]) -> None:
     web, project, item = finished
     grow(web, project)
     frames = web.get(f"/api/projects/{project}/masks/4")
@@ -161,9 +161,7 @@ def test_what_is_sent_as_it_is_stored_is_what_its_schema_says(finished: tuple[Ru
     assert web.post(f"/api/projects/{project}/objects/{item}/segment/cancel", {}) == one
 
 
-def test_what_nouns_say_is_read_once_for_all_servers_and_anew_when_one_changed(
-    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_facts_are_cached_on_disk_and_reread_when_a_noun_changes(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     files, reads = project_files(tmp_path, "p"), []
     files.work.mkdir(parents=True)
     finish(files.work)
@@ -190,7 +188,7 @@ def test_what_nouns_say_is_read_once_for_all_servers_and_anew_when_one_changed(
     assert look() is None
 
 
-def test_facts_that_are_kept_say_which_version_they_are_of() -> None:
+def test_the_fields_of_cached_facts_match_their_version() -> None:
     """A field more or less: FACTS_VERSION goes up with it, for what an older server kept lacks it."""
     told = {"generate": _candidate_facts(candidates("drawer_1")), "align": plain(placement("drawer_1"))}
     fields = sorted(f"{stage} {key}" for stage, said in told.items() for key in (*said, *said.get("candidates", [{}])[0]))
@@ -200,7 +198,7 @@ def test_facts_that_are_kept_say_which_version_they_are_of() -> None:
 MOST_OF_A_CLICK = 16  # statements without the transactions' begins; each row is written once
 
 
-def test_a_click_stores_what_it_adds_and_asks_no_more_where_there_is_more(finished: tuple[Running, str, int]) -> None:
+def test_a_click_stores_only_its_change_with_a_constant_number_of_queries(finished: tuple[Running, str, int]) -> None:
     web, project, item = finished
     web.context.descriptions.stop()  # it would write the descriptions of the added projects meanwhile
 
@@ -219,7 +217,7 @@ def test_a_click_stores_what_it_adds_and_asks_no_more_where_there_is_more(finish
         assert {(len(stored.before or {}), len(stored.after or {})) for stored in events} == {(0, 1)}
 
 
-def test_a_cache_of_files_holds_so_many_bytes_and_sees_that_a_file_changed(tmp_path: Any) -> None:
+def test_the_file_cache_is_bounded_in_bytes_and_detects_changed_files(tmp_path: Any) -> None:
     made: list[str] = []
     cache: FileCache[str] = FileCache(25)
 
@@ -241,7 +239,7 @@ def test_a_cache_of_files_holds_so_many_bytes_and_sees_that_a_file_changed(tmp_p
     assert look("nowhere") is None
 
 
-def test_where_masks_lie_is_read_from_the_end_of_their_file_and_found_without_one_too(tmp_path: Any) -> None:
+def test_the_mask_index_is_read_from_the_file_end_or_rebuilt_without_it(tmp_path: Any) -> None:
     path = tmp_path / "masks" / "k.jsonl"
     mask_store.begin(path)
     for frame in (7, 3, 3):
@@ -263,7 +261,7 @@ def test_where_masks_lie_is_read_from_the_end_of_their_file_and_found_without_on
     assert done.entry(7) is None
 
 
-def test_an_index_of_masks_is_read_as_it_was_written_before_it_was_packed(tmp_path: Any) -> None:
+def test_a_mask_index_of_the_older_unpacked_format_is_readable(tmp_path: Any) -> None:
     entry = {"frame": 4, "confidence": 0.5, "area": 0.1, "mask": {}}
     mask_store.write(tmp_path / "packed", [entry], "geometric")
     line, end = (tmp_path / "packed").read_text().splitlines()
@@ -276,9 +274,7 @@ def test_an_index_of_masks_is_read_as_it_was_written_before_it_was_packed(tmp_pa
     assert packed.entry(4) == numbers.entry(4) == entry
 
 
-def test_nouns_are_kept_by_their_bytes_and_read_anew_when_their_file_changed(
-    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cached_facts_are_evicted_by_bytes_and_read_again(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     files, reads = project_files(tmp_path, "p"), []
     files.work.mkdir(parents=True)
     finish(files.work)

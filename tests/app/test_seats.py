@@ -55,7 +55,7 @@ def shown(web: Running) -> Any:
     return web.get("/api/seats")
 
 
-def test_a_server_without_jobs_of_its_own_shows_what_seats_compute(shared: dict[str, Any], tmp_path: Path) -> None:
+def test_a_server_that_runs_no_jobs_shows_results_of_seats(shared: dict[str, Any], tmp_path: Path) -> None:
     with running(tmp_path / "web", **shared, heavy_jobs=0) as web, seat(web, tmp_path / "one"), seat(web, tmp_path / "two"):
         project = web.post("/api/projects/upload?filename=kitchen.r3d", None, content=R3D)["id"]
         web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")
@@ -71,7 +71,7 @@ def test_a_server_without_jobs_of_its_own_shows_what_seats_compute(shared: dict[
         assert web.context.runner.rows.owner not in owners
 
 
-def test_a_run_goes_on_at_another_seat_with_the_stages_that_are_there(shared: dict[str, Any], tmp_path: Path) -> None:
+def test_a_run_continues_at_another_seat_after_its_seat_ends(shared: dict[str, Any], tmp_path: Path) -> None:
     with running(tmp_path / "web", **shared, heavy_jobs=0) as web:
         with seat(web, tmp_path / "one"):
             project = web.sample()
@@ -89,7 +89,7 @@ def test_a_run_goes_on_at_another_seat_with_the_stages_that_are_there(shared: di
         assert str(tmp_path / "one") not in request
 
 
-def test_a_job_at_a_seat_is_cancelled_and_its_log_read_while_it_runs(shared: dict[str, Any], tmp_path: Path) -> None:
+def test_the_log_of_a_job_at_a_seat_is_readable_and_the_job_cancellable(shared: dict[str, Any], tmp_path: Path) -> None:
     with running(tmp_path / "web", **shared, heavy_jobs=0) as web, seat(web, tmp_path / "one"):
         project = web.sample()
         behave(web, project, segment="hang")
@@ -105,7 +105,7 @@ def test_a_job_at_a_seat_is_cancelled_and_its_log_read_while_it_runs(shared: dic
         assert web.job(job, "cancelled", "done", "failed")["state"] == "cancelled"
 
 
-def test_a_seat_that_is_drained_ends_what_it_does_and_then_itself(shared: dict[str, Any], tmp_path: Path) -> None:
+def test_a_draining_seat_finishes_its_job_and_exits(shared: dict[str, Any], tmp_path: Path) -> None:
     with running(tmp_path / "web", **shared, heavy_jobs=0) as web, seat(web, tmp_path / "one") as one:
         project, _ = held(web, "drawer_1")
         web.context.store.keep(project)
@@ -133,14 +133,14 @@ def test_a_seat_of_another_version_is_refused_in_one_line(
         assert "\n" not in str(refused.value)
 
 
-def test_a_server_on_a_file_is_the_only_seat(tmp_path: Path) -> None:
+def test_a_server_on_sqlite_is_the_only_seat(tmp_path: Path) -> None:
     with running(tmp_path) as web:
         (one,) = shown(web)["seats"]
         assert (one["here"], one["jobs_at_a_time"], shown(web)["shared"]) == (True, 1, False)
         assert web.client.patch("/api/seats/0", json={"draining": True}).status_code == 409
 
 
-def test_rows_in_a_file_give_no_job_to_other_machines(tmp_path: Path) -> None:
+def test_a_worker_on_a_sqlite_database_is_refused(tmp_path: Path) -> None:
     with pytest.raises(EnvironmentProblem, match="in a file"):
         work.work(data_dir=tmp_path)
     assert Settings(data_dir=tmp_path).postgres == ""

@@ -24,7 +24,7 @@ def refused(code: int) -> Any:
     return pytest.raises(WebSocketDisconnect, check=lambda error: error.code == code)
 
 
-def test_without_a_session_nothing_is_shown(web: Running) -> None:
+def test_requests_without_a_session_are_refused_or_sent_to_the_login(web: Running) -> None:
     other = fresh(web, headers={"X-Requested-With": "tests"})
     for path in (
         "/api/projects",
@@ -43,7 +43,7 @@ def test_without_a_session_nothing_is_shown(web: Running) -> None:
     assert other.get("/api/health").json() == {"state": "ok"}
 
 
-def test_the_printed_token_becomes_a_cookie_and_leaves_the_address(web: Running) -> None:
+def test_the_printed_token_is_exchanged_for_a_cookie_and_a_clean_url(web: Running) -> None:
     other = fresh(web)
     address = f"/p/abc/annotate{web.printed()[1:]}"
     answer = other.get(address, follow_redirects=False)
@@ -58,7 +58,7 @@ def test_the_printed_token_becomes_a_cookie_and_leaves_the_address(web: Running)
     assert "set-cookie" not in again.headers
 
 
-def test_a_printed_address_signs_one_browser_in_and_says_what_to_do_to_others(web: Running) -> None:
+def test_a_printed_address_signs_in_one_browser_only(web: Running) -> None:
     address = web.printed()
     with ThreadPoolExecutor(8) as crowd:
         opened = list(crowd.map(lambda _: fresh(web).get(address, follow_redirects=False).status_code, range(8)))
@@ -68,7 +68,7 @@ def test_a_printed_address_signs_one_browser_in_and_says_what_to_do_to_others(we
     assert "<form>" in page.text
 
 
-def test_two_servers_of_a_host_do_not_share_a_cookie(web: Running) -> None:
+def test_servers_on_different_ports_use_different_cookies(web: Running) -> None:
     there = fresh(web, base_url="http://127.0.0.1:9000", headers={"X-Requested-With": "tests"})
     there.cookies = web.client.cookies  # browsers send cookies to every port
     assert there.get("/api/projects").status_code == 401
@@ -78,7 +78,7 @@ def test_two_servers_of_a_host_do_not_share_a_cookie(web: Running) -> None:
     assert web.client.get("/api/projects").status_code == 200
 
 
-def test_behind_tls_browsers_stay_with_it_and_no_page_asks_for_devices(web: Running) -> None:
+def test_hsts_is_sent_over_tls_and_camera_and_microphone_are_denied(web: Running) -> None:
     plain, tls = web.client.get("/api/health").headers, fresh(web, base_url="https://127.0.0.1:8000").get("/api/health").headers
     assert "strict-transport-security" not in plain
     assert tls["strict-transport-security"] == "max-age=31536000"
@@ -114,19 +114,19 @@ def sessions(web: Running) -> list[SignIn]:
 
 
 @pytest.mark.parametrize("token", ["wrong", "x" * 4_000, "é"])
-def test_a_wrong_token_opens_nothing(web: Running, token: str) -> None:
+def test_a_wrong_launch_token_is_unauthorized(web: Running, token: str) -> None:
     answer = fresh(web).get("/", params={"token": token}, follow_redirects=False)
     assert answer.status_code == 401
     assert "set-cookie" not in answer.headers
 
 
 @pytest.mark.parametrize("value", ["", "x", "x.y", "." * 50, f"{'a' * 22}.{'0' * 64}", "ä.ö"])
-def test_a_made_up_cookie_is_no_session(web: Running, value: str) -> None:
+def test_an_invalid_session_cookie_is_unauthorized(web: Running, value: str) -> None:
     other = fresh(web)
     assert other.get("/api/projects", headers={"cookie": f"{COOKIE}={value}".encode()}).status_code == 401
 
 
-def test_a_session_outlives_the_server(start: Callable[..., Any]) -> None:
+def test_a_session_survives_a_server_restart(start: Callable[..., Any]) -> None:
     with start() as web:
         cookie = web.client.cookies[COOKIE]
     with start() as web:
@@ -135,24 +135,24 @@ def test_a_session_outlives_the_server(start: Callable[..., Any]) -> None:
 
 
 @pytest.mark.parametrize("others", ['a={"b": [1, 2]}; ', "plain; ", "x=\x01; ", 'q="half; '])
-def test_what_other_apps_of_this_machine_keep_in_cookies_signs_nobody_out(web: Running, others: str) -> None:
+def test_cookies_of_other_apps_do_not_break_the_session(web: Running, others: str) -> None:
     cookie = web.client.cookies[COOKIE]
     headers = {"cookie": f"{others}{COOKIE}={cookie}; theirs=2".encode()}
     assert fresh(web).get("/api/projects", headers=headers).status_code == 200
 
 
-def test_what_is_stored_of_a_session_lets_nobody_in(web: Running) -> None:
+def test_the_session_cookie_is_not_stored_in_plain_text(web: Running) -> None:
     stored = b"".join(path.read_bytes() for path in web.settings.data_dir.glob("r2c2r.db*"))
     assert web.client.cookies[COOKIE].encode() not in stored
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "", "[::1", "localhost.evil:8000", "10.0.0.7:8000"])
-def test_other_hosts_are_not_answered(web: Running, host: str) -> None:
+def test_requests_for_other_host_names_are_refused(web: Running, host: str) -> None:
     assert web.client.get("/api/projects", headers={"host": host}).status_code == 421
 
 
 @pytest.mark.parametrize("host", ["localhost:8000", "127.0.0.1", "[::1]:8000", "LOCALHOST:1"])
-def test_loopback_names_are(web: Running, host: str) -> None:
+def test_requests_for_loopback_host_names_are_answered(web: Running, host: str) -> None:
     assert web.client.get("/api/health", headers={"host": host}).status_code == 200
 
 
@@ -166,7 +166,7 @@ def test_requests_from_other_sites_are_refused(web: Running, origin: str) -> Non
         assert answer.json()["kind"] == "forbidden"
 
 
-def test_unsafe_requests_need_the_header_that_forms_cannot_send(web: Running) -> None:
+def test_state_changing_requests_need_a_header_that_forms_cannot_send(web: Running) -> None:
     del web.client.headers["X-Requested-With"]
     for method in ("POST", "PATCH", "PUT", "DELETE"):
         answer = web.client.request(method, "/api/projects/x", headers={"origin": ORIGIN})
@@ -175,7 +175,7 @@ def test_unsafe_requests_need_the_header_that_forms_cannot_send(web: Running) ->
 
 
 @pytest.mark.parametrize("headers", [{}, {"origin": "http://evil.example"}, {"origin": "null"}])
-def test_sockets_need_our_origin(web: Running, headers: dict[str, str]) -> None:
+def test_websockets_from_other_origins_are_refused(web: Running, headers: dict[str, str]) -> None:
     for path in ("/api/live", "/viewer/token"):
         with (
             refused(4403),
@@ -184,7 +184,7 @@ def test_sockets_need_our_origin(web: Running, headers: dict[str, str]) -> None:
             pass
 
 
-def test_a_socket_needs_a_session(web: Running) -> None:
+def test_a_websocket_needs_a_session(web: Running) -> None:
     with (
         refused(4401),
         fresh(web).websocket_connect(f"{SOCKETS}/api/live", headers={"origin": ORIGIN}),
@@ -192,7 +192,7 @@ def test_a_socket_needs_a_session(web: Running) -> None:
         pass
 
 
-def test_every_answer_carries_the_safe_headers(web: Running) -> None:
+def test_every_response_has_the_security_headers(web: Running) -> None:
     for path in ("/", "/api/projects", "/static/index.html", "/nowhere", "/api/projects/none"):
         headers = web.client.get(path).headers
         assert headers["x-content-type-options"] == "nosniff"
@@ -203,7 +203,7 @@ def test_every_answer_carries_the_safe_headers(web: Running) -> None:
         assert "frame-ancestors 'self'" in policy
 
 
-def test_what_is_read_at_once_is_bounded_also_for_strangers(web: Running) -> None:
+def test_request_bodies_are_bounded_also_without_a_session(web: Running) -> None:
     def pieces() -> Iterator[bytes]:
         yield from (b"x" * (1 << 20) for _ in range(20))
 
@@ -234,7 +234,7 @@ ESCAPES = (
 )
 
 
-def test_no_path_leads_out(web: Running) -> None:
+def test_path_traversal_is_rejected(web: Running) -> None:
     project = web.sample()
     for path in ESCAPES:
         answer = web.client.get(path.replace("PROJECT", project))
@@ -242,13 +242,13 @@ def test_no_path_leads_out(web: Running) -> None:
         assert b"root:" not in answer.content
 
 
-def test_the_key_to_the_app_is_not_told_twice(web: Running) -> None:
+def test_the_launch_token_is_not_revealed_by_the_api(web: Running) -> None:
     assert web.settings.launch_token not in web.client.get("/api/system").text
     assert web.settings.launch_token not in web.client.get("/api/openapi.json").text
 
 
 @pytest.mark.parametrize("path", ["/", "/api/projects", "/static/js/main.js"])
-def test_a_proxy_that_publishes_it_below_a_path_is_told_that_it_needs_a_host_name(web: Running, path: str) -> None:
+def test_a_proxy_with_a_path_prefix_is_refused_with_a_hint(web: Running, path: str) -> None:
     answer = web.client.get(path, headers={"X-Forwarded-Prefix": "/lab/r2c2r"})
     assert answer.status_code == 421
     assert "/lab/r2c2r" in answer.json()["message"]

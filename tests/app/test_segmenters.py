@@ -32,7 +32,7 @@ def choose(web: Running, project: str, segmenter: str, status: int = 200) -> Any
     return web.patch(f"/api/projects/{project}", {"segmenter": segmenter}, status)
 
 
-def test_every_segmenter_is_listed_with_its_licence_and_what_is_missing(web: Running) -> None:
+def test_segmenters_are_listed_with_licence_and_reason_if_unavailable(web: Running) -> None:
     listed = {entry["name"]: entry for entry in web.get("/api/system")["segmenters"]}
     assert next(iter(listed)) == "geometric"
     assert listed["geometric"]["available"]
@@ -41,7 +41,7 @@ def test_every_segmenter_is_listed_with_its_licence_and_what_is_missing(web: Run
     assert "hf download facebook/sam2.1-hiera-tiny" in listed["sam2"]["reason"]
 
 
-def test_one_whose_weights_are_missing_is_refused_with_the_next_step(web: Running) -> None:
+def test_a_segmenter_without_weights_is_refused_with_a_hint(web: Running) -> None:
     project = web.sample()
     refused = choose(web, project, "sam2", 503)
     assert refused["kind"] == "backend-unavailable"
@@ -50,7 +50,7 @@ def test_one_whose_weights_are_missing_is_refused_with_the_next_step(web: Runnin
     assert web.get(f"/api/projects/{project}")["segmenter"] == "geometric"
 
 
-def test_the_chosen_one_draws_all_objects_and_each_says_who_drew_it(web: Running, sam2: Path) -> None:
+def test_the_chosen_segmenter_recomputes_masks_that_name_their_backend(web: Running, sam2: Path) -> None:
     project = web.sample()
     made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)["id"]
 
@@ -69,7 +69,9 @@ def test_the_chosen_one_draws_all_objects_and_each_says_who_drew_it(web: Running
     assert [entry["action"] for entry in web.get(f"/api/projects/{project}/history")][:2] == ["segmenter", "segmenter"]
 
 
-def test_a_live_process_is_ended_while_others_can_write(web: Running, sam2: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_database_is_not_locked_while_a_live_process_is_closed(
+    web: Running, sam2: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     project = web.sample()
     ended = []
 
@@ -83,7 +85,7 @@ def test_a_live_process_is_ended_while_others_can_write(web: Running, sam2: Path
     assert ended == [project]
 
 
-def test_a_run_takes_the_projects_segmenter_unless_told_otherwise(web: Running, sam2: Path) -> None:
+def test_a_run_uses_the_segmenter_of_the_project(web: Running, sam2: Path) -> None:
     project = web.sample()
     choose(web, project, "sam2")
     request = web.post(f"/api/projects/{project}/run", {}, 202)
@@ -92,7 +94,7 @@ def test_a_run_takes_the_projects_segmenter_unless_told_otherwise(web: Running, 
     assert '"segmenter": "sam2"' in written
 
 
-def test_another_segmenter_makes_the_result_stale(web: Running, sam2: Path) -> None:
+def test_choosing_another_segmenter_makes_the_result_stale(web: Running, sam2: Path) -> None:
     project = web.sample()
     web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "done")
     assert web.get(f"/api/projects/{project}")["result"] == "current"

@@ -21,7 +21,7 @@ from tests.forked import forked
 from tests.waiting import PATIENCE_S
 
 
-def test_a_taken_port_is_one_line_with_the_next_step(tmp_path: Path) -> None:
+def test_a_port_in_use_is_reported_in_one_line_with_a_hint(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(EnvironmentProblem) as caught:
@@ -32,12 +32,12 @@ def test_a_taken_port_is_one_line_with_the_next_step(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("host", "names"), [("0.0.0.0", []), ("::", []), ("127.0.0.1", ["kitchens.example"])])
-def test_other_machines_are_not_let_in_by_accident(tmp_path: Path, host: str, names: list[str]) -> None:
+def test_serving_other_machines_without_accounts_is_refused(tmp_path: Path, host: str, names: list[str]) -> None:
     with pytest.raises(EnvironmentProblem, match="nobody has an account"):
         serve(host=host, port=0, data_dir=tmp_path, names=names)
 
 
-def test_accounts_are_made_and_changed_from_the_command_line(
+def test_accounts_are_managed_from_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def user(*words: str, said: str = "") -> tuple[int, str]:
@@ -66,13 +66,13 @@ def test_accounts_are_made_and_changed_from_the_command_line(
     assert "ann" not in user("list")[1]
 
 
-def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+def test_a_data_folder_that_cannot_be_created_raises(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(EnvironmentProblem):
         serve(host="127.0.0.1", port=0, data_dir=tmp_path / "file" / "data")
 
 
-def test_the_server_prints_its_address_and_holds_its_folder(tmp_path: Path) -> None:
+def test_the_server_prints_its_address_and_locks_its_data_folder(tmp_path: Path) -> None:
     with forked(serve, host="127.0.0.1", port=0, data_dir=tmp_path) as server:
         address = server.readline().split(" ", 1)[1].strip()
         assert address.startswith("http://127.0.0.1:")
@@ -82,7 +82,7 @@ def test_the_server_prints_its_address_and_holds_its_folder(tmp_path: Path) -> N
         assert server.end() in (0, -15)
 
 
-def test_a_key_for_another_browser_is_printed_while_the_server_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_r2c2r_key_prints_single_use_addresses_of_a_running_server(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def key() -> tuple[int, str]:
         code = main(["key", "--data", str(tmp_path)])
         captured = capsys.readouterr()
@@ -108,7 +108,7 @@ def test_a_key_for_another_browser_is_printed_while_the_server_runs(tmp_path: Pa
         assert "sign in to this server by name" in key()[1]
 
 
-def test_who_asks_is_what_the_proxy_says_only_where_the_server_was_told_to_believe_it(tmp_path: Path) -> None:
+def test_forwarded_client_addresses_are_used_only_from_a_trusted_proxy(tmp_path: Path) -> None:
     for behind, seen in (([], "127.0.0.1"), (["127.0.0.1"], "203.0.113.7"), (["10.0.0.0/8"], "127.0.0.1")):
         data = tmp_path / "-".join(["data", *behind]).replace("/", "_")
         data.mkdir()
@@ -126,7 +126,7 @@ def test_who_asks_is_what_the_proxy_says_only_where_the_server_was_told_to_belie
 
 
 @pytest.mark.parametrize("address", ["proxy.example", "*", "10.0.0.1/8", ""])
-def test_a_proxy_is_named_by_its_address(tmp_path: Path, address: str) -> None:
+def test_an_invalid_proxy_address_is_refused(tmp_path: Path, address: str) -> None:
     with pytest.raises(InputError, match="--behind-proxy"):
         serve(host="127.0.0.1", port=0, data_dir=tmp_path, behind_proxy=[address])
 
@@ -156,7 +156,7 @@ def _answers(address: str) -> bool:
         return False
 
 
-def test_another_folder_is_allowed_to_import_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_import_from_adds_an_import_root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class _StoppedError(Exception):
         """Raised before anything is served."""
 
@@ -174,7 +174,7 @@ def test_another_folder_is_allowed_to_import_from(tmp_path: Path, monkeypatch: p
     assert roots == [Path.home(), tmp_path / "data", scans]
 
 
-def test_a_folder_to_import_from_that_is_not_there_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_import_folder_is_reported_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["serve", "--data", str(tmp_path), "--import-from", str(tmp_path / "none")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "none: no such file or folder" in line

@@ -44,7 +44,7 @@ def waiting(engine: Engine, *projects: str) -> None:
             session.add(Job(project_id=name, kind="run", state="queued", created=0.0))
 
 
-def test_how_far_a_job_is_waits_for_no_disk_and_what_became_of_it_does(engine: Engine, tmp_path: Path) -> None:
+def test_job_progress_commits_asynchronously_and_job_ends_synchronously(engine: Engine, tmp_path: Path) -> None:
     """Else each word of progress holds the one lock of all writers until the disk has turned."""
     waiting(engine, "p")
     server, asked = a_server(engine, tmp_path), list[str]()
@@ -79,7 +79,7 @@ def test_no_two_servers_claim_the_same_job(engine: Engine, tmp_path: Path) -> No
     assert len(claimed) == len(set(claimed)) == 12
 
 
-def test_a_server_that_starts_takes_nothing_from_one_that_lives(engine: Engine, tmp_path: Path) -> None:
+def test_a_starting_server_takes_no_jobs_from_a_live_one(engine: Engine, tmp_path: Path) -> None:
     waiting(engine, "p")
     first, second = a_server(engine, tmp_path), a_server(engine, tmp_path)
     number = first.claim()
@@ -90,9 +90,7 @@ def test_a_server_that_starts_takes_nothing_from_one_that_lives(engine: Engine, 
     assert second.beat() == {}
 
 
-def test_a_job_without_a_sign_of_life_is_taken_up_and_its_former_owner_changes_nothing_more(
-    engine: Engine, tmp_path: Path
-) -> None:
+def test_a_job_without_heartbeat_is_taken_over_and_its_old_owner_locked_out(engine: Engine, tmp_path: Path) -> None:
     waiting(engine, "p")
     first, second = a_server(engine, tmp_path), a_server(engine, tmp_path)
     number = first.claim() or 0
@@ -114,7 +112,7 @@ def test_a_job_without_a_sign_of_life_is_taken_up_and_its_former_owner_changes_n
     assert first.beat() == {}
 
 
-def test_a_sign_of_life_keeps_a_job(engine: Engine, tmp_path: Path) -> None:
+def test_a_heartbeat_keeps_the_ownership_of_a_job(engine: Engine, tmp_path: Path) -> None:
     waiting(engine, "p")
     first, second = a_server(engine, tmp_path), a_server(engine, tmp_path)
     number = first.claim() or 0
@@ -124,7 +122,7 @@ def test_a_sign_of_life_keeps_a_job(engine: Engine, tmp_path: Path) -> None:
     assert stored(engine, number)["owner"] == first.owner
 
 
-def test_a_job_that_is_cancelled_at_another_server_stops_where_it_runs(postgres_server: PostgresServer, tmp_path: Path) -> None:
+def test_a_job_cancelled_at_another_server_stops_where_it_runs(postgres_server: PostgresServer, tmp_path: Path) -> None:
     rows, data = postgres_server.of_folder(tmp_path), tmp_path / "data"
     with running(data, postgres=rows, beat_s=0.1) as first, running(data, postgres=rows, run_jobs=False) as second:
         project = first.sample()
@@ -138,7 +136,7 @@ def test_a_job_that_is_cancelled_at_another_server_stops_where_it_runs(postgres_
     postgres_server.drop_all()
 
 
-def test_one_writes_at_a_time_and_what_it_read_is_still_true(engine: Engine) -> None:
+def test_concurrent_writers_are_serialized_without_lost_updates(engine: Engine) -> None:
     waiting(engine, "p")
 
     def count_up() -> None:
@@ -157,7 +155,7 @@ def test_one_writes_at_a_time_and_what_it_read_is_still_true(engine: Engine) -> 
         assert session.get_one(Project, "p").size_bytes == 80
 
 
-def test_a_reader_sees_the_rows_of_one_moment(engine: Engine) -> None:
+def test_a_read_transaction_sees_one_snapshot(engine: Engine) -> None:
     waiting(engine, "p")
     with reading(engine) as session:
         assert len(session.exec(select(Project.id)).all()) == 1
@@ -165,14 +163,14 @@ def test_a_reader_sees_the_rows_of_one_moment(engine: Engine) -> None:
         assert len(session.exec(select(Project.id)).all()) == 1
 
 
-def test_a_recording_of_many_gibibytes_has_a_row(engine: Engine) -> None:
+def test_an_upload_size_of_a_tebibyte_is_stored(engine: Engine) -> None:
     with writing(engine) as session:
         session.add(Upload(id="u", file_name="f", size=2**40, who="w", created=0.0))
     with reading(engine) as session:
         assert session.get_one(Upload, "u").size == 2**40
 
 
-def test_what_postgres_says_is_taken_by_its_code(engine: Engine) -> None:
+def test_postgres_errors_are_classified_by_sqlstate(engine: Engine) -> None:
     def said(state: str | None) -> str:
         orig = Exception("of a language nobody here speaks")
         orig.sqlstate = state  # type: ignore[attr-defined]
@@ -194,7 +192,7 @@ def test_what_postgres_says_is_taken_by_its_code(engine: Engine) -> None:
         ("elsewhere.db", "not postgresql+psycopg://USER@HOST/NAME"),
     ],
 )
-def test_a_database_that_is_not_there_is_one_line(
+def test_an_unreachable_database_is_reported_in_one_line_without_password(
     address: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("psycopg", reason="no psycopg: pip install 'r2c2r[postgres]'")
@@ -206,7 +204,7 @@ def test_a_database_that_is_not_there_is_one_line(
     assert "secret" not in said
 
 
-def test_an_empty_postgres_beside_projects_is_not_served(
+def test_an_empty_postgres_beside_project_folders_is_refused(
     postgres_server: PostgresServer, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("uvicorn.Server.run", lambda *_, **__: None)

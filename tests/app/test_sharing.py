@@ -58,7 +58,7 @@ def parts(web: Running) -> list[Part]:
         return list(session.exec(select(Part)))
 
 
-def test_two_seats_share_the_objects_of_one_job_and_make_what_one_makes(tmp_path: Path) -> None:
+def test_two_seats_share_the_objects_of_a_job_with_identical_results(tmp_path: Path) -> None:
     with running(tmp_path / "two", heavy_jobs=2, **FREE) as web:
         project, folder = held(web, *NAMES)
         job = run(web, project)
@@ -80,7 +80,7 @@ def test_two_seats_share_the_objects_of_one_job_and_make_what_one_makes(tmp_path
         assert f"segment of {name} at " in log
 
 
-def test_how_many_objects_are_done_is_said(tmp_path: Path) -> None:
+def test_a_shared_job_reports_the_number_of_finished_objects(tmp_path: Path) -> None:
     with running(tmp_path, heavy_jobs=2, **FREE) as web:
         project, folder = held(web, "mug_1")
         job = run(web, project)
@@ -94,7 +94,7 @@ def test_how_many_objects_are_done_is_said(tmp_path: Path) -> None:
         assert said == sorted(said)
 
 
-def test_a_seat_whose_process_is_killed_costs_a_try(tmp_path: Path) -> None:
+def test_an_object_whose_process_is_killed_is_retried(tmp_path: Path) -> None:
     with running(tmp_path, heavy_jobs=2, **FREE) as web:
         project, folder = held(web, *NAMES)
         job = run(web, project)
@@ -110,7 +110,7 @@ def test_a_seat_whose_process_is_killed_costs_a_try(tmp_path: Path) -> None:
         assert sorted(segmented) == [("drawer_1", "part"), ("drawer_1", "part"), ("mug_1", "part")]
 
 
-def test_an_object_that_kills_every_process_is_left_to_the_stage(tmp_path: Path) -> None:
+def test_an_object_that_exhausts_its_tries_is_computed_by_the_stage(tmp_path: Path) -> None:
     with running(tmp_path, heavy_jobs=2, **FREE) as web:
         project, folder = held(web, "drawer_1")
         job = run(web, project)
@@ -125,7 +125,7 @@ def test_an_object_that_kills_every_process_is_left_to_the_stage(tmp_path: Path)
         assert ("segment", "drawer_1", "whole") in computed(folder)
 
 
-def test_cancelling_stops_every_seat(tmp_path: Path) -> None:
+def test_cancelling_a_shared_job_stops_every_seat(tmp_path: Path) -> None:
     with running(tmp_path, heavy_jobs=2, **FREE) as web:
         project, folder = held(web, *NAMES)
         job = run(web, project)
@@ -137,7 +137,7 @@ def test_cancelling_stops_every_seat(tmp_path: Path) -> None:
         assert parts(web) == []
 
 
-def test_an_object_that_fails_ends_the_job_with_its_line(tmp_path: Path) -> None:
+def test_an_object_that_fails_ends_the_job_with_its_message(tmp_path: Path) -> None:
     with running(tmp_path, heavy_jobs=2, **FREE) as web:
         project, folder = held(web)
         (folder / "bad.txt").write_text("mug_1")
@@ -147,7 +147,7 @@ def test_an_object_that_fails_ends_the_job_with_its_line(tmp_path: Path) -> None
         assert parts(web) == []
 
 
-def test_objects_that_take_no_longer_than_a_process_to_begin_are_not_shared(tmp_path: Path) -> None:
+def test_objects_faster_than_a_process_start_are_not_shared(tmp_path: Path) -> None:
     with running(tmp_path, heavy_jobs=2) as web:  # without a model two objects take a second or two
         project, folder = held(web)
         assert web.job(run(web, project), "done", "failed")["state"] == "done"
@@ -165,7 +165,7 @@ def test_a_single_object_is_not_shared(tmp_path: Path) -> None:
         assert segmented == [("mug_1", "whole")]
 
 
-def test_seats_with_jobs_of_their_own_are_not_counted_on(tmp_path: Path) -> None:
+def test_seats_with_own_jobs_do_not_count_as_spare(tmp_path: Path) -> None:
     with running(tmp_path, heavy_jobs=2, **FREE) as web:
         projects = [web.sample() for _ in range(2)]
         rows = PartRows(web.context.engine, "somebody", web.settings)
@@ -188,11 +188,11 @@ def test_seats_with_jobs_of_their_own_are_not_counted_on(tmp_path: Path) -> None
         (5, 1, 8, 5),
     ],
 )
-def test_a_seat_takes_as_many_objects_as_keep_all_busy(waiting: int, seats: int, fewest: int, taken: int) -> None:
+def test_a_seat_takes_its_fair_share_of_the_waiting_objects(waiting: int, seats: int, fewest: int, taken: int) -> None:
     assert fair_share(waiting, seats, fewest) == taken
 
 
-def test_a_server_that_stops_leaves_no_process_and_the_next_goes_on(tmp_path: Path) -> None:
+def test_a_stopped_server_leaves_no_process_and_the_next_one_continues(tmp_path: Path) -> None:
     with running(tmp_path / "data", heavy_jobs=2, **FREE) as web:
         project, folder = held(web, *NAMES)
         job = run(web, project)
@@ -241,7 +241,7 @@ def held_at(web: Running, one: Forked, two: Forked) -> tuple[int, dict[int, Path
     return job, at
 
 
-def test_what_a_machine_that_vanishes_was_at_another_one_computes(served: Running, tmp_path: Path) -> None:
+def test_objects_of_a_lost_machine_are_computed_by_another(served: Running, tmp_path: Path) -> None:
     with seat(served, tmp_path / "one") as one, seat(served, tmp_path / "two") as two:
         job, folders = held_at(served, one, two)
         with reading(served.context.engine) as session:
@@ -263,7 +263,7 @@ def test_what_a_machine_that_vanishes_was_at_another_one_computes(served: Runnin
     assert sorted(nouns) == sorted(f"nouns/{stage}/{name}.noun" for stage in SHARED for name in NAMES)
 
 
-def test_a_job_that_is_cancelled_where_pages_are_served_stops_at_every_machine(served: Running, tmp_path: Path) -> None:
+def test_cancelling_at_the_web_server_stops_the_job_on_every_machine(served: Running, tmp_path: Path) -> None:
     with seat(served, tmp_path / "one") as one, seat(served, tmp_path / "two") as two:
         job, folders = held_at(served, one, two)
         processes = [psutil.Process(int(path.read_text())) for folder in folders.values() for path in folder.glob("at-*.part")]

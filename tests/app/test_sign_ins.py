@@ -24,13 +24,13 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
         yield web
 
 
-def test_the_printed_key_opens_nothing_where_others_can_reach_it(shared: Running) -> None:
+def test_the_launch_token_is_refused_when_accounts_are_required(shared: Running) -> None:
     stranger = browser(shared)
     assert stranger.get(f"/?token={shared.settings.launch_token}", follow_redirects=False).status_code == 401
     assert COOKIE not in stranger.cookies
 
 
-def test_the_sign_in_page_is_shown_to_strangers(shared: Running) -> None:
+def test_the_sign_in_page_is_shown_without_a_session(shared: Running) -> None:
     stranger = browser(shared)
     page = stranger.get("/p/x/annotate?frame=3")
     assert page.status_code == 200
@@ -39,7 +39,7 @@ def test_the_sign_in_page_is_shown_to_strangers(shared: Running) -> None:
         assert stranger.get(asset).status_code == 200, asset
 
 
-def test_signing_out_ends_the_session_at_once(shared: Running) -> None:
+def test_signing_out_ends_the_session_immediately(shared: Running) -> None:
     with signed_in(shared, "the-admin") as client:
         cookie = client.cookies[COOKIE]
     other = browser(shared)
@@ -47,13 +47,13 @@ def test_signing_out_ends_the_session_at_once(shared: Running) -> None:
     assert other.get("/api/projects").status_code == 401
 
 
-def test_each_sign_in_is_a_session_of_its_own(shared: Running) -> None:
+def test_each_sign_in_creates_a_separate_session(shared: Running) -> None:
     with signed_in(shared, "the-admin") as one, signed_in(shared, "the-admin") as two:
         assert one.cookies[COOKIE] != two.cookies[COOKIE]
 
 
 @pytest.mark.parametrize("body", [{"name": "nobody", "password": PASSWORD}, {"name": "the-admin", "password": "wrong"}])
-def test_a_wrong_name_and_a_wrong_password_look_the_same(shared: Running, body: dict[str, str]) -> None:
+def test_wrong_names_and_wrong_passwords_return_the_same_error(shared: Running, body: dict[str, str]) -> None:
     answer = browser(shared).post("/api/login", json=body)
     assert (answer.status_code, answer.json()["message"]) == (401, "the name or the password is wrong")
     assert "set-cookie" not in answer.headers
@@ -67,9 +67,7 @@ def test_signing_in_from_another_site_is_refused(shared: Running) -> None:
     assert stranger.post("/api/login", json=body).status_code == 403
 
 
-def test_after_five_wrong_passwords_each_waits_and_many_at_once_are_no_more(
-    shared: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_sign_in_is_delayed_and_limited_after_five_wrong_passwords(shared: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     accounts.add(shared.context.engine, "guessed", "annotator", PASSWORD)
     waited: list[float] = []
 
@@ -93,7 +91,7 @@ def test_after_five_wrong_passwords_each_waits_and_many_at_once_are_no_more(
     assert 3.0 < waited[-1] <= 4.0  # delayed, but accepted
 
 
-def test_sign_ins_wait_outside_the_threads_that_requests_share(shared: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pending_sign_ins_do_not_block_other_requests(shared: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     verified, going = accounts.verified, threading.Event()
 
     def late(*arguments: Any) -> Any:
@@ -122,7 +120,7 @@ def test_sign_ins_wait_outside_the_threads_that_requests_share(shared: Running, 
     assert sorted({each.result() for each in asked}) == [401, 429]
 
 
-def test_whatever_was_guessed_the_right_password_is_in_after_a_bounded_wait() -> None:
+def test_the_wait_before_a_sign_in_is_bounded_despite_wrong_guesses() -> None:
     now = [0.0]
     attempts = Attempts(lambda: now[0])
     for number in range(30):  # behind a proxy that does not identify clients: one address for all
@@ -141,7 +139,7 @@ def test_whatever_was_guessed_the_right_password_is_in_after_a_bounded_wait() ->
     attempts.succeeded("bob", "home")
 
 
-def test_guesses_are_forgotten_after_a_while_and_with_the_right_password() -> None:
+def test_wrong_guesses_expire_and_are_cleared_by_a_successful_sign_in() -> None:
     now = [0.0]
     attempts = Attempts(lambda: now[0])
     for _ in range(5):
@@ -178,12 +176,12 @@ def test_guesses_are_forgotten_after_a_while_and_with_the_right_password() -> No
         ("tr0ub4dor&3x", ""),
     ],
 )
-def test_passwords_that_are_tried_first_are_refused_with_the_reason(password: str, reason: str) -> None:
+def test_common_passwords_are_refused_with_the_reason(password: str, reason: str) -> None:
     said = weakness("ann.smith", password)
     assert (reason in said, bool(said)) == (True, bool(reason)), said
 
 
-def test_a_weak_password_is_refused_wherever_one_is_set(shared: Running) -> None:
+def test_weak_passwords_are_refused_by_every_operation_that_sets_one(shared: Running) -> None:
     with signed_in(shared, "the-admin") as admin:
         new = {"name": "weak", "role": "annotator", "password": "1234567890"}
         assert "in order" in admin.post("/api/accounts", json=new).json()["message"]
@@ -193,7 +191,7 @@ def test_a_weak_password_is_refused_wherever_one_is_set(shared: Running) -> None
         assert admin.get("/api/system").status_code == 200  # the session continues
 
 
-def test_the_record_says_who_came_in_who_was_refused_and_who_changed_whose_account(shared: Running) -> None:
+def test_the_audit_records_sign_ins_refusals_and_account_changes(shared: Running) -> None:
     with signed_in(shared, "the-admin") as admin:
         newest = admin.get("/api/audit").json()["entries"][0]["id"]
         admin.post("/api/accounts", json={"name": "noted", "role": "annotator", "password": PASSWORD})
@@ -225,7 +223,7 @@ def test_the_record_says_who_came_in_who_was_refused_and_who_changed_whose_accou
         assert page["total"] >= len(found)
 
 
-def test_of_refusals_only_the_newest_are_kept(shared: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_audit_keeps_only_the_newest_refusals(shared: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(audit, "MOST_REFUSALS", 3)
     before = audit.entries(shared.context.engine, None, 200).total
     for number in range(6):

@@ -29,7 +29,7 @@ def certified(web: Running, project: str, passed: bool) -> None:
             session.add(bundle)
 
 
-def test_a_new_project_is_a_draft_and_only_legal_steps_are_taken(web: Running) -> None:
+def test_a_new_project_is_a_draft_and_rejects_illegal_transitions(web: Running) -> None:
     project = web.sample()
     assert web.get(f"/api/projects/{project}")["review_state"] == "draft"
     refused = step(web, project, "approved", "because", 409)
@@ -38,7 +38,7 @@ def test_a_new_project_is_a_draft_and_only_legal_steps_are_taken(web: Running) -
     assert [move["to"] for move in web.get(f"/api/projects/{project}/review")["moves"]] == ["ready"]
 
 
-def test_what_is_unmet_is_said_and_needs_a_reason(web: Running) -> None:
+def test_unmet_conditions_are_listed_and_overridden_by_a_reason(web: Running) -> None:
     project = web.sample()
     web.post(f"/api/projects/{project}/objects", {"name": "bare", "category": "mug"})
     (move,) = web.get(f"/api/projects/{project}/review")["moves"]
@@ -48,7 +48,7 @@ def test_what_is_unmet_is_said_and_needs_a_reason(web: Running) -> None:
     assert (said["state"], said["who"], said["reason"]) == ("ready", "tester", "the mug is only a note")
 
 
-def test_two_people_who_step_at_once_do_not_overtake_each_other(web: Running) -> None:
+def test_a_transition_from_an_outdated_state_is_a_conflict(web: Running) -> None:
     project = web.sample()
     step(web, project, "ready", "go")
     stale = web.post(f"/api/projects/{project}/review", {"from_state": "draft", "to": "ready", "reason": "me too"}, 409)
@@ -63,7 +63,7 @@ def under_review(reviewed: Reviewed) -> Reviewed:
     return reviewed
 
 
-def test_changes_are_requested_with_a_reason_and_it_is_in_the_history(under_review: Reviewed) -> None:
+def test_requesting_changes_needs_a_reason_that_is_in_the_history(under_review: Reviewed) -> None:
     web, project, _ = under_review
     step(web, project, "changes requested", status=409)
     step(web, project, "changes requested", "the hinge is on the left")
@@ -76,7 +76,7 @@ def test_changes_are_requested_with_a_reason_and_it_is_in_the_history(under_revi
     assert step(web, project, "ready", "moved it")["state"] == "ready"
 
 
-def test_approving_needs_a_certificate_that_passed_or_a_reason(under_review: Reviewed) -> None:
+def test_approval_needs_a_passed_certificate_or_a_reason(under_review: Reviewed) -> None:
     web, project, number = under_review
     certified(web, project, passed=False)
     (approve,) = [m for m in web.get(f"/api/projects/{project}/review")["moves"] if m["to"] == "approved"]
@@ -94,7 +94,7 @@ def test_approving_needs_a_certificate_that_passed_or_a_reason(under_review: Rev
     assert step(web, project, "approved")["state"] == "approved"
 
 
-def test_what_is_approved_stays_what_it_was_until_it_is_reopened(under_review: Reviewed) -> None:
+def test_an_approved_project_is_read_only_until_reopened(under_review: Reviewed) -> None:
     web, project, number = under_review
     step(web, project, "approved", "good enough for the demo")
     base = f"/api/projects/{project}"
@@ -107,7 +107,7 @@ def test_what_is_approved_stays_what_it_was_until_it_is_reopened(under_review: R
     web.post(f"{base}/objects/{number}/points", {"frame": 3, "x": 5, "y": 5})
 
 
-def test_the_figures_say_clicks_an_object_and_the_time_to_approval(under_review: Reviewed) -> None:
+def test_the_figures_report_clicks_per_object_and_time_to_approval(under_review: Reviewed) -> None:
     web, project, number = under_review
     before = web.get(f"/api/projects/{project}/figures")
     assert before["upload_to_approval_s"] is None
@@ -120,7 +120,7 @@ def test_the_figures_say_clicks_an_object_and_the_time_to_approval(under_review:
     assert after["computing_s"] > 0
 
 
-def test_a_comment_is_pinned_resolved_and_in_the_history(reviewed: Reviewed) -> None:
+def test_comments_are_pinned_resolved_reopened_and_in_the_history(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     base = f"/api/projects/{project}"
     on_frame = web.post(f"{base}/comments", {"text": "cut here", "object": number, "frame": 3, "x": 10.5, "y": 20})
@@ -138,7 +138,7 @@ def test_a_comment_is_pinned_resolved_and_in_the_history(reviewed: Reviewed) -> 
     web.post(f"{base}/comments", {"text": "nobody", "object": 10_000}, 404)
 
 
-def test_the_backends_are_chosen_for_the_project_and_unknown_ones_refused(web: Running) -> None:
+def test_unavailable_and_unknown_backends_are_refused(web: Running) -> None:
     project = web.sample()
     system = web.get("/api/system")
     usual = web.get(f"/api/projects/{project}")
@@ -151,7 +151,7 @@ def test_the_backends_are_chosen_for_the_project_and_unknown_ones_refused(web: R
     assert web.get(f"/api/projects/{project}") == usual
 
 
-def test_a_run_uses_the_backends_of_the_project_and_another_one_makes_the_result_stale(reviewed: Reviewed) -> None:
+def test_a_run_uses_the_backends_of_the_project_and_a_change_makes_it_stale(reviewed: Reviewed) -> None:
     web, project, _ = reviewed
     assert web.get(f"/api/projects/{project}")["result"] == "current"
     with writing(web.context.engine) as session:  # as if the other one were installed

@@ -54,7 +54,7 @@ def start_seat(folder: Path) -> None:
         (BUCKET, "AWS_ALLOW_HTTP", "", "its endpoint has no TLS", "AWS_ALLOW_HTTP=true"),
     ],
 )
-def test_neither_a_server_nor_a_seat_starts_on_a_store_that_refuses_it(
+def test_servers_and_seats_do_not_start_with_an_invalid_store(
     known: None,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -77,7 +77,7 @@ def test_neither_a_server_nor_a_seat_starts_on_a_store_that_refuses_it(
     assert "\n" not in str(refused.value)
 
 
-def test_a_store_that_opens_is_written_to_and_no_bucket_is_made(known: None, s3: ObjectServer, tmp_path: Path) -> None:
+def test_a_valid_store_is_accepted_and_a_missing_bucket_is_not_created(known: None, s3: ObjectServer, tmp_path: Path) -> None:
     require_store(Settings(data_dir=tmp_path, store=f"s3://{BUCKET}/{tmp_path.name}"))
     require_store(Settings(data_dir=tmp_path, store=f"file://{tmp_path / 'store'}"))
     require_store(Settings(data_dir=tmp_path, store=""))
@@ -86,7 +86,7 @@ def test_a_store_that_opens_is_written_to_and_no_bucket_is_made(known: None, s3:
             require_store(Settings(data_dir=tmp_path, store="s3://nobody-made-this"))
 
 
-def test_a_store_that_is_away_is_waited_for(
+def test_an_unreachable_store_is_logged_and_does_not_prevent_the_start(
     known: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{free_port()}")
@@ -94,7 +94,7 @@ def test_a_store_that_is_away_is_waited_for(
     assert "does not answer, jobs wait" in caplog.text
 
 
-def test_a_folder_that_cannot_be_one_is_refused(tmp_path: Path) -> None:
+def test_a_store_folder_below_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="R2C2R_STORE"):
         require_store(Settings(data_dir=tmp_path, store=f"file://{tmp_path / 'file' / 'store'}"))
@@ -114,11 +114,11 @@ def test_a_folder_that_cannot_be_one_is_refused(tmp_path: Path) -> None:
         ("file:///b", "Unable to open file: Permission denied (os error 13)", "give its folder to"),
     ],
 )
-def test_what_a_store_says_names_the_setting(address: str, said: str, next_step: str) -> None:
+def test_store_errors_are_mapped_to_a_hint_about_the_setting(address: str, said: str, next_step: str) -> None:
     wrong = refusal(address, said)
     assert wrong is not None
     assert wrong.hint.startswith(next_step)
 
 
-def test_a_store_that_is_busy_refuses_nothing() -> None:
+def test_a_busy_store_is_not_a_refusal() -> None:
     assert refusal("s3://b", "non-2xx status code: 503 Service Unavailable: <Code>SlowDown</Code>") is None

@@ -31,7 +31,7 @@ def two(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[tuple[Runni
     postgres_server.drop_all()
 
 
-def test_what_one_server_computed_another_shows_and_sends(two: tuple[Running, Running]) -> None:
+def test_results_of_one_server_are_shown_and_downloaded_at_another(two: tuple[Running, Running]) -> None:
     first, second = two
     project = first.sample()
     assert second.get(f"/api/projects/{project}/frames")[0]["index"] == 0
@@ -48,7 +48,7 @@ def test_what_one_server_computed_another_shows_and_sends(two: tuple[Running, Ru
     assert not (second.settings.data_dir / f"projects/{project}/source/scan.r3d").exists()  # no page needs it
 
 
-def test_what_a_run_made_is_in_the_store_whole_before_its_row_says_so(
+def test_results_of_a_run_are_in_the_store_before_the_row_is_committed(
     two: tuple[Running, Running], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A machine that is killed after the row is stored loses nothing of it."""
@@ -68,7 +68,9 @@ def test_what_a_run_made_is_in_the_store_whole_before_its_row_says_so(
     assert kept == [True]
 
 
-def test_a_store_that_is_away_is_said_and_waited_for(two: tuple[Running, Running], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unreachable_store_is_reported_and_jobs_wait_for_it(
+    two: tuple[Running, Running], monkeypatch: pytest.MonkeyPatch
+) -> None:
     first, second = two
     project = first.sample()
     away = Unavailable("the store of files: it does not answer", hint="try again in a moment")
@@ -89,7 +91,7 @@ def _raise(error: Exception) -> None:
     raise error
 
 
-def test_a_log_is_read_at_another_server(two: tuple[Running, Running]) -> None:
+def test_the_log_of_a_job_is_readable_at_another_server(two: tuple[Running, Running]) -> None:
     first, second = two
     project = first.sample()
     behave(first, project, segment="fail")
@@ -105,7 +107,7 @@ def test_a_recording_sent_to_one_server_is_read_by_another(two: tuple[Running, R
     assert source.read_bytes() == R3D
 
 
-def test_a_project_deleted_for_good_leaves_nothing_in_the_store(two: tuple[Running, Running], tmp_path: Path) -> None:
+def test_a_permanently_deleted_project_leaves_nothing_in_the_store(two: tuple[Running, Running], tmp_path: Path) -> None:
     first, second = two
     project = first.sample()
     assert list((tmp_path / "store").rglob(f"{project}/files/*"))
@@ -114,13 +116,13 @@ def test_a_project_deleted_for_good_leaves_nothing_in_the_store(two: tuple[Runni
     assert [path for path in (tmp_path / "store").rglob("*") if path.is_file() and project in str(path)] == []
 
 
-def test_a_recording_by_path_is_refused_where_other_machines_compute(two: tuple[Running, Running], tmp_path: Path) -> None:
+def test_import_by_path_is_refused_if_other_machines_compute(two: tuple[Running, Running], tmp_path: Path) -> None:
     (tmp_path / "scan.r3d").write_bytes(b"PK")
     refused = two[0].post("/api/projects/import", {"path": str(tmp_path / "scan.r3d")}, 422)
     assert "upload" in refused["hint"]
 
 
-def test_a_bundle_is_taken_from_the_store_itself(
+def test_a_bundle_download_redirects_to_the_store(
     postgres_server: PostgresServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with object_server() as s3:

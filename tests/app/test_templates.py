@@ -14,7 +14,7 @@ __all__ = ["kept"]
 OBJECTS = [{"name": "drawer_1", "category": "drawer"}, {"name": "oven_1", "category": "oven"}]
 
 
-def test_a_project_takes_over_a_template_and_keeps_it_when_the_template_changes(web: Running) -> None:
+def test_an_adopted_checklist_is_kept_when_its_template_changes(web: Running) -> None:
     project = web.sample()
     template = web.post("/api/templates", {"name": "Flat 3", "objects": OBJECTS}, 201)
     at = f"/api/projects/{project}"
@@ -36,7 +36,7 @@ def test_a_project_takes_over_a_template_and_keeps_it_when_the_template_changes(
     assert (refused.status_code, refused.json()["kind"]) == (404, "not-found")
 
 
-def test_names_of_a_template_are_usable_and_unique(web: Running) -> None:
+def test_object_names_of_a_template_must_be_valid_and_unique(web: Running) -> None:
     def refused(objects: list[dict[str, str]]) -> str:
         return str(web.post("/api/templates", {"name": "Flat", "objects": objects}, 422)["message"])
 
@@ -47,7 +47,7 @@ def test_names_of_a_template_are_usable_and_unique(web: Running) -> None:
     assert web.post("/api/templates", {"name": "Flat", "objects": OBJECTS}, 409)["kind"] == "conflict"
 
 
-def test_everybody_takes_a_template_and_who_made_it_or_an_admin_changes_it(kept: Kept) -> None:
+def test_anyone_uses_a_template_but_only_owner_or_admin_changes_it(kept: Kept) -> None:
     made = kept.of["alice"].post("/api/templates", json={"name": "Flat", "objects": OBJECTS}).json()
 
     def may(name: str) -> list[Any]:
@@ -63,7 +63,7 @@ def test_everybody_takes_a_template_and_who_made_it_or_an_admin_changes_it(kept:
     assert kept.of["root"].delete(at).status_code == 204
 
 
-def test_a_copy_and_a_folder_keep_what_is_to_be_clicked(web: Running) -> None:
+def test_a_duplicate_and_a_project_folder_keep_the_checklist(web: Running) -> None:
     project = web.sample()
     template = web.post("/api/templates", {"name": "Flat 3", "objects": OBJECTS}, 201)
     web.client.put(f"/api/projects/{project}/checklist", json={"template": template["id"]})

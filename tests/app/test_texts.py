@@ -24,7 +24,7 @@ def send(web: Running, method: str, path: str, body: Any) -> Any:
 
 
 @pytest.mark.parametrize("text", UNSHOWN.values(), ids=UNSHOWN)
-def test_what_cannot_be_shown_is_refused_in_one_line(web: Running, text: str) -> None:
+def test_unprintable_text_is_refused_in_one_line(web: Running, text: str) -> None:
     project = web.sample()
     at = f"/api/projects/{project}"
     for method, path, body in (
@@ -47,7 +47,7 @@ def test_what_cannot_be_shown_is_refused_in_one_line(web: Running, text: str) ->
         assert "\n" not in answer.json()["message"]
 
 
-def test_an_address_that_no_file_can_have_is_not_found(web: Running) -> None:
+def test_paths_that_are_invalid_file_names_are_not_found(web: Running) -> None:
     project = web.sample()
     for part in ("%00", "a%1bb", "%E2%80%AE", "c" * 300):
         assert web.client.get(f"/media/{project}/candidates/1/{part}.png").status_code == 404
@@ -58,7 +58,7 @@ def test_an_address_that_no_file_can_have_is_not_found(web: Running) -> None:
     assert web.client.get("/api/browse", params={"path": "a" * 5000}).status_code == 422
 
 
-def test_a_candidate_longer_than_a_file_name_is_refused(web: Running) -> None:
+def test_a_candidate_name_longer_than_a_file_name_is_refused(web: Running) -> None:
     at = f"/api/projects/{web.sample()}/objects/1/override"
     for name in ("a" * 256, "ä" * 200):
         answer = send(web, "PATCH", at, {"candidate": name})
@@ -66,7 +66,7 @@ def test_a_candidate_longer_than_a_file_name_is_refused(web: Running) -> None:
         assert all(word in answer.json()["message"] for word in ("candidate", "255"))
 
 
-def test_white_space_is_no_name(web: Running) -> None:
+def test_blank_names_are_refused_and_whitespace_is_normalised(web: Running) -> None:
     at = f"/api/projects/{web.sample()}"
     for body in ({"name": "  "}, {"name": "\n\t"}):
         assert send(web, "PATCH", at, body).status_code == 422
@@ -75,7 +75,7 @@ def test_white_space_is_no_name(web: Running) -> None:
     assert web.post(f"{at}/comments", {"text": "one\ntwo "}, 201)["text"] == "one\ntwo"
 
 
-def test_every_text_of_every_body_has_a_bound(web: Running) -> None:
+def test_every_text_field_of_a_request_body_has_a_maximum_length(web: Running) -> None:
     document = web.app.openapi()
     unbound = {
         f"{operation['operationId']}: {where}"

@@ -17,7 +17,7 @@ def benchmarks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_a_kitchen_is_counted_from_its_upload_to_its_bundle(
+def test_the_throughput_benchmark_measures_one_kitchen_end_to_end(
     postgres_server: PostgresServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import throughput  # type: ignore[import-not-found]
@@ -36,7 +36,7 @@ def test_a_kitchen_is_counted_from_its_upload_to_its_bundle(
     assert (folder / "0.bundle").is_file()
 
 
-def test_the_documentation_says_what_was_measured() -> None:
+def test_the_documentation_contains_the_measured_figures() -> None:
     import throughput
 
     parts = json.loads((ROOT / "benchmarks" / "throughput.json").read_text())

@@ -15,7 +15,7 @@ from app.jobs.steps import JobProgress
 TOOK_S = {"segment": 30.0, "generate": 20.0, "export": 60.0}
 
 
-def test_a_run_that_finds_most_done_does_not_promise_the_rest_as_fast(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_estimate_never_increases_after_stages_that_were_cached(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [1000.0]
     monkeypatch.setattr("app.jobs.steps.time", SimpleNamespace(monotonic=lambda: now[0]))
     progress = JobProgress([Step(stage, (), 30.0, took_s) for stage, took_s in TOOK_S.items()], began=now[0])
@@ -32,7 +32,7 @@ def test_a_run_that_finds_most_done_does_not_promise_the_rest_as_fast(monkeypatc
     assert told == sorted(told, reverse=True)  # it never increases
 
 
-def test_a_run_that_is_slower_than_before_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slower_run_increases_the_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [1000.0]
     monkeypatch.setattr("app.jobs.steps.time", SimpleNamespace(monotonic=lambda: now[0]))
     progress = JobProgress([Step(stage, (), 30.0, took_s) for stage, took_s in TOOK_S.items()], began=now[0])
@@ -41,7 +41,7 @@ def test_a_run_that_is_slower_than_before_says_so(monkeypatch: pytest.MonkeyPatc
     assert progress.eta_s == pytest.approx(160.0)
 
 
-def test_the_longest_of_the_projects_own_finished_runs_counts(tmp_path: Path) -> None:
+def test_the_estimate_uses_the_longest_finished_run_of_the_project(tmp_path: Path) -> None:
     engine = open_engine(tmp_path / "r2c2r.db")
     with writing(engine) as session:
         for project in ("mine", "other"):

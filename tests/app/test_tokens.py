@@ -36,7 +36,7 @@ def made(web: Running, owner: str, scope: str) -> Any:
         return answer.json()
 
 
-def test_a_program_acts_for_the_person_without_cookie_or_header_of_pages(shared: Running) -> None:
+def test_a_token_acts_as_its_owner_without_cookie_or_csrf_header(shared: Running) -> None:
     client = program(shared, made(shared, "the-reviewer", "reviewer")["secret"])
     system = client.get("/api/system").json()
     assert (system["user"], system["role"]) == ("the-reviewer", "reviewer")
@@ -55,7 +55,9 @@ def test_a_program_acts_for_the_person_without_cookie_or_header_of_pages(shared:
         ("admin", 200, 422, 200, 200),
     ],
 )
-def test_a_scope_reaches_that_far(shared: Running, scope: str, reads: int, writes: int, metrics: int, administers: int) -> None:
+def test_a_scope_allows_exactly_its_operations(
+    shared: Running, scope: str, reads: int, writes: int, metrics: int, administers: int
+) -> None:
     client = program(shared, made(shared, "the-admin", scope)["secret"])
     assert client.get("/api/projects").status_code == reads
     assert client.post("/api/projects/sample", json={"frames": "many"}).status_code == writes
@@ -63,7 +65,7 @@ def test_a_scope_reaches_that_far(shared: Running, scope: str, reads: int, write
     assert client.get("/api/accounts").status_code == administers
 
 
-def test_a_scope_beyond_the_role_is_refused_and_shrinks_with_it(shared: Running) -> None:
+def test_a_scope_cannot_exceed_the_current_role_of_its_owner(shared: Running) -> None:
     with signed_in(shared, "the-annotator") as client:
         for scope in ("reviewer", "admin", "metrics"):
             assert client.post("/api/tokens", json={"name": "n", "scope": scope}).status_code == 403
@@ -76,14 +78,14 @@ def test_a_scope_beyond_the_role_is_refused_and_shrinks_with_it(shared: Running)
     assert program(shared, secret).get("/api/system").status_code == 401
 
 
-def test_a_token_makes_and_revokes_none(shared: Running) -> None:
+def test_a_token_cannot_create_or_revoke_tokens(shared: Running) -> None:
     token = made(shared, "the-admin", "admin")
     client = program(shared, token["secret"])
     assert client.post("/api/tokens", json={"name": "n"}).status_code == 403
     assert client.delete(f"/api/tokens/{token['id']}").status_code == 403
 
 
-def test_its_secret_is_stored_nowhere_and_told_once(shared: Running) -> None:
+def test_the_secret_of_a_token_is_not_stored_or_listed(shared: Running) -> None:
     token = made(shared, "the-annotator", "read")
     program(shared, token["secret"]).get("/api/projects")
     with reading(shared.context.engine) as session:
@@ -95,7 +97,7 @@ def test_its_secret_is_stored_nowhere_and_told_once(shared: Running) -> None:
         assert {shown["owner"] for shown in client.get("/api/tokens").json()} == {"the-annotator"}  # other tests made more
 
 
-def test_what_is_revoked_opens_nothing_and_its_connection_ends(shared: Running) -> None:
+def test_revoking_a_token_ends_its_access_and_connections(shared: Running) -> None:
     token = made(shared, "the-annotator", "annotator")
     client = program(shared, token["secret"])
     with signed_in(shared, "the-reviewer") as other:
@@ -112,18 +114,20 @@ def test_what_is_revoked_opens_nothing_and_its_connection_ends(shared: Running) 
 
 
 @pytest.mark.parametrize("authorization", ["Bearer r2c2r_wrong", "Bearer ", "Basic cjpj", "Bearer other", "bearer\tr2c2r_x"])
-def test_what_is_no_token_opens_nothing_and_is_no_excuse(shared: Running, authorization: str) -> None:
+def test_an_invalid_token_is_unauthorized(shared: Running, authorization: str) -> None:
     client = TestClient(shared.app, base_url=ORIGIN, headers={"Authorization": authorization})
     assert client.get("/api/projects").status_code == 401
     assert client.post("/api/projects/sample", json={}).status_code in (401, 403)
 
 
-def test_a_page_of_another_site_gains_nothing_by_a_token(shared: Running) -> None:
+def test_a_token_is_refused_from_a_foreign_origin(shared: Running) -> None:
     secret = made(shared, "the-annotator", "annotator")["secret"]
     assert program(shared, secret, Origin="http://elsewhere.example").get("/api/projects").status_code == 403
 
 
-def test_the_command_line_makes_lists_and_revokes(web: Running, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_tokens_are_created_listed_and_revoked_on_the_command_line(
+    web: Running, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     data = ["--data", str(web.settings.data_dir)]
     assert main(["token", "add", "night runs", "--scope", "admin", *data]) == 0
     secret = capsys.readouterr().out.strip()
@@ -139,7 +143,7 @@ def test_the_command_line_makes_lists_and_revokes(web: Running, tmp_path: Path, 
     assert "is no scope" in capsys.readouterr().err
 
 
-def test_more_than_fifty_are_refused(web: Running) -> None:
+def test_tokens_beyond_the_maximum_number_are_refused(web: Running) -> None:
     with writing(web.context.engine) as session:
         for number in range(tokens.MOST):
             session.add(ApiToken(digest=str(number), name="n", scope="read", created=0.0))

@@ -46,6 +46,6 @@ def test_requests_and_the_stages_of_jobs_are_traced(tmp_path: Path) -> None:
     assert asked.resource.attributes["service.name"] == "r2c2r"
 
 
-def test_another_kind_of_traces_is_refused_in_one_line() -> None:
+def test_an_unknown_trace_exporter_is_refused() -> None:
     with pytest.raises(InputError, match="R2C2R_TRACES 'jaeger': not otlp"):
         open_traces("jaeger")

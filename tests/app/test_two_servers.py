@@ -49,7 +49,7 @@ def engine(address: str) -> Iterator[Engine]:
         yield found
 
 
-def test_people_masks_and_jobs_of_one_server_are_seen_at_the_other(two: tuple[Running, Running]) -> None:
+def test_presence_masks_and_jobs_are_shared_between_servers(two: tuple[Running, Running]) -> None:
     a, b = two
     project = a.sample()
     with listening(a, project) as at_a, listening(b, project) as at_b:
@@ -78,7 +78,7 @@ def test_people_masks_and_jobs_of_one_server_are_seen_at_the_other(two: tuple[Ru
         waiting.until(lambda: {person["who"] for person in presence(at_b)} == {"bob"})
 
 
-def test_what_is_put_into_the_trash_at_one_is_gone_at_the_other(two: tuple[Running, Running]) -> None:
+def test_a_project_trashed_at_one_server_is_hidden_at_the_other(two: tuple[Running, Running]) -> None:
     a, b = two
     project = a.sample()
     with listening(b, project) as at_b:
@@ -87,9 +87,7 @@ def test_what_is_put_into_the_trash_at_one_is_gone_at_the_other(two: tuple[Runni
         b.until(lambda: b.client.get(f"/api/projects/{project}").status_code == 404)
 
 
-def test_all_messages_arrive_in_their_order_also_over_broken_connections(
-    engine: Engine, postgres_server: PostgresServer
-) -> None:
+def test_messages_arrive_in_order_despite_broken_connections(engine: Engine, postgres_server: PostgresServer) -> None:
     told: list[int] = []
     gaps: list[None] = []
     with channel(engine, "a") as a, channel(engine, "b") as b:
@@ -105,7 +103,7 @@ def test_all_messages_arrive_in_their_order_also_over_broken_connections(
     assert gaps == []
 
 
-def test_who_was_away_while_messages_were_deleted_has_its_tabs_fetch_everything(engine: Engine) -> None:
+def test_a_server_that_missed_deleted_messages_detects_a_gap(engine: Engine) -> None:
     gaps = threading.Event()
     with channel(engine, "a") as one:
         one.on_gap.append(gaps.set)
@@ -117,7 +115,7 @@ def test_who_was_away_while_messages_were_deleted_has_its_tabs_fetch_everything(
         assert gaps.wait(PATIENCE_S)
 
 
-def test_who_vanishes_is_forgotten_and_what_it_may_not_have_told_is_fetched(engine: Engine) -> None:
+def test_a_vanished_server_is_forgotten_and_forces_a_refetch(engine: Engine) -> None:
     gone: list[tuple[str, bool]] = []
     hub = Hub()
     with channel(engine, "a") as a:
@@ -142,7 +140,7 @@ def test_who_vanishes_is_forgotten_and_what_it_may_not_have_told_is_fetched(engi
             lost.stop()
 
 
-def test_what_waits_for_a_database_that_does_not_answer_is_bounded(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_waiting_for_the_database_are_bounded(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(channels, "WAITING_BYTES", 10_000)
     kinds: list[str] = []
     with channel(engine, "b") as b:
@@ -159,7 +157,7 @@ def test_what_waits_for_a_database_that_does_not_answer_is_bounded(engine: Engin
     assert kinds == ["gap"]
 
 
-def test_a_newer_version_of_a_row_is_not_followed_by_an_older_of_another_server(engine: Engine) -> None:
+def test_an_older_row_version_of_another_server_is_not_published(engine: Engine) -> None:
     first, second = Hub(), Hub()
     with channel(engine, "a") as a, channel(engine, "b") as b:
         join_hubs(a, first)

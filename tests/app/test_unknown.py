@@ -85,7 +85,7 @@ def lose(data: Path) -> None:
         path.unlink()
 
 
-def test_a_lost_database_is_made_anew_from_what_the_folders_say(start: Start, tmp_path: Path) -> None:
+def test_a_lost_database_is_rebuilt_from_the_project_folders(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
         project = worked_on(web)
@@ -103,7 +103,7 @@ def test_a_lost_database_is_made_anew_from_what_the_folders_say(start: Start, tm
         assert [item["name"] for item in web.get(f"{base}/objects")] == ["drawer_1", "mug_1"]
 
 
-def test_what_a_restored_database_does_not_know_is_shown_to_an_admin_and_adopted(start: Start, tmp_path: Path) -> None:
+def test_projects_unknown_to_a_restored_database_are_listed_and_adopted(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
         old = web.sample()
@@ -138,7 +138,7 @@ def test_what_a_restored_database_does_not_know_is_shown_to_an_admin_and_adopted
         assert web.get("/api/unknown") == []
 
 
-def test_who_may_see_a_project_is_adopted_by_name_and_others_see_nothing_of_it(start: Start, tmp_path: Path) -> None:
+def test_adopting_a_project_restores_its_members_by_account_name(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
 
     def signed_in(web: Running, name: str) -> TestClient:
@@ -173,7 +173,7 @@ def test_who_may_see_a_project_is_adopted_by_name_and_others_see_nothing_of_it(s
         assert (told["members_only"], told["owner"], told["members"], told["may_change"]) == (True, "alice", ["bob"], True)
 
 
-def test_only_an_admin_sees_what_was_set_aside(web: Running) -> None:
+def test_only_admins_manage_folders_set_aside(web: Running) -> None:
     accounts.add(web.context.engine, "eve", "reviewer", "three plain words")
     eve = TestClient(web.app, base_url=ORIGIN, headers={"X-Requested-With": "tests"})
     eve.post("/api/login", json={"name": "eve", "password": "three plain words"})
@@ -183,7 +183,7 @@ def test_only_an_admin_sees_what_was_set_aside(web: Running) -> None:
     assert eve.post("/api/unknown/x/discard").status_code == 403
 
 
-def test_what_is_no_project_is_shown_and_not_adopted(web: Running) -> None:
+def test_entries_that_are_no_project_are_listed_and_not_adoptable(web: Running) -> None:
     folder = web.settings.unknown
     for name, content in (("a/project.json", b'{"version": 2}'), ("b/notes.txt", b"x"), ("c.part", b"bytes")):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -199,7 +199,7 @@ def test_what_is_no_project_is_shown_and_not_adopted(web: Running) -> None:
     assert (folder / "c.part").exists()
 
 
-def test_the_bytes_of_an_upload_become_a_project_where_all_of_them_are_there_or_are_discarded(web: Running) -> None:
+def test_complete_orphaned_uploads_are_adoptable_and_partial_ones_discarded(web: Running) -> None:
     folder = web.settings.unknown
     folder.mkdir()
     with zipfile.ZipFile(folder / "whole.part", "w") as recording:
@@ -219,7 +219,7 @@ def test_the_bytes_of_an_upload_become_a_project_where_all_of_them_are_there_or_
     assert {path.name for path in folder.iterdir()} == {"project"}
 
 
-def test_a_folder_of_an_older_version_is_adopted_with_what_its_last_run_was_told(start: Start, tmp_path: Path) -> None:
+def test_a_folder_without_description_is_adopted_with_its_last_inputs(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
         project = worked_on(web)
@@ -245,7 +245,7 @@ def test_a_folder_of_an_older_version_is_adopted_with_what_its_last_run_was_told
         assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [1]
 
 
-def test_a_recording_that_was_never_read_is_read_after_it_is_adopted(start: Start, tmp_path: Path) -> None:
+def test_adopting_a_project_that_was_never_imported_queues_its_import(start: Start, tmp_path: Path) -> None:
     data = tmp_path / "data"
     with start() as web:
         project = web.sample()
@@ -260,7 +260,7 @@ def test_a_recording_that_was_never_read_is_read_after_it_is_adopted(start: Star
             assert session.exec(select(Job.kind, Job.state)).all() == [("import", "queued")]
 
 
-def test_every_change_reaches_the_folder_and_the_file_is_read_back_as_it_was_written(web: Running) -> None:
+def test_changes_are_written_to_the_description_and_read_back_unchanged(web: Running) -> None:
     project = web.sample()
     files = project_files(web.settings.data_dir, project)
     drawer = web.get(f"/api/projects/{project}/objects")[0]["id"]
@@ -278,7 +278,7 @@ def test_every_change_reaches_the_folder_and_the_file_is_read_back_as_it_was_wri
     assert json.loads(files.description.read_text())["project"]["source_path"] == "source/scan.r3d"
 
 
-def test_a_file_of_a_version_that_told_of_no_true_lengths_is_written_anew_at_the_next_start(start: Start) -> None:
+def test_descriptions_without_true_lengths_are_rewritten_at_start(start: Start) -> None:
     with start() as web:
         project = web.sample()
         web.post(f"/api/projects/{project}/lengths", {"points_world": [[0, 0, 0], [0, 1, 0]], "metres": 1.01}, 201)
@@ -292,7 +292,7 @@ def test_a_file_of_a_version_that_told_of_no_true_lengths_is_written_anew_at_the
     assert json.loads(path.read_text()) == {**said, "true_lengths": [length]}
 
 
-def test_what_was_said_and_measured_is_adopted_once(web: Running) -> None:
+def test_adopting_does_not_duplicate_comments_and_lengths(web: Running) -> None:
     project = worked_on(web)
     before = known(web, project)
     context = web.context
@@ -309,7 +309,7 @@ def test_what_was_said_and_measured_is_adopted_once(web: Running) -> None:
     assert sorted(after["lengths"]["lengths"], key=lambda row: row["at"]) == before["lengths"]["lengths"]
 
 
-def test_a_change_that_is_not_committed_is_not_told(web: Running) -> None:
+def test_an_uncommitted_change_is_not_announced(web: Running) -> None:
     project, told = web.sample(), []
     web.context.engine.update_execution_options(projects_changed=lambda ids: told.extend(ids))
     with suppress(ZeroDivisionError), writing(web.context.engine) as session:
@@ -322,7 +322,7 @@ def test_a_change_that_is_not_committed_is_not_told(web: Running) -> None:
     assert told == [project]
 
 
-def test_describing_asks_the_database_the_same_number_of_times_whatever_the_project_holds(web: Running) -> None:
+def test_describing_a_project_needs_a_constant_number_of_queries(web: Running) -> None:
     project = web.sample()
     files, engine = project_files(web.settings.data_dir, project), web.context.engine
 
@@ -339,7 +339,7 @@ def test_describing_asks_the_database_the_same_number_of_times_whatever_the_proj
     assert queries() == few
 
 
-def test_a_description_that_is_none_is_one_line(tmp_path: Path) -> None:
+def test_an_invalid_description_raises_with_the_file_name(tmp_path: Path) -> None:
     path = tmp_path / "project.json"
     for content in ("", "[]", '{"version": 1}', "\ud800".encode("utf-8", "surrogatepass").decode("latin-1")):
         path.write_text(content)

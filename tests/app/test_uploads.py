@@ -32,7 +32,7 @@ def finish(web: Running, upload: str, status: int = 202) -> Any:
     return web.post(f"/api/uploads/{upload}/finish", status=status)
 
 
-def test_pieces_become_a_project_also_when_the_server_stops_between_them(start: Callable[..., Any]) -> None:
+def test_an_upload_continues_after_a_server_restart(start: Callable[..., Any]) -> None:
     with start() as web:
         upload = begin(web, name="Aunt's", modified=12.5)
         assert send(web.client, upload, 0, R3D[:100]).headers["upload-offset"] == "100"
@@ -54,7 +54,7 @@ def test_pieces_become_a_project_also_when_the_server_stops_between_them(start: 
         assert list(web.settings.uploads.iterdir()) == []
 
 
-def test_the_time_to_approval_begins_with_the_first_byte(web: Running) -> None:
+def test_the_time_to_approval_includes_the_upload(web: Running) -> None:
     upload = begin(web)
     with writing(web.context.engine) as session:
         row = session.get(Upload, upload)
@@ -69,7 +69,7 @@ def test_the_time_to_approval_begins_with_the_first_byte(web: Running) -> None:
     assert 1000.0 < figures["upload_to_approval_s"] <= figures["age_s"]
 
 
-def test_bytes_that_do_not_fit_are_refused_with_the_offset_that_does(web: Running) -> None:
+def test_a_piece_at_a_wrong_offset_is_refused_with_the_expected_one(web: Running) -> None:
     upload = begin(web)
     send(web.client, upload, 0, R3D[:50])
     for wrong in (0, 49, 51, 10**9):
@@ -81,7 +81,7 @@ def test_bytes_that_do_not_fit_are_refused_with_the_offset_that_does(web: Runnin
     assert web.client.patch(f"/api/uploads/{upload}").status_code == 422
 
 
-def test_a_sender_that_leaves_in_the_middle_goes_on_where_it_stopped(web: Running) -> None:
+def test_an_interrupted_piece_is_kept_and_the_upload_resumes(web: Running) -> None:
     upload = begin(web)
     break_off(web, "PATCH", f"/api/uploads/{upload}", R3D[:100], headers={"upload-offset": "0"})
     assert web.client.head(f"/api/uploads/{upload}").headers["upload-offset"] == "100"
@@ -89,7 +89,7 @@ def test_a_sender_that_leaves_in_the_middle_goes_on_where_it_stopped(web: Runnin
     assert finish(web, upload)["id"] == upload
 
 
-def test_what_cannot_be_read_is_refused_when_it_is_complete_and_leaves_nothing(web: Running) -> None:
+def test_an_unreadable_upload_is_refused_at_its_end_and_leaves_nothing(web: Running) -> None:
     for content, words in ((b"not a zip" * 9, "not a zip"), (archive(("unreadable", b"x")), "no frame can be read")):
         upload = begin(web, content)
         send(web.client, upload, 0, content)
@@ -102,7 +102,7 @@ def test_what_cannot_be_read_is_refused_when_it_is_complete_and_leaves_nothing(w
         assert left_behind(web) == []
 
 
-def test_a_file_that_will_not_fit_is_refused_before_it_is_sent(start: Callable[..., Any]) -> None:
+def test_a_file_that_is_too_large_is_refused_before_it_is_sent(start: Callable[..., Any]) -> None:
     with start(max_upload_bytes=100) as web:
         assert web.post("/api/uploads", {"file_name": "a", "size": 101}, 413)["kind"] == "too-large"
     with start(min_free_bytes=1 << 60) as web:
@@ -110,15 +110,13 @@ def test_a_file_that_will_not_fit_is_refused_before_it_is_sent(start: Callable[.
 
 
 @pytest.mark.parametrize(("name", "words"), [("Kitchen.usdz", "a finished 3D model"), ("room.bag", "RealSense bag")])
-def test_a_file_whose_name_tells_that_it_is_no_recording_is_refused_before_it_is_sent(
-    web: Running, name: str, words: str
-) -> None:
+def test_a_file_with_a_wrong_extension_is_refused_before_it_is_sent(web: Running, name: str, words: str) -> None:
     refused = web.post("/api/uploads", {"file_name": name, "size": 10}, 422)
     assert (refused["kind"], words in refused["message"], bool(refused["hint"])) == ("capture", True, True)
     assert web.get("/api/uploads") == []
 
 
-def test_an_upload_is_its_senders_alone(start: Callable[..., Any]) -> None:
+def test_an_upload_is_visible_to_its_sender_only(start: Callable[..., Any]) -> None:
     with start() as web:
         accounts.add(web.context.engine, "eve", "reviewer", "three plain words")
         upload = begin(web)
@@ -131,7 +129,7 @@ def test_an_upload_is_its_senders_alone(start: Callable[..., Any]) -> None:
         assert web.client.head(f"/api/uploads/{upload}").status_code == 404
 
 
-def test_what_is_done_to_an_upload_is_not_undone_by_another_request_and_every_server_minds_its_own() -> None:
+def test_conflicting_requests_for_one_upload_are_refused() -> None:
     mine, others = AtWork(), AtWork()
     for first, second, waits in (
         ("sent", "sent", True),
@@ -149,7 +147,7 @@ def test_what_is_done_to_an_upload_is_not_undone_by_another_request_and_every_se
         pass  # no files are left
 
 
-def test_uploads_that_nobody_goes_on_with_are_forgotten(web: Running) -> None:
+def test_abandoned_uploads_are_deleted(web: Running) -> None:
     old, new = begin(web), begin(web)
     os.utime(web.settings.uploads / f"{old}.part", (1, 1))
     uploads.forget_stopped(web.context)
@@ -157,9 +155,7 @@ def test_uploads_that_nobody_goes_on_with_are_forgotten(web: Running) -> None:
     assert [path.name for path in Path(web.settings.uploads).iterdir()] == [f"{new}.part"]
 
 
-def test_what_no_row_knows_is_set_aside_and_only_what_is_marked_half_made_goes(
-    web: Running, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_files_without_a_row_are_set_aside_and_half_made_ones_deleted(web: Running, caplog: pytest.LogCaptureFixture) -> None:
     upload, project, finishing = begin(web), web.sample(), interrupted(web)
     data, projects = web.settings.data_dir, web.settings.data_dir / "projects"
     recording = projects / "0123456789ab" / "source" / "scan.r3d"
@@ -182,7 +178,7 @@ def test_what_no_row_knows_is_set_aside_and_only_what_is_marked_half_made_goes(
     assert web.client.get(f"/media/{project}/frames/3.jpg").status_code == 200
 
 
-def test_an_upload_of_a_restored_database_takes_no_project_with_it(web: Running) -> None:
+def test_deleting_an_upload_of_a_restored_database_keeps_the_project(web: Running) -> None:
     upload = interrupted(web)
     finish(web, upload)
     with writing(web.context.engine) as session:  # the state before finishing
@@ -204,13 +200,13 @@ def interrupted(web: Running, content: bytes = R3D) -> str:
     return upload
 
 
-def test_a_crash_while_finishing_is_made_good_by_finishing_again(web: Running) -> None:
+def test_finishing_an_upload_again_recovers_from_a_crash(web: Running) -> None:
     upload = interrupted(web)
     assert int(web.client.head(f"/api/uploads/{upload}").headers["upload-offset"]) == len(R3D)
     assert finish(web, upload)["id"] == upload
 
 
-def test_what_is_refused_or_given_up_after_such_a_crash_leaves_nothing_either(web: Running) -> None:
+def test_an_upload_refused_or_deleted_after_a_crash_leaves_nothing(web: Running) -> None:
     finish(web, interrupted(web, archive(("unreadable", b"x"))), 422)
     assert left_behind(web) == []
     assert web.client.delete(f"/api/uploads/{interrupted(web)}").status_code == 204
@@ -225,7 +221,7 @@ def test_what_is_refused_or_given_up_after_such_a_crash_leaves_nothing_either(we
     assert finish(web, upload, 404)["kind"] == "not-found"
 
 
-def test_an_upload_whose_bytes_somebody_deleted_starts_anew(web: Running) -> None:
+def test_an_upload_whose_file_was_deleted_restarts_at_zero(web: Running) -> None:
     upload = begin(web)
     send(web.client, upload, 0, R3D[:50])
     (web.settings.uploads / f"{upload}.part").unlink()

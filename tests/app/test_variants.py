@@ -23,7 +23,7 @@ def make(web: Running, project: str, status: int = 202, **wish: Any) -> Any:
     return web.post(f"/api/projects/{project}/variants", {"version": 1, "count": 2, "seed": 5} | wish, status)
 
 
-def test_they_are_made_by_a_job_of_their_own_and_kept_beside_the_bundle(web: Running, project: str) -> None:
+def test_variants_are_made_by_a_separate_job_and_can_be_downloaded(web: Running, project: str) -> None:
     assert web.get(f"/api/projects/{project}/variants")["sets"] == []
     job = web.job(make(web, project)["id"], "done")
     assert (job["kind"], [stage["name"] for stage in job["stages"]]) == ("vary", ["vary"])
@@ -33,14 +33,14 @@ def test_they_are_made_by_a_job_of_their_own_and_kept_beside_the_bundle(web: Run
     assert web.get(f"/api/projects/{project}")["result"] == "current"  # people's inputs are unchanged
 
 
-def test_the_same_are_not_made_again_and_another_seed_gives_others(web: Running, project: str) -> None:
+def test_existing_variants_are_a_conflict_and_another_seed_adds_a_set(web: Running, project: str) -> None:
     web.job(make(web, project)["id"], "done")
     assert make(web, project, 409)["hint"] == "download them, or give another seed"
     web.job(make(web, project, seed=6)["id"], "done")
     assert [made["seed"] for made in web.get(f"/api/projects/{project}/variants")["sets"]] == [6, 5]
 
 
-def test_what_is_asked_for_twice_is_one_job_and_can_be_stopped_and_tried_again(web: Running, project: str) -> None:
+def test_a_repeated_variants_request_is_one_cancellable_retryable_job(web: Running, project: str) -> None:
     held = behave(web, project, vary="hang")
     job = make(web, project)["id"]
     assert make(web, project)["id"] == job
@@ -56,7 +56,7 @@ def test_what_is_asked_for_twice_is_one_job_and_can_be_stopped_and_tried_again(w
     assert len(web.get(f"/api/projects/{project}/variants")["sets"]) == 1
 
 
-def test_what_was_made_is_deleted_and_nothing_else_can_be(web: Running, project: str) -> None:
+def test_variants_are_deleted_and_other_folders_cannot_be(web: Running, project: str) -> None:
     web.job(make(web, project)["id"], "done")
     (made,) = web.get(f"/api/projects/{project}/variants")["sets"]
     assert web.delete(f"/api/projects/{project}/variants/{made['name']}")["sets"] == []
@@ -68,7 +68,7 @@ def test_what_was_made_is_deleted_and_nothing_else_can_be(web: Running, project:
     assert len(web.get(f"/api/projects/{project}/bundles")) == 1
 
 
-def test_how_many_are_bounded_and_there_must_be_a_bundle(web: Running, project: str) -> None:
+def test_the_number_of_variants_is_bounded_and_a_bundle_is_required(web: Running, project: str) -> None:
     assert web.get(f"/api/projects/{project}/variants")["offer"]["most"] == MOST_VARIANTS
     for wish in ({"count": MOST_VARIANTS + 1}, {"count": 0}, {"seed": -1}):
         make(web, project, 422, **wish)
@@ -76,7 +76,7 @@ def test_how_many_are_bounded_and_there_must_be_a_bundle(web: Running, project: 
     assert web.get(f"/api/projects/{web.sample()}/variants") == {"offer": None, "sets": []}
 
 
-def test_none_are_begun_for_which_there_is_no_room(web: Running, project: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_variants_are_refused_without_enough_disk_space(web: Running, project: str, monkeypatch: pytest.MonkeyPatch) -> None:
     usage = namedtuple("usage", "total used free")
     needed = web.get(f"/api/projects/{project}/variants")["offer"]
     monkeypatch.setattr(files.shutil, "disk_usage", lambda _: usage(10**9, 0, needed["zip_bytes"] + needed["disk_bytes"] - 1))
@@ -88,7 +88,7 @@ def test_none_are_begun_for_which_there_is_no_room(web: Running, project: str, m
     make(web, project, 404)
 
 
-def test_a_copy_of_the_project_has_them_too(web: Running, project: str) -> None:
+def test_a_duplicated_project_has_the_variants(web: Running, project: str) -> None:
     web.job(make(web, project)["id"], "done")
     copy = web.post(f"/api/projects/{project}/duplicate", status=201)["id"]
     (made,) = web.get(f"/api/projects/{copy}/variants")["sets"]

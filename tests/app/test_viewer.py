@@ -32,7 +32,7 @@ def seen(tmp_path: Path) -> Iterator[Running]:
         yield web
 
 
-def test_the_page_comes_through_with_what_it_needs_to_live_in_a_frame(seen: Running) -> None:
+def test_the_viewer_page_is_proxied_with_headers_for_embedding(seen: Running) -> None:
     session = seen.post(f"/api/projects/{seen.sample()}/viewer")
     assert session["state"] == "ready"
     page = seen.client.get(session["url"])
@@ -44,7 +44,7 @@ def test_the_page_comes_through_with_what_it_needs_to_live_in_a_frame(seen: Runn
     assert page.headers["x-content-type-options"] == "nosniff"
 
 
-def test_messages_go_both_ways_under_the_clients_own_protocol(seen: Running) -> None:
+def test_websocket_messages_are_proxied_both_ways_with_the_subprotocol(seen: Running) -> None:
     url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"].rstrip("/")
     with seen.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN}) as socket:
         assert socket.accepted_subprotocol == PROTOCOL
@@ -54,7 +54,7 @@ def test_messages_go_both_ways_under_the_clients_own_protocol(seen: Running) -> 
         assert socket.receive_text() == "hello"
 
 
-def test_the_connections_of_a_person_to_3d_views_are_bounded(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_3d_view_connections_of_a_person_is_limited(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.viewer.client.MOST_CONNECTIONS", 2)
     url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"].rstrip("/")
 
@@ -80,7 +80,7 @@ def test_signing_out_closes_the_3d_view(seen: Running) -> None:
     assert closed.value.code == 4401
 
 
-def test_a_token_serves_the_session_it_was_made_for_only(seen: Running) -> None:
+def test_a_viewer_token_is_valid_for_its_own_session_only(seen: Running) -> None:
     url = seen.post(f"/api/projects/{seen.sample()}/viewer")["url"]
     other = TestClient(seen.app, base_url=ORIGIN, headers={"X-Requested-With": "t"})
     other.get(seen.printed())
@@ -92,12 +92,12 @@ def test_a_token_serves_the_session_it_was_made_for_only(seen: Running) -> None:
     assert seen.client.get("/viewer/madeup/").status_code == 403
 
 
-def test_the_same_session_gets_the_same_token(seen: Running) -> None:
+def test_the_same_session_receives_the_same_viewer_token(seen: Running) -> None:
     project = seen.sample()
     assert seen.post(f"/api/projects/{project}/viewer")["url"] == seen.post(f"/api/projects/{project}/viewer")["url"]
 
 
-def test_a_viewer_that_died_is_said_and_started_anew(seen: Running) -> None:
+def test_a_crashed_viewer_is_reported_and_restarted(seen: Running) -> None:
     project = seen.sample()
     url = seen.post(f"/api/projects/{project}/viewer")["url"]
     seen.post(f"/api/projects/{project}/viewer/show", {"mode": "cloud", "opacity": 0.123}, 503)  # kills the stand-in
@@ -105,7 +105,7 @@ def test_a_viewer_that_died_is_said_and_started_anew(seen: Running) -> None:
     assert seen.post(f"/api/projects/{project}/viewer")["url"] == url
 
 
-def test_without_a_viewer_there_is_a_picture_and_a_mesh(start: Callable[..., Any], tmp_path: Path) -> None:
+def test_a_failed_viewer_offers_a_fallback_page_and_image(start: Callable[..., Any], tmp_path: Path) -> None:
     broken = Viewer(Settings(data_dir=tmp_path / "data", **PATIENT), (sys.executable, "-c", "raise SystemExit(3)"))
     with start(viewer=broken) as web:
         project = web.sample()
@@ -117,7 +117,7 @@ def test_without_a_viewer_there_is_a_picture_and_a_mesh(start: Callable[..., Any
         assert web.client.get(session["fallback_image"]).status_code == 200
 
 
-def test_a_view_nobody_looks_at_is_closed_and_opens_again(tmp_path: Path) -> None:
+def test_an_idle_view_is_closed_and_reopens_on_request(tmp_path: Path) -> None:
     viewer = Viewer(Settings(data_dir=tmp_path / "data", **PATIENT, viewer_idle_s=0.0), fake("viewer"))
     with running(tmp_path / "data", viewer=viewer) as web:
         project = web.sample()
@@ -134,7 +134,7 @@ def test_a_view_nobody_looks_at_is_closed_and_opens_again(tmp_path: Path) -> Non
         assert web.post(f"/api/projects/{project}/viewer")["url"] == url
 
 
-def test_a_view_closed_between_finding_and_asking_it_is_opened_again(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_view_closed_before_a_request_reaches_it_is_reopened(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     project, viewer = seen.sample(), seen.context.viewer
     show = f"/api/projects/{project}/viewer/show"
     seen.post(show, {"mode": "cloud"})
@@ -156,7 +156,7 @@ def test_a_view_closed_between_finding_and_asking_it_is_opened_again(seen: Runni
     assert (refused["kind"], "closed meanwhile" in refused["message"]) == ("unavailable", True)
 
 
-def test_what_is_asked_of_the_viewer_reaches_it(seen: Running) -> None:
+def test_viewer_commands_are_validated_and_forwarded(seen: Running) -> None:
     project = seen.sample()
     seen.post(f"/api/projects/{project}/viewer")
     shown = seen.post(f"/api/projects/{project}/viewer/show", {"mode": "cloud"})
@@ -168,7 +168,7 @@ def test_what_is_asked_of_the_viewer_reaches_it(seen: Running) -> None:
     assert seen.post(f"/api/projects/{project}/viewer/show", {"mode": "dance"}, 422)["kind"] == "invalid"
 
 
-def test_what_one_person_shows_another_does_not_see(seen: Running) -> None:
+def test_each_session_has_its_own_view(seen: Running) -> None:
     project = seen.sample()
     other = TestClient(seen.app, base_url=ORIGIN, headers={"X-Requested-With": "t"})
     other.get(seen.printed())
@@ -180,7 +180,7 @@ def test_what_one_person_shows_another_does_not_see(seen: Running) -> None:
     assert seen.post(show, {"mode": "cloud"})["text"] == "shown 2 times"
 
 
-def test_a_view_started_anew_shows_what_it_showed(seen: Running) -> None:
+def test_a_restarted_view_shows_its_last_content(seen: Running) -> None:
     project = seen.sample()
     show = f"/api/projects/{project}/viewer/show"
     seen.post(show, {"mode": "cloud"})
@@ -190,7 +190,7 @@ def test_a_view_started_anew_shows_what_it_showed(seen: Running) -> None:
     assert seen.post(show, {"mode": "cloud"})["text"] == "shown 2 times"  # the first one repeated the last view
 
 
-def test_the_view_used_least_makes_room(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_least_recently_used_view_is_evicted(seen: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.viewer.client.MOST_VIEWS", 2)
     viewer, folder = seen.context.viewer, seen.settings.data_dir
     tokens = [viewer.open("p", folder, session) for session in ("a", "b")]
@@ -201,11 +201,11 @@ def test_the_view_used_least_makes_room(seen: Running, monkeypatch: pytest.Monke
             viewer.open("p", folder, "d")
 
 
-def test_the_installed_viser_keeps_the_contract() -> None:
+def test_the_installed_viser_fulfils_the_contract() -> None:
     assert contract.check() == []
 
 
-def test_the_raw_port_takes_only_those_who_know_the_key() -> None:
+def test_the_raw_viewer_port_requires_the_key() -> None:
     server = contract.open_server("the-key")
     try:
         port = server.get_port()
@@ -230,7 +230,7 @@ def _status(port: int, headers: dict[str, str]) -> int:
         connection.close()
 
 
-def test_the_real_viewer_shows_the_scan_a_candidate_the_placement_and_a_scene_that_moves(web: Running) -> None:
+def test_the_real_viewer_shows_cloud_candidate_placement_and_scene(web: Running) -> None:
     project = web.sample()
     web.job(run(web, project), "done")
     finish(web.settings.data_dir / "projects" / project / "work")

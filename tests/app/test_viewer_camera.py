@@ -33,7 +33,7 @@ def after(view: View, **wish: Any) -> Any:
     return camera.position
 
 
-def test_the_camera_stays_where_it_is_while_the_same_thing_is_shown_otherwise(view: View) -> None:
+def test_the_camera_is_kept_when_only_the_appearance_changes(view: View) -> None:
     aligned = {"mode": "aligned", "name": "drawer_1"}
     assert after(view, **aligned) != MOVED
     assert after(view, **aligned, opacity=0.3) == MOVED
@@ -43,21 +43,21 @@ def test_the_camera_stays_where_it_is_while_the_same_thing_is_shown_otherwise(vi
     assert after(view, mode="candidate", name="drawer_1", candidate="c1") != MOVED
 
 
-def test_the_camera_is_turned_where_it_is_asked_to_look(view: View) -> None:
+def test_the_camera_moves_when_a_look_direction_is_requested(view: View) -> None:
     cloud = {"mode": "cloud"}
     after(view, **cloud)
     assert after(view, **cloud) == MOVED
     assert after(view, **cloud, look="scene") != MOVED
 
 
-def test_the_first_view_is_of_the_whole_scene_not_of_the_object_that_happens_to_be_chosen(view: View) -> None:
+def test_the_first_view_shows_the_whole_scene_despite_a_selected_object(view: View) -> None:
     chosen = {"mode": "cloud", "name": "drawer_1", "focus": [50.0, 0.0, 0.0]}
     first = after(view, **chosen)
     assert after(view, **chosen, look="object") != first
     assert after(view, **chosen, look="scene") == first
 
 
-def test_it_stands_where_a_photo_was_taken_or_where_a_comment_was_made(view: View) -> None:
+def test_the_camera_takes_the_pose_of_a_photo_or_a_comment(view: View) -> None:
     assert after(view, mode="cloud", look="photo", frame=3) == (0.0, 0.0, 0.0)  # as in the recording
     camera = view.server.get_clients()[0].camera
     assert camera.look_at == (0.0, 0.0, 2.0)
@@ -71,7 +71,7 @@ def test_it_stands_where_a_photo_was_taken_or_where_a_comment_was_made(view: Vie
         after(view, mode="cloud", look="photo", frame=99)
 
 
-def test_a_page_that_opened_while_the_camera_was_turned_is_turned_too(view: View) -> None:
+def test_a_page_that_connects_late_gets_the_current_camera(view: View) -> None:
     """viser moves the cameras of pages that have told theirs; one still drawing its first view keeps where it began."""
     server: Any = view.server
     server.initial_camera = SimpleNamespace(position=(3.0, 3.0, 3.0), look_at=(0.0, 0.0, 0.0), fov=USUAL_FOV, near=0.01)

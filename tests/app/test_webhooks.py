@@ -65,7 +65,9 @@ def run_of(web: Running, project: str) -> Any:
     return web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "done", "failed")
 
 
-def test_a_run_and_a_state_are_told_signed(start: Callable[..., Any], listener: tuple[str, type[Listening]]) -> None:
+def test_finished_runs_and_state_changes_are_posted_with_a_signature(
+    start: Callable[..., Any], listener: tuple[str, type[Listening]]
+) -> None:
     url, handler = listener
     with start(webhooks_to=HERE) as web:
         project = web.sample()
@@ -89,7 +91,7 @@ def test_a_run_and_a_state_are_told_signed(start: Callable[..., Any], listener: 
         assert web.get("/api/webhooks") == []
 
 
-def test_what_fails_is_tried_again_after_a_restart(
+def test_a_failed_delivery_is_retried_after_a_restart(
     start: Callable[..., Any], listener: tuple[str, type[Listening]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     url, handler = listener
@@ -111,7 +113,9 @@ def test_what_fails_is_tried_again_after_a_restart(
         assert [content for _, content in handler.heard] == [handler.heard[0][1]] * 2
 
 
-def test_a_test_is_posted_once_whatever_is_answered(start: Callable[..., Any], listener: tuple[str, type[Listening]]) -> None:
+def test_a_test_delivery_is_posted_once_for_any_response(
+    start: Callable[..., Any], listener: tuple[str, type[Listening]]
+) -> None:
     url, handler = listener
     handler.statuses = [500, 204]
     with start(webhooks_to=HERE) as web:
@@ -125,13 +129,13 @@ def test_a_test_is_posted_once_whatever_is_answered(start: Callable[..., Any], l
         assert web.client.post("/api/webhooks/99/test").status_code == 404
 
 
-def test_tries_come_less_often_and_end() -> None:
+def test_retry_pauses_grow_and_end_after_about_two_days() -> None:
     pauses = [sender.pause_s(attempt) for attempt in range(1, sender.TRIES)]
     assert pauses == sorted(pauses)
     assert 36 * 3600 < sum(pauses) < 60 * 3600
 
 
-def test_what_is_undone_is_not_told(start: Callable[..., Any]) -> None:
+def test_a_rolled_back_change_creates_no_delivery(start: Callable[..., Any]) -> None:
     with start() as web:
         project = web.sample()
         web.post("/api/webhooks", {"url": "https://lab.example/"}, 201)
@@ -156,7 +160,7 @@ def test_what_is_undone_is_not_told(start: Callable[..., Any]) -> None:
         "http://2130706433:1/",
     ],
 )
-def test_addresses_inside_are_never_connected_to(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_internal_addresses_are_never_connected_to(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     connected: list[Any] = []
     monkeypatch.setattr(posting.socket, "create_connection", lambda *given, **_: connected.append(given))
     with pytest.raises(Forbidden, match="not a public address"):
@@ -164,7 +168,7 @@ def test_addresses_inside_are_never_connected_to(url: str, monkeypatch: pytest.M
     assert connected == []
 
 
-def test_a_name_is_connected_to_where_it_was_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_host_name_is_resolved_once_against_dns_rebinding(monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[str] = []
 
     def changes(host: str, port: int, **_: Any) -> list[Any]:
@@ -181,14 +185,14 @@ def test_a_name_is_connected_to_where_it_was_judged(monkeypatch: pytest.MonkeyPa
         posting.post("http://rebinding.example/", b"{}", {})
 
 
-def test_a_redirect_is_not_followed(listener: tuple[str, type[Listening]]) -> None:
+def test_a_webhook_redirect_is_not_followed(listener: tuple[str, type[Listening]]) -> None:
     url, handler = listener
     handler.statuses = [307]
     assert posting.post(url, b"{}", {}, posting.networks(HERE)) == 307
     assert len(handler.heard) == 1
 
 
-def test_who_answers_a_byte_at_a_time_has_no_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slow_response_does_not_exceed_the_total_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(posting, "TOTAL_S", 0.3)
 
     def drip(listening: socket.socket) -> None:
@@ -209,11 +213,11 @@ def test_who_answers_a_byte_at_a_time_has_no_more_time(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("url", ["file:///etc/passwd", "ftp://a.example", "https://", "https://a:b@c.example", "http://a b/"])
-def test_what_is_no_address_is_refused(web: Running, url: str) -> None:
+def test_an_invalid_webhook_address_is_refused(web: Running, url: str) -> None:
     assert web.client.post("/api/webhooks", json={"url": url}).status_code == 422
 
 
-def test_owners_have_those_of_their_projects_and_admins_all(tmp_path: Path) -> None:
+def test_webhooks_are_managed_by_project_owners_and_admins(tmp_path: Path) -> None:
     with with_accounts(tmp_path / "data") as web:
         with signed_in(web, "the-annotator") as owner:
             project = owner.post("/api/projects/sample", json={}).json()["id"]
