@@ -14,7 +14,7 @@ from tests.browser.together import Server, post, signed_in
 CORNERS = [[0.6, 2.0, 0.8], [1.1, 2.0, 0.8], [1.1, 2.0, 0.6], [0.6, 2.0, 0.6]]
 
 
-def test_the_ones_like_an_object_are_shown_and_confirmed(new_context: NewContext, server: Server) -> None:
+def test_proposals_similar_to_an_object_are_listed_and_confirmed(new_context: NewContext, server: Server) -> None:
     context = new_context(bypass_csp=True)
     page = signed_in(context, server, "cleo")
     project = sample(page)
@@ -62,7 +62,7 @@ def test_the_ones_like_an_object_are_shown_and_confirmed(new_context: NewContext
     expect(proposals.get_by_role("heading")).to_have_text("Proposals (1)")
 
 
-def test_several_are_numbered_from_left_to_right_and_from_the_top_down(new_context: NewContext, server: Server) -> None:
+def test_selected_objects_are_numbered_left_to_right_and_top_down(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "cleo")
     project = sample(page)

@@ -9,7 +9,7 @@ from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
 
-def test_an_annotator_is_told_that_a_reviewer_decides(new_context: NewContext, server: Server) -> None:
+def test_an_annotator_sees_disabled_review_buttons_and_can_comment(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "cleo")
     project = sample(page)

@@ -10,7 +10,7 @@ from tests.browser.test_together import pick, rows, sample
 from tests.browser.together import Server, post, signed_in
 
 
-def test_objects_are_assigned_and_wait_for_their_person(new_context: NewContext, server: Server) -> None:
+def test_assigned_objects_are_counted_in_the_inbox_of_the_assignee(new_context: NewContext, server: Server) -> None:
     contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     project = sample(ann)

@@ -10,7 +10,7 @@ from tests.browser.together import Server, post, signed_in
 SAME = {"frame": 3, "x": 30.5, "y": 90.5, "label": 1}  # at the same place as the click on drawer_2
 
 
-def test_objects_that_spoil_a_run_are_told_before_it(new_context: NewContext, server: Server) -> None:
+def test_objects_that_would_spoil_a_run_are_listed_before_it(new_context: NewContext, server: Server) -> None:
     page = signed_in(new_context(bypass_csp=True), server, "ann")
     project = sample(page)
     page.goto(f"{project}/annotate?frame=3")

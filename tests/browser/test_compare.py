@@ -19,7 +19,7 @@ SHOWN = """async () => {
 }"""
 
 
-def test_candidates_stand_side_by_side_turn_together_and_say_what_differs(new_context: NewContext, server: Server) -> None:
+def test_compared_candidates_rotate_together_and_report_differences(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)

@@ -11,7 +11,7 @@ from tests.browser.test_together import click_frame, pick, rows, sample
 from tests.browser.together import Server, signed_in
 
 
-def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(new_context: NewContext, server: Server) -> None:
+def test_two_objects_at_the_same_place_are_reported_until_one_is_deleted(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
@@ -38,7 +38,7 @@ def test_a_second_object_on_the_same_thing_is_said_until_it_is_deleted(new_conte
     expect(page.get_by_role("button", name="drawer_2", exact=True)).to_have_attribute("aria-pressed", "true")
 
 
-def test_a_click_that_finds_no_mask_in_its_frame_is_said_until_it_is_removed(new_context: NewContext, server: Server) -> None:
+def test_a_click_without_a_mask_is_reported_until_it_is_removed(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
@@ -59,7 +59,7 @@ def test_a_click_that_finds_no_mask_in_its_frame_is_said_until_it_is_removed(new
     expect(said).to_have_count(0)
 
 
-def test_a_thing_that_is_too_large_is_said_at_the_click_with_what_mends_it(new_context: NewContext, tmp_path: Path) -> None:
+def test_an_object_that_is_too_large_is_reported_with_a_remedy(new_context: NewContext, tmp_path: Path) -> None:
     with Server(tmp_path, live="panels") as server:  # 0.8 m wide and 1.2 m high
         context = new_context()
         page = signed_in(context, server, "ann")
@@ -74,9 +74,7 @@ def test_a_thing_that_is_too_large_is_said_at_the_click_with_what_mends_it(new_c
         expect(said.first).to_contain_text("click off it where its mask is too large")
 
 
-def test_a_size_that_its_category_does_not_have_is_said_at_the_click_with_what_mends_it(
-    new_context: NewContext, tmp_path: Path
-) -> None:
+def test_a_size_implausible_for_its_category_is_reported_with_a_remedy(new_context: NewContext, tmp_path: Path) -> None:
     with Server(tmp_path, live="panels") as server:  # of 0.8 by 1.2 m
         context = new_context()
         page = signed_in(context, server, "ann")

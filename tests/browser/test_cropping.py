@@ -27,7 +27,7 @@ def changed(page: Page) -> AbstractContextManager[object]:
     return page.expect_response(lambda answer: answer.request.method == "PATCH" and answer.ok)
 
 
-def test_a_crop_box_is_dragged_typed_undone_and_taken_away(new_context: NewContext, server: Server) -> None:
+def test_a_crop_box_is_dragged_typed_undone_and_removed(new_context: NewContext, server: Server) -> None:
     context = new_context()
     context.clock.install()
     page = signed_in(context, server, "ann")

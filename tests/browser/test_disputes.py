@@ -37,7 +37,7 @@ def until_drawn(page: Page, *, whole: bool) -> None:
     until(is_drawn, "not drawn")
 
 
-def test_two_names_on_one_panel_show_two_masks(new_context: NewContext, server: Server) -> None:
+def test_two_objects_on_one_panel_have_separate_masks(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)

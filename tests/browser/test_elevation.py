@@ -43,7 +43,7 @@ def stored(page: Page) -> list[dict[str, Any]]:
     return [entry for entry in file["objects"] if "front" in entry]
 
 
-def test_fronts_are_drawn_split_typed_merged_and_taken_back(new_context: NewContext, server: Server) -> None:
+def test_fronts_are_drawn_split_resized_merged_and_undone(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
@@ -108,7 +108,7 @@ def names(page: Page) -> list[str]:
     return fronts(page).locator(".what").all_inner_texts()
 
 
-def test_a_run_is_divided_repeated_numbered_and_taken_back_by_keyboard(new_context: NewContext, server: Server) -> None:
+def test_a_row_of_fronts_is_divided_repeated_numbered_and_undone_by_keyboard(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
@@ -171,7 +171,7 @@ def test_a_run_is_divided_repeated_numbered_and_taken_back_by_keyboard(new_conte
     expect(fronts(page)).to_have_count(2)
 
 
-def test_a_merge_leaves_the_handle_and_what_changes_nothing_is_not_taken_back(new_context: NewContext, server: Server) -> None:
+def test_a_merge_keeps_the_handle_and_undo_skips_changes_without_effect(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
@@ -242,7 +242,7 @@ def test_handle_and_hinge_of_one_front_are_copied_to_the_others(new_context: New
     assert [entry["front"]["hinge"] for entry in stored(page)] == [None, None, "left"]
 
 
-def test_the_header_of_a_project_fits_a_phone(new_context: NewContext, server: Server) -> None:
+def test_the_header_of_a_project_fits_a_phone_screen(new_context: NewContext, server: Server) -> None:
     context = new_context(viewport={"width": 420, "height": 800})
     page = signed_in(context, server, "ann")
     sample(page)

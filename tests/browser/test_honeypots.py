@@ -12,7 +12,7 @@ from tests.browser.test_together import click_frame, ready, rows, sample
 from tests.browser.together import Server, signed_in
 
 
-def test_a_honeypot_is_slipped_in_done_and_scored(new_context: NewContext, server: Server) -> None:
+def test_a_honeypot_is_assigned_annotated_and_scored(new_context: NewContext, server: Server) -> None:
     contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
     ann, cleo = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "cleo"), strict=True))
     project = sample(ann).split("/p/")[1]

@@ -7,7 +7,7 @@ from tests.browser.serving import NewContext, box_of
 from tests.browser.together import Server, signed_in
 
 
-def test_a_refused_path_stays_and_says_what_allows_it(new_context: NewContext, server: Server) -> None:
+def test_a_refused_import_path_stays_with_the_reason_and_the_remedy(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     page.get_by_role("button", name="From this machine…").click()

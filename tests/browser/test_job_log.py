@@ -9,7 +9,7 @@ from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
 
-def test_a_running_and_a_cancelled_job_have_a_log(new_context: NewContext, server: Server) -> None:
+def test_the_log_of_a_running_and_of_a_cancelled_job_is_shown(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)

@@ -36,7 +36,7 @@ def seek(page: Page, frame: int) -> None:
     expect(page.locator("r2c2r-film-strip output")).to_contain_text(f"frame {frame} ")
 
 
-def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Path) -> None:
+def test_a_scan_is_imported_clicked_run_reviewed_and_downloaded(page: Page, address: str, sample: Path, tmp_path: Path) -> None:
     # Projects: the empty state offers the sample
     expect(page.get_by_role("button", name="Open the sample kitchen")).to_be_visible()
     picture(page, "1-projects-empty")
@@ -114,7 +114,7 @@ def test_the_whole_journey(page: Page, address: str, sample: Path, tmp_path: Pat
         assert {"scene.urdf", "scene.xml", "scene.glb", "manifest.json", "report.html"} <= names | set(bundle.namelist())
 
 
-def test_the_sample_is_seen_while_it_is_made_and_opens_with_its_masks(page: Page) -> None:
+def test_the_sample_shows_rendered_frames_and_opens_with_masks(page: Page) -> None:
     small = json.dumps({"seed": 1, "frames": 10, "width": 320, "height": 240})
     page.route("**/api/projects/sample", lambda route: route.continue_(post_data=small))
     page.get_by_role("button", name="Open the sample kitchen").click()
@@ -130,7 +130,7 @@ def test_the_sample_is_seen_while_it_is_made_and_opens_with_its_masks(page: Page
     assert all("frame" in row for row in seen), seen  # without any click or request
 
 
-def test_a_foreign_file_is_refused_in_one_line(page: Page, address: str, tmp_path: Path) -> None:
+def test_a_file_that_is_no_recording_is_refused_with_its_name(page: Page, address: str, tmp_path: Path) -> None:
     page.goto(address)
     bad = tmp_path / "notes.r3d"
     bad.write_bytes(b"these are not the frames you are looking for")
@@ -142,7 +142,7 @@ def test_a_foreign_file_is_refused_in_one_line(page: Page, address: str, tmp_pat
     picture(page, "9-refused")
 
 
-def test_the_help_lists_the_keys_and_dark_mode_is_kept(page: Page, address: str) -> None:
+def test_the_help_opens_by_key_and_dark_mode_survives_a_reload(page: Page, address: str) -> None:
     page.goto(address)
     page.keyboard.press("?")
     expect(page.get_by_role("heading", name="Keyboard and mouse")).to_be_visible()

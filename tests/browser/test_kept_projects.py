@@ -8,7 +8,7 @@ from tests.browser.test_together import say
 from tests.browser.together import Server, post, signed_in
 
 
-def test_nothing_that_is_put_away_is_lost(new_context: NewContext, server: Server) -> None:
+def test_tagged_archived_duplicated_and_deleted_projects_are_recoverable(new_context: NewContext, server: Server) -> None:
     context = new_context(bypass_csp=True)
     page = signed_in(context, server, "ann")
     for name in ("Cellar", "Attic"):

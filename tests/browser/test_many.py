@@ -10,7 +10,7 @@ from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, post, signed_in
 
 
-def test_many_objects_are_searched_and_new_object_stays_in_sight(new_context: NewContext, server: Server) -> None:
+def test_a_long_object_list_is_searchable_and_new_object_stays_visible(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
@@ -31,7 +31,7 @@ def test_many_objects_are_searched_and_new_object_stays_in_sight(new_context: Ne
     expect(rows(page)).to_have_count(16)
 
 
-def test_sixty_objects_are_grouped_locked_and_changed_together(new_context: NewContext, server: Server) -> None:
+def test_sixty_objects_are_grouped_locked_and_edited_together(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
@@ -86,7 +86,7 @@ def test_sixty_objects_are_grouped_locked_and_changed_together(new_context: NewC
     wait_for_toast(page, "Deleted jar_1")
 
 
-def test_projects_are_searched_and_ordered(new_context: NewContext, server: Server) -> None:
+def test_projects_are_searched_and_sorted(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     for name in ("Cellar", "Attic", "Bath", "Attic two"):

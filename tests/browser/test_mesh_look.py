@@ -20,7 +20,7 @@ def stored(page: Page, server: Server, project: str, number: int) -> str | None:
     return said["candidate"]
 
 
-def test_a_mesh_is_shown_with_its_size_and_repairs_before_it_is_used(new_context: NewContext, server: Server) -> None:
+def test_an_uploaded_mesh_is_previewed_with_size_and_repairs(new_context: NewContext, server: Server) -> None:
     page = signed_in(new_context(bypass_csp=True), server, "ann")
     project = sample(page)
     finish(server.data / "projects" / project.split("/p/")[1] / "work")

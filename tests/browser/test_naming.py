@@ -8,7 +8,7 @@ from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, post, signed_in
 
 
-def test_names_are_joined_and_an_unknown_category_is_said_once(new_context: NewContext, server: Server) -> None:
+def test_names_are_normalised_and_an_unknown_category_is_reported_once(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)

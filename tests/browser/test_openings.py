@@ -8,7 +8,7 @@ from tests.browser.test_together import click_frame, sample
 from tests.browser.together import Server, signed_in
 
 
-def test_the_lane_of_an_opening_says_what_the_front_does_in_the_frame_shown(new_context: NewContext, server: Server) -> None:
+def test_the_opening_lane_shows_the_state_of_the_front_in_the_frame(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)

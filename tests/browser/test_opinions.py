@@ -12,7 +12,7 @@ from tests.browser.test_together import click_frame, ready, rows, sample
 from tests.browser.together import Server, post, signed_in
 
 
-def test_a_second_opinion_is_asked_given_and_compared(new_context: NewContext, server: Server) -> None:
+def test_a_second_opinion_is_requested_given_and_compared(new_context: NewContext, server: Server) -> None:
     contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     project = sample(ann)

@@ -99,7 +99,7 @@ def signed_in(new_context: NewContext, address: str, **looks: Any) -> Page:
 
 
 @pytest.mark.skipif(not AXE.is_file(), reason="npm ci was not run in static/")
-def test_no_page_has_a_serious_finding(new_context: NewContext, finished: tuple[str, str]) -> None:
+def test_no_page_has_a_serious_accessibility_finding(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, project = finished
     base = address.split("/?")[0]
     page = signed_in(new_context, address, bypass_csp=True)
@@ -128,7 +128,7 @@ def test_no_page_has_a_serious_finding(new_context: NewContext, finished: tuple[
     assert found == []
 
 
-def test_what_our_pages_load_first_is_small(new_context: NewContext, finished: tuple[str, str]) -> None:
+def test_the_first_page_load_is_small(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, _ = finished
     page = new_context().new_page()
     sizes: dict[str, int] = {}
@@ -138,9 +138,7 @@ def test_what_our_pages_load_first_is_small(new_context: NewContext, finished: t
     assert 0 < sum(sizes.values()) < FIRST_LOAD_BYTES, sizes
 
 
-def test_lines_for_a_simulator_are_copied_by_keyboard_and_robots_are_seen(
-    new_context: NewContext, finished: tuple[str, str]
-) -> None:
+def test_simulator_code_is_copied_by_keyboard_and_grasps_are_shown(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, project = finished
     page = signed_in(new_context, address, permissions=["clipboard-read", "clipboard-write"])
     page.goto(f"{address.split('/?')[0]}/p/{project}/download")
@@ -165,7 +163,7 @@ def test_lines_for_a_simulator_are_copied_by_keyboard_and_robots_are_seen(
         page.wait_for_function("image => image.naturalWidth > 0", arg=picture.element_handle())
 
 
-def test_a_button_held_down_while_its_list_changes_is_still_clicked(new_context: NewContext, finished: tuple[str, str]) -> None:
+def test_a_button_pressed_while_its_list_rerenders_is_still_clicked(new_context: NewContext, finished: tuple[str, str]) -> None:
     page = signed_in(new_context, finished[0])
     page.evaluate("""import("/static/js/dom.js").then(({ h, renew }) => {
         const list = h("div"), button = (text) => h("button", { onclick: () => (window.clicked = text) }, text);
@@ -195,9 +193,7 @@ def test_an_error_stays_until_another_page_is_opened(new_context: NewContext, fi
         expect(error).to_have_count(0)
 
 
-def test_a_change_made_without_a_connection_is_stored_when_it_is_back(
-    changed: tuple[str, str], new_context: NewContext
-) -> None:
+def test_an_offline_change_is_stored_after_reconnecting(changed: tuple[str, str], new_context: NewContext) -> None:
     address, project = changed
     page = signed_in(new_context, address)
     page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
@@ -211,7 +207,7 @@ def test_a_change_made_without_a_connection_is_stored_when_it_is_back(
     expect(page.locator(".banner")).to_be_hidden()
 
 
-def test_a_second_tab_leaves_what_waits_to_the_first_until_that_is_gone(
+def test_a_second_tab_sends_queued_changes_only_after_the_first_closes(
     changed: tuple[str, str], new_context: NewContext
 ) -> None:
     address, project = changed
@@ -234,7 +230,7 @@ def test_a_second_tab_leaves_what_waits_to_the_first_until_that_is_gone(
     assert len(sent) == 1
 
 
-def test_who_is_at_a_list_by_keyboard_stays_there(new_context: NewContext, finished: tuple[str, str]) -> None:
+def test_keyboard_focus_in_a_list_is_kept_after_a_change(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, project = finished
     page = signed_in(new_context, address)
     page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
@@ -245,7 +241,7 @@ def test_who_is_at_a_list_by_keyboard_stays_there(new_context: NewContext, finis
         expect(button).to_be_focused()
 
 
-def test_a_control_reached_by_keyboard_is_used_by_it(new_context: NewContext, finished: tuple[str, str]) -> None:
+def test_keys_operate_the_focused_control_instead_of_shortcuts(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, project = finished
     page = signed_in(new_context, address)
     page.goto(f"{address.split('/?')[0]}/p/{project}/annotate?frame=3")

@@ -18,7 +18,7 @@ def said(page: Page) -> list[dict[str, Any]]:
     return frames
 
 
-def test_a_mask_is_painted_kept_and_said_not_to_be_there(new_context: NewContext, server: Server) -> None:
+def test_a_mask_is_painted_confirmed_and_marked_absent(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
@@ -49,7 +49,7 @@ def test_a_mask_is_painted_kept_and_said_not_to_be_there(new_context: NewContext
     assert said(page) == [painted]
 
 
-def test_eraser_lasso_polygon_and_keep_each_set_the_frame_right(new_context: NewContext, server: Server) -> None:
+def test_eraser_lasso_polygon_and_keep_each_correct_the_mask(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)

@@ -23,7 +23,7 @@ def webhooks_here(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("R2C2R_WEBHOOKS_TO", "127.0.0.0/8")
 
 
-def test_who_is_added_may_work_and_who_is_removed_is_shown_out(new_context: NewContext, server: Server) -> None:
+def test_an_added_account_signs_in_and_a_removed_one_is_signed_out(new_context: NewContext, server: Server) -> None:
     contexts = [new_context() for _ in range(2)]
     ann = signed_in(contexts[0], server, "ann")
     ann.get_by_role("link", name="People").click()
@@ -59,7 +59,7 @@ def test_who_is_added_may_work_and_who_is_removed_is_shown_out(new_context: NewC
     expect(carl.get_by_role("button", name="Sign in")).to_be_visible()
 
 
-def test_a_printed_address_that_was_used_says_what_to_do_and_wrong_passwords_are_said(
+def test_used_printed_addresses_and_wrong_passwords_are_explained(
     new_context: NewContext, tmp_path: Path, server: Server
 ) -> None:
     context = new_context()
@@ -86,7 +86,7 @@ def test_a_printed_address_that_was_used_says_what_to_do_and_wrong_passwords_are
     expect(page.get_by_role("button", name="Sign in")).to_be_enabled()
 
 
-def test_webhooks_are_added_tried_and_removed_by_keyboard(new_context: NewContext, server: Server) -> None:
+def test_webhooks_are_added_tested_and_removed_by_keyboard(new_context: NewContext, server: Server) -> None:
     heard: list[str] = []
 
     class Listening(BaseHTTPRequestHandler):
@@ -139,7 +139,7 @@ def test_webhooks_are_added_tried_and_removed_by_keyboard(new_context: NewContex
         listening.shutdown()
 
 
-def test_a_project_is_kept_to_the_people_its_owner_names(new_context: NewContext, server: Server) -> None:
+def test_a_project_is_restricted_to_members_chosen_by_its_owner(new_context: NewContext, server: Server) -> None:
     contexts = [new_context() for _ in range(2)]
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     ann.get_by_role("button", name="Sample kitchen", exact=True).click()
@@ -186,7 +186,7 @@ def test_a_project_is_kept_to_the_people_its_owner_names(new_context: NewContext
     expect(card).to_have_count(1)
 
 
-def test_an_admin_leaves_or_adopts_what_was_set_aside(new_context: NewContext, server: Server) -> None:
+def test_an_admin_leaves_or_adopts_a_folder_set_aside(new_context: NewContext, server: Server) -> None:
     context = new_context()
     ann = signed_in(context, server, "ann")
     ann.get_by_role("button", name="Sample kitchen", exact=True).click()

@@ -13,7 +13,7 @@ from tests.browser.test_together import pick, ready, sample, say, viewed
 from tests.browser.together import Server, signed_in
 
 
-def test_the_object_fills_the_picture_and_its_comments_are_pins(new_context: NewContext, server: Server) -> None:
+def test_the_object_is_zoomed_to_fit_and_its_comments_are_pins(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
@@ -48,7 +48,7 @@ def test_the_object_fills_the_picture_and_its_comments_are_pins(new_context: New
     picture(page, "photo-check")
 
 
-def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(new_context: NewContext, server: Server) -> None:
+def test_marking_a_leaf_open_or_closed_updates_its_overlay_at_once(new_context: NewContext, server: Server) -> None:
     context = new_context(bypass_csp=True)
     page = signed_in(context, server, "ann")
     project = sample(page)
@@ -118,7 +118,7 @@ def test_a_leaf_is_marked_closed_or_open_over_its_photo_and_follows_at_once(new_
     expect(page.locator(".opening .state")).to_have_text("closed, set by a person")
 
 
-def test_who_annotates_sees_marks_and_makes_none(new_context: NewContext, server: Server) -> None:
+def test_an_annotator_sees_opening_marks_but_cannot_make_any(new_context: NewContext, server: Server) -> None:
     context = new_context()
     ann = signed_in(context, server, "ann")
     project = sample(ann)

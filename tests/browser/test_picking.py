@@ -26,9 +26,7 @@ def pixels(canvas: Locator) -> int:
     return seen[-1]
 
 
-def test_a_click_on_a_mask_chooses_its_object_and_a_second_one_there_is_asked_for(
-    new_context: NewContext, server: Server
-) -> None:
+def test_a_click_on_a_mask_selects_its_object_instead_of_adding_one(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)
@@ -55,7 +53,7 @@ def test_a_click_on_a_mask_chooses_its_object_and_a_second_one_there_is_asked_fo
     expect(rows(page)).to_have_count(4)
 
 
-def test_space_held_moves_the_picture_and_tapped_plays(new_context: NewContext, server: Server) -> None:
+def test_dragging_with_space_pans_and_tapping_space_plays(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     sample(page)

@@ -11,7 +11,7 @@ from tests.browser.test_together import pick, ready, sample
 from tests.browser.together import Server, signed_in
 
 
-def test_stages_models_and_roles_are_told_in_plain_words(new_context: NewContext, server: Server) -> None:
+def test_stages_models_and_roles_have_plain_names(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)

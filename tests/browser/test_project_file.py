@@ -27,7 +27,7 @@ def downloaded(page: Page, to: Path) -> bytes:
     return (to / "Kitchen.r2c2r.zip").read_bytes()
 
 
-def test_a_project_goes_to_another_person_as_one_file(new_context: NewContext, server: Server, tmp_path: Path) -> None:
+def test_a_project_is_exported_and_imported_as_one_file(new_context: NewContext, server: Server, tmp_path: Path) -> None:
     context = new_context(bypass_csp=True)
     page = signed_in(context, server, "ann")
     project = import_file(page, "Kitchen.r3d", R3D)

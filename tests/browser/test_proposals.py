@@ -10,9 +10,7 @@ from tests.browser.test_together import click_frame, rows, sample
 from tests.browser.together import Server, signed_in
 
 
-def test_a_key_confirms_the_next_proposal_undo_takes_it_back_and_another_dismisses(
-    new_context: NewContext, server: Server
-) -> None:
+def test_proposals_are_confirmed_undone_and_dismissed_by_key(new_context: NewContext, server: Server) -> None:
     page = signed_in(new_context(), server, "ann")
     page.goto(f"{sample(page)}/annotate")
     proposals = page.get_by_label("Proposals", exact=True)
@@ -58,7 +56,7 @@ def test_a_key_confirms_the_next_proposal_undo_takes_it_back_and_another_dismiss
     picture(page, "15-all-confirmed")
 
 
-def test_what_is_doubted_is_not_confirmed_with_the_others(new_context: NewContext, server: Server) -> None:
+def test_confirming_all_skips_doubtful_proposals(new_context: NewContext, server: Server) -> None:
     page = signed_in(new_context(viewport={"width": 1280, "height": 1000}), server, "ann")
     page.goto(f"{sample(page)}/annotate?frame=3")
     proposals = page.get_by_label("Proposals", exact=True)

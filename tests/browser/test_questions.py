@@ -29,7 +29,7 @@ def corners(page: Page) -> Any:
     return front["front"]["corners_m"]
 
 
-def test_a_key_says_whether_there_is_a_seam_at_an_edge_that_hardly_shows(new_context: NewContext, server: Server) -> None:
+def test_questions_about_faint_edges_are_answered_by_key(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     clicked_cabinet(page)

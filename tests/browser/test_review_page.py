@@ -33,7 +33,7 @@ def shot_when(page: Page, shows: Callable[[np.ndarray], bool]) -> np.ndarray:
     return seen[-1]
 
 
-def test_the_page_draws_the_scene_and_opens_a_door_without_a_server(new_context: NewContext, tmp_path: Path) -> None:
+def test_review_html_renders_the_scene_and_moves_joints_without_a_server(new_context: NewContext, tmp_path: Path) -> None:
     file = tmp_path / "review.html"
     file.write_text(review_html(plan_bundle(kitchen()), certificate(), np.array([0.0, -3.0, 1.5])), encoding="utf-8")
     page = new_context(viewport={"width": 900, "height": 600}).new_page()

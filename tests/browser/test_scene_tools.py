@@ -86,7 +86,7 @@ def from_front(page: Page, name: str) -> tuple[float, float]:
     return frame["x"] + frame["width"] / 2 + float(across), frame["y"] + frame["height"] / 2 + float(down)
 
 
-def test_a_click_in_the_scene_chooses_and_the_scene_stays(new_context: NewContext, server: Server) -> None:
+def test_a_click_in_the_scene_selects_an_object_and_keeps_the_scene(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     finished(page, server)
@@ -120,9 +120,7 @@ def clicked(page: Page, name: str) -> Any:
     return chosen
 
 
-def test_what_geometry_can_show_is_shown_before_the_run_and_older_results_are_marked_stale(
-    new_context: NewContext, server: Server
-) -> None:
+def test_a_hinge_correction_is_previewed_and_marks_results_stale(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = finished(page, server)
@@ -139,7 +137,7 @@ def test_what_geometry_can_show_is_shown_before_the_run_and_older_results_are_ma
     assert Path(server.data / "projects" / project.split("/p/")[1] / "work" / "bundle.zip").is_file()  # nothing was recomputed
 
 
-def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(new_context: NewContext, server: Server) -> None:
+def test_an_unclicked_worktop_is_resized_left_out_and_brought_back(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = finished(page, server)
@@ -164,9 +162,7 @@ def test_what_nobody_clicked_is_listed_sized_and_left_out_and_comes_back(new_con
     expect(page.get_by_role("button", name="Delete counter_1")).to_be_visible()
 
 
-def test_how_it_opens_is_changed_in_review_and_holds_for_all_of_a_category_of_ones_own(
-    new_context: NewContext, server: Server
-) -> None:
+def test_a_hinge_is_copied_and_kind_and_custom_category_are_set_in_review(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = finished(page, server)
@@ -208,9 +204,7 @@ def test_how_it_opens_is_changed_in_review_and_holds_for_all_of_a_category_of_on
     assert (copied["hinge"], copied["built_as"], copied["dimensions_m"]) == ("right", None, None)
 
 
-def test_a_section_looks_inside_colours_say_what_was_seen_and_a_comment_keeps_the_view(
-    new_context: NewContext, server: Server
-) -> None:
+def test_sections_heat_maps_and_comment_views_work_in_the_scene(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     finished(page, server)
@@ -246,7 +240,7 @@ def test_a_section_looks_inside_colours_say_what_was_seen_and_a_comment_keeps_th
     expect(section).to_be_hidden()
 
 
-def test_a_tape_in_the_room_is_held_against_the_scan_and_rescales_it(new_context: NewContext, server: Server) -> None:
+def test_a_tape_measurement_reports_the_scan_error_and_rescales_it(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = finished(page, server)

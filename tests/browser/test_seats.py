@@ -7,7 +7,7 @@ from tests.browser.serving import NewContext
 from tests.browser.together import Server, signed_in
 
 
-def test_a_seat_that_helps_another_names_its_objects(new_context: NewContext, server: Server) -> None:
+def test_the_seat_list_names_the_objects_of_a_helping_seat(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     job = {"id": 7, "project_id": "p", "project_name": "Kitchen A", "kind": "run", "stage": "generate", "progress": 0.4}

@@ -11,7 +11,7 @@ ZOOMED = {"width": 640, "height": 360}  # 1280 × 720 at 200 %
 PHONE = {"width": 390, "height": 844}
 
 
-def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(new_context: NewContext, server: Server) -> None:
+def test_the_frame_keeps_its_size_at_200_percent_zoom_and_on_a_phone(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
@@ -33,7 +33,7 @@ def test_zoomed_to_200_percent_and_on_a_phone_the_frame_keeps_its_size(new_conte
         picture(page, name)
 
 
-def test_one_key_skips_to_the_picture(new_context: NewContext, server: Server) -> None:
+def test_the_skip_link_moves_the_focus_to_the_picture(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
@@ -50,7 +50,7 @@ def test_one_key_skips_to_the_picture(new_context: NewContext, server: Server) -
     expect(skip).to_have_count(0)  # there is no picture on this page
 
 
-def test_messages_leave_the_lanes_free(new_context: NewContext, server: Server) -> None:
+def test_toasts_do_not_cover_the_lanes(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)

@@ -15,7 +15,7 @@ def share_of_window(page: Page) -> float:
     return scale**2 * FRAME[0] * FRAME[1] / page.evaluate("innerWidth * innerHeight")
 
 
-def test_nothing_that_appears_moves_the_picture(new_context: NewContext, server: Server) -> None:
+def test_appearing_elements_do_not_move_the_picture(new_context: NewContext, server: Server) -> None:
     page = signed_in(new_context(viewport={"width": 1280, "height": 720}), server, "ann")
     page.goto(f"{sample(page)}/annotate?frame=3")
     canvas = page.locator("r2c2r-frame-canvas canvas")
@@ -37,7 +37,7 @@ def test_nothing_that_appears_moves_the_picture(new_context: NewContext, server:
     assert box_of(canvas) == first
 
 
-def test_a_bar_between_two_panels_is_where_its_person_left_it(new_context: NewContext, server: Server) -> None:
+def test_a_moved_panel_separator_keeps_its_position_after_a_reload(new_context: NewContext, server: Server) -> None:
     context = new_context(viewport={"width": 1280, "height": 720}, bypass_csp=True)
     page = signed_in(context, server, "ann")
     page.goto(f"{sample(page)}/annotate?frame=3")
@@ -74,7 +74,7 @@ def test_a_bar_between_two_panels_is_where_its_person_left_it(new_context: NewCo
     assert serious(page, "annotate") == []
 
 
-def test_the_tools_are_one_stop_of_the_tab_key(new_context: NewContext, server: Server) -> None:
+def test_the_toolbar_is_a_single_tab_stop_with_arrow_keys(new_context: NewContext, server: Server) -> None:
     page = signed_in(new_context(viewport={"width": 1280, "height": 720}), server, "ann")
     page.goto(f"{sample(page)}/annotate?frame=3")
     ready(page)

@@ -8,7 +8,7 @@ from tests.browser.test_together import click_frame, pick, ready, rows, sample, 
 from tests.browser.together import Server, signed_in
 
 
-def test_a_template_is_kept_changed_taken_over_and_clicked(new_context: NewContext, server: Server) -> None:
+def test_a_template_is_saved_edited_adopted_and_clicked(new_context: NewContext, server: Server) -> None:
     context = new_context(bypass_csp=True)  # bypass_csp for axe
     page = signed_in(context, server, "ann")
     expect(page.get_by_label("Objects to click")).to_be_hidden()  # there is no template yet

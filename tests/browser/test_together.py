@@ -72,9 +72,7 @@ def ready(page: Page) -> None:
     page.locator(".chip", has_text=re.compile("^ready$")).wait_for()
 
 
-def test_clicks_survive_wrong_ones_another_person_a_lost_connection_and_a_dead_server(
-    people: tuple[Page, Page], server: Server
-) -> None:
+def test_clicks_survive_undo_conflicts_lost_connections_and_server_crashes(people: tuple[Page, Page], server: Server) -> None:
     ann, bea = people
     project = sample(ann)
     ann.goto(f"{project}/annotate?frame=3")
@@ -132,7 +130,7 @@ def test_clicks_survive_wrong_ones_another_person_a_lost_connection_and_a_dead_s
     stored(again)
 
 
-def test_a_project_goes_from_draft_to_approved(people: tuple[Page, Page], server: Server) -> None:
+def test_two_people_take_a_project_from_draft_to_approval(people: tuple[Page, Page], server: Server) -> None:
     ann, bea = people
     project = sample(ann)
     folder = server.data / "projects" / project.rsplit("/", 1)[-1]
@@ -235,7 +233,7 @@ def reject_c0(page: Page) -> Locator:
     return page.locator('[data-at="rejected:c0"]')
 
 
-def test_a_tablet_reaches_everything_by_touch(new_context: NewContext, server: Server) -> None:
+def test_a_tablet_can_annotate_by_touch(new_context: NewContext, server: Server) -> None:
     context = new_context(viewport={"width": 1024, "height": 768}, has_touch=True)
     ann = signed_in(context, server, "ann")
     ann.goto(f"{sample(ann)}/annotate?frame=3")
@@ -277,9 +275,7 @@ def move(page: Page, step: str, reason: str = "") -> None:
         say(page, step, reason)
 
 
-def test_what_waits_for_a_person_is_in_their_inbox_and_what_happened_meanwhile_on_the_overview(
-    new_context: NewContext, server: Server
-) -> None:
+def test_the_inbox_lists_open_work_and_the_overview_lists_news(new_context: NewContext, server: Server) -> None:
     contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
     ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
     address = sample(ann)

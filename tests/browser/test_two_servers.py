@@ -37,7 +37,7 @@ def two(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Serve
             yield a, b
 
 
-def test_two_people_at_two_servers_work_on_one_project(new_context: NewContext, two: tuple[Server, Server]) -> None:
+def test_people_at_two_servers_see_each_other_clicks_and_runs(new_context: NewContext, two: tuple[Server, Server]) -> None:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
     contexts = [new_context() for _ in two]
     ann, bea = (signed_in(*given) for given in zip(contexts, two, ("ann", "bea"), strict=True))

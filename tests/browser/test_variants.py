@@ -9,7 +9,7 @@ from tests.browser.test_together import sample
 from tests.browser.together import Server, signed_in
 
 
-def test_variants_are_made_by_keyboard_and_what_they_take_is_said_before(new_context: NewContext, server: Server) -> None:
+def test_variants_are_requested_by_keyboard_with_their_size_shown_before(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "cleo")
     project = sample(page)
