@@ -24,7 +24,7 @@ def test_import_contracts_hold() -> None:
     assert done.returncode == 0, done.stdout
 
 
-def test_stages_never_import_each_other() -> None:
+def test_stages_do_not_import_each_other() -> None:
     stages = ["ingest", "segment", "generate", "align", "synthesize", "warp", "export", "evaluate", "dataset", "synthetic"]
     for stage in stages:
         for path in (ROOT / "r2c2r_core" / stage).rglob("*.py"):
@@ -33,15 +33,15 @@ def test_stages_never_import_each_other() -> None:
                     assert f"r2c2r_core.{other}" not in path.read_text(), f"{path} imports {other}"
 
 
-def test_no_module_of_the_core_and_the_app_imports_itself_by_way_of_others() -> None:
-    """A circle is said by its members; imports inside functions and for types count."""
+def test_core_and_app_have_no_import_cycles() -> None:
+    """A cycle is reported by its members; imports inside functions and for types count."""
     try:
         TopologicalSorter(import_graph(ROOT, "r2c2r_core", "app")).prepare()
     except CycleError as problem:
         pytest.fail(" imports ".join(reversed(problem.args[1])))
 
 
-def test_a_circle_of_imports_is_found_across_packages(tmp_path: Path) -> None:
+def test_import_cycles_are_detected_across_packages(tmp_path: Path) -> None:
     for name, code in {
         "core/__init__.py": "",
         "core/a.py": "def f():\n    from app import b\n",
@@ -74,12 +74,12 @@ SEGMENT = ROOT / "r2c2r_core" / "segment"
 
 
 @pytest.mark.parametrize("room", sorted(path.parent for path in SEGMENT.rglob("__init__.py")), ids=lambda path: path.name)
-def test_a_room_of_segment_has_at_most_five_import_levels(room: Path) -> None:
+def test_each_subpackage_of_segment_has_at_most_five_import_levels(room: Path) -> None:
     levels = import_levels(room)
     assert max(levels.values()) <= 5, {name: level for name, level in levels.items() if level > 5}
 
 
-def test_every_room_of_segment_stands_in_its_table_above_the_rooms_that_use_it() -> None:
+def test_subpackages_of_segment_import_only_those_listed_above_them() -> None:
     listed = re.findall(r"^\| (\w+) +\|", (SEGMENT / "__init__.py").read_text(), re.MULTILINE)[1:]
     assert sorted(listed) == sorted(path.parent.name for path in SEGMENT.glob("*/__init__.py"))
     for place, room in enumerate(listed):
@@ -126,7 +126,7 @@ def _imported(tree: ast.Module, package: str) -> set[str]:
 
 
 @pytest.mark.parametrize("module", ["r2c2r_core.cli", "r2c2r_core.pipeline", "app.main, app.work"])
-def test_importing_costs_nothing_heavy(module: str) -> None:
+def test_importing_loads_no_heavy_dependencies(module: str) -> None:
     heavy = ["open3d", "mujoco", "scene_synthesizer", "torch", "transformers", "pybullet", "viser", "trimesh"]
     heavy += ["opentelemetry.sdk", "opentelemetry.exporter"]  # imported only if a setting turns traces on
     code = f"import sys, {module}; print([name for name in {heavy} if name in sys.modules])"
@@ -156,8 +156,8 @@ for package in (r2c2r_core, app):
     assert done.returncode == 0, done.stderr
 
 
-def test_no_code_that_forbids_commercial_use_is_installed() -> None:
-    """The C code in `triangle` forbids it; scene_synthesizer asks for it, `make env` takes it away, nothing misses it."""
+def test_no_package_that_forbids_commercial_use_is_installed() -> None:
+    """The licence of `triangle` forbids it: scene_synthesizer requires it, `make env` removes it, and no code needs it."""
     assert importlib.util.find_spec("triangle") is None, "take it away: pip uninstall triangle"
 
 
@@ -187,8 +187,8 @@ MAY_HURRY = {
 }
 
 
-def test_no_test_is_in_a_hurry() -> None:
-    """All limits are those of tests/waiting.py; what a test needs is waited for by what it shows."""
+def test_tests_have_no_short_time_limits() -> None:
+    """Tests use only the time limits of tests/waiting.py, and wait for conditions instead of durations."""
     tests = ROOT / "tests"
     hurried = [
         (path.relative_to(tests).as_posix(), number, line.strip())
@@ -200,7 +200,7 @@ def test_no_test_is_in_a_hurry() -> None:
     assert MAY_HURRY.keys() - {path for path, *_ in hurried} == set()  # exceptions are removed with the code that needed them
 
 
-def test_the_readme_names_every_command_and_stays_short() -> None:
+def test_the_readme_lists_every_command_and_is_short() -> None:
     readme = (ROOT / "README.md").read_text()
     commands = next(action.choices for action in build_parser()._actions if isinstance(action, argparse._SubParsersAction))
     assert [command for command in commands if f"`r2c2r {command}`" not in readme] == []
@@ -211,7 +211,7 @@ MAX_CORE_LINES, MAX_PARAMS = 65_193, 1_293
 """Limits of r2c2r_core. A change that needs more raises the number here, in its own commit, with the reason."""
 
 
-def test_the_core_and_its_tuned_numbers_do_not_grow() -> None:
+def test_the_core_stays_within_its_limits_of_lines_and_parameters() -> None:
     texts = [path.read_text(encoding="utf-8") for path in (ROOT / "r2c2r_core").rglob("*.py")]
     lines, params = sum(text.count("\n") for text in texts), sum(len(re.findall(r"\bparam\(", text)) for text in texts)
     assert (lines <= MAX_CORE_LINES, params <= MAX_PARAMS) == (True, True), f"{lines} lines, {params} param( calls"
@@ -241,7 +241,7 @@ def test_every_public_function_is_used_outside_the_tests() -> None:
 RIDDLES = ("What", "Which", "Whatever", "Nobody", "Of")
 
 
-def test_the_first_line_of_a_docstring_names_its_subject() -> None:
+def test_docstrings_do_not_start_with_an_unclear_word() -> None:
     found = [
         f"{path.relative_to(ROOT)}: {text.splitlines()[0]}"
         for name in ("r2c2r_core", "app")

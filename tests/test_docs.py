@@ -51,7 +51,7 @@ def settings_of(config: object, path: str = "") -> list[tuple[str, str]]:
 
 @pytest.mark.slow
 @without_mkdocs
-def test_every_setting_stands_in_the_documentation(site: Path) -> None:
+def test_every_setting_is_documented(site: Path) -> None:
     sections = re.split(r"<h3 id=\"[^\"]*\">", (site / "settings.html").read_text())
     by_name = {section.partition("<a ")[0]: section for section in sections[1:]}
     missing = [(s, name) for s, name in settings_of(ReconstructConfig()) if f"<code>{name}</code>" not in by_name[s]]
@@ -60,7 +60,7 @@ def test_every_setting_stands_in_the_documentation(site: Path) -> None:
 
 @pytest.mark.slow
 @without_mkdocs
-def test_every_page_is_reached_and_asks_nothing_of_other_hosts(site: Path) -> None:
+def test_every_page_is_linked_and_loads_nothing_from_other_hosts(site: Path) -> None:
     start = (site / "index.html").read_text()
     pages = [p for p in site.rglob("*.html") if p.name != "404.html"]
     assert len(pages) >= len(list((ROOT / "docs").rglob("*.md")))
@@ -72,8 +72,8 @@ def test_every_page_is_reached_and_asks_nothing_of_other_hosts(site: Path) -> No
 
 @pytest.mark.slow
 @without_mkdocs
-def test_files_of_the_checkout_stand_in_their_pages(site: Path) -> None:
-    """A marker that is misspelt is printed as it stands, without a warning: every page has what it includes."""
+def test_included_files_appear_in_their_pages(site: Path) -> None:
+    """A misspelt include marker is printed verbatim, without a warning."""
     for page in (ROOT / "docs").rglob("*.md"):
         built = re.sub(r"<[^>]*>", "", (site / page.relative_to(ROOT / "docs").with_suffix(".html")).read_text())
         assert re.search(r"8 *&lt; *-|8 *< *-", built) is None, f"{page} shows a marker instead of a file"
@@ -85,13 +85,13 @@ def test_files_of_the_checkout_stand_in_their_pages(site: Path) -> None:
 
 @pytest.mark.slow
 @without_mkdocs
-def test_the_reference_has_the_docstrings(site: Path) -> None:
+def test_the_reference_contains_the_docstrings(site: Path) -> None:
     reference = (site / "reference.html").read_text()
     assert "Turn one RGB-D recording into an articulated scene" in reference
     assert "world_from_mesh = world_from_camera @ camera_from_mesh" in reference
 
 
-def test_what_a_page_shows_of_the_checkout_is_there() -> None:
+def test_sections_included_by_pages_exist_in_their_files() -> None:
     shown = [found for page in (ROOT / "docs").rglob("*.md") for found in SHOWN.findall(page.read_text())]
     assert len(shown) > 5
     for name, section in shown:

@@ -37,16 +37,16 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> SamplePaths:
     return write_sample(tmp_path_factory.mktemp("sample"), frames=10, size=(256, 192))
 
 
-def test_every_example_is_run_here() -> None:
+def test_every_example_is_run_by_this_file() -> None:
     source = Path(__file__).read_text()
     assert [name for name in sorted(path.stem for path in EXAMPLES.glob("*.py")) if f'run("{name}"' not in source] == []
 
 
-def test_reading_a_capture(run: Run, sample: SamplePaths) -> None:
+def test_the_capture_example_reads_ten_frames(run: Run, sample: SamplePaths) -> None:
     assert "10 frames" in run("read_a_capture", sample.scan)
 
 
-def test_clicking_and_cutting(run: Run, sample: SamplePaths, tmp_path: Path) -> None:
+def test_the_click_example_writes_a_cutout(run: Run, sample: SamplePaths, tmp_path: Path) -> None:
     click = read_prompts(sample.prompts).objects[0]
     point = click.points[0]
     said = run("click_and_cut", sample.scan, click.category, point.frame, point.x, point.y, tmp_path / "cut.png")
@@ -55,14 +55,14 @@ def test_clicking_and_cutting(run: Run, sample: SamplePaths, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_the_candidates_of_one_object(run: Run, sample: SamplePaths, tmp_path: Path) -> None:
+def test_the_candidates_example_writes_meshes(run: Run, sample: SamplePaths, tmp_path: Path) -> None:
     drawer = next(found.name for found in read_prompts(sample.prompts).objects if found.category == "drawer")
     said = run("candidates", sample.scan, sample.prompts, drawer, tmp_path)
     assert "is chosen" in said
     assert list(tmp_path.glob("*.ply"))
 
 
-def test_a_bundle_opens_in_mujoco(run: Run, tmp_path: Path) -> None:
+def test_the_mujoco_example_opens_every_joint(run: Run, tmp_path: Path) -> None:
     said = run("bundle_in_mujoco", write_folder(kitchen(), tmp_path / "bundle"))
     lines = said.strip().splitlines()
     assert len(lines) >= 3
@@ -71,7 +71,7 @@ def test_a_bundle_opens_in_mujoco(run: Run, tmp_path: Path) -> None:
         assert float(reached) > 0.95 * float(upper), line
 
 
-def test_a_bundle_opens_beside_robots_of_others_or_it_is_said_what_is_missing(run: Run, tmp_path: Path) -> None:
+def test_the_robot_examples_run_or_name_the_missing_package(run: Run, tmp_path: Path) -> None:
     folder = write_folder(kitchen(), tmp_path / "bundle")
     said = [
         run("bundle_in_isaac_lab", folder, "drawer_1"),
@@ -84,7 +84,7 @@ def test_a_bundle_opens_beside_robots_of_others_or_it_is_said_what_is_missing(ru
         run("bundle_in_isaac_lab", folder, "fridge")
 
 
-def test_opening_is_learnt(run: Run, tmp_path: Path) -> None:
+def test_the_learning_example_improves_drawer_opening(run: Run, tmp_path: Path) -> None:
     pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'r2c2r[gym]'")
     said = run("learn_to_open", write_folder(kitchen(), tmp_path / "bundle"), "drawer_1_slide", 3, 3).splitlines()
     assert said[0] == "before: 0 of 3"
@@ -99,7 +99,7 @@ def address(tmp_path: Path) -> Iterator[str]:
         yield f"http://127.0.0.1:{port}/?token={settings.launch_token}"
 
 
-def test_the_api_is_driven(run: Run, address: str) -> None:
+def test_the_api_example_completes_a_run(run: Run, address: str) -> None:
     said = run("drive_the_api", address)
     assert "drawer_1" in said
     assert "run done" in said

@@ -145,7 +145,7 @@ def doctors_lines(capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
-def test_a_recording_format_of_another_package_is_recognised(
+def test_the_recording_format_of_a_plugin_is_recognised(
     install: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scan = tmp_path / "scan"
@@ -159,7 +159,7 @@ def test_a_recording_format_of_another_package_is_recognised(
     assert "plug-in sonar" in doctors_lines(capsys)
 
 
-def test_a_recording_of_another_packages_format_is_read(install: Install, tmp_path: Path) -> None:
+def test_a_recording_in_the_format_of_a_plugin_is_read(install: Install, tmp_path: Path) -> None:
     install(own_entry("r2c2r.readers")[0], "r2c2r.readers", *own_entry("r2c2r.readers")[1:])
     poses = write_numpy_scan(tmp_path / "scan", frames=3)
     capture = read_capture(tmp_path / "scan", tmp_path / "frames", IngestConfig())
@@ -175,7 +175,7 @@ def test_a_recording_of_another_packages_format_is_read(install: Install, tmp_pa
         read_capture(tmp_path / "scan", tmp_path / "other", IngestConfig())
 
 
-def test_a_generator_of_another_package_makes_the_candidates(install: Install, bottle_scene: tuple[Capture, MaskTrack]) -> None:
+def test_the_generator_of_a_plugin_makes_the_candidates(install: Install, bottle_scene: tuple[Capture, MaskTrack]) -> None:
     module, entry, code = own_entry("r2c2r.generators")
     install(module, "r2c2r.generators", entry, code)
     found = generate_candidates(*bottle_scene, "convex-hull", GenerateConfig(count=2, pool_frames=6))
@@ -192,7 +192,7 @@ def test_a_generator_of_another_package_makes_the_candidates(install: Install, b
 @pytest.mark.parametrize(
     ("group", "table"), [("r2c2r.segmenters", SEGMENTERS), ("r2c2r.generators", GENERATORS), ("r2c2r.matchers", MATCHERS)]
 )
-def test_a_backend_of_another_package_can_be_chosen_by_name(
+def test_the_backend_of_a_plugin_is_loaded_by_name(
     install: Install, group: str, table: Registry, capsys: pytest.CaptureFixture[str]
 ) -> None:
     default = table.default
@@ -212,7 +212,7 @@ def test_a_backend_of_another_package_can_be_chosen_by_name(
         ("r2c2r.matchers", MATCHERS, "match_many", "r2c2r_core.align.protocol.Matcher"),
     ],
 )
-def test_a_backend_that_lacks_a_method_is_refused_with_a_line_that_says_which(
+def test_a_plugin_backend_without_a_required_method_is_refused_by_name(
     install: Install, group: str, table: Registry, method: str, protocol: str
 ) -> None:
     install("delphi", group, "oracle = delphi:LINE", BACKEND.replace(f"def {method}(", "def forgotten("))
@@ -222,7 +222,7 @@ def test_a_backend_that_lacks_a_method_is_refused_with_a_line_that_says_which(
     assert str(caught.value) == f"{said}; expected a class with the methods of {protocol}"
 
 
-def test_a_backend_whose_class_is_gone_or_unfinished_is_refused(install: Install) -> None:
+def test_a_plugin_backend_with_a_missing_or_abstract_class_is_refused(install: Install) -> None:
     unfinished = "\nfrom r2c2r_core.align.protocol import Matcher\n" + BACKEND.replace(
         "class Oracle:", "class Oracle(Matcher):"
     )
@@ -236,7 +236,7 @@ def test_a_backend_whose_class_is_gone_or_unfinished_is_refused(install: Install
         GENERATORS.load("oracle")
 
 
-def test_a_kind_of_furniture_of_another_package_is_named_and_built(install: Install) -> None:
+def test_the_furniture_category_of_a_plugin_is_recognised_and_built(install: Install) -> None:
     assert named("wine larder").notice is not None
     install("larder", "r2c2r.fixtures", "larder = larder:LARDER", FIXTURE)
     for words in ("wine larder", "Wine Larders", "bodega"):
@@ -248,7 +248,7 @@ def test_a_kind_of_furniture_of_another_package_is_named_and_built(install: Inst
     assert [part.name for part in fixture.build(order).parts] == ["base", "door"]
 
 
-def test_an_output_format_of_another_package_is_written_checked_and_described(install: Install, tmp_path: Path) -> None:
+def test_the_output_format_of_a_plugin_is_written_and_linted(install: Install, tmp_path: Path) -> None:
     install("counting", "r2c2r.formats", "count = counting:COUNT", FORMAT)
     assert formats()[-1].name == "count"
     folder = write_folder(kitchen(), tmp_path / "bundle")
@@ -269,7 +269,7 @@ def test_an_output_format_of_another_package_is_written_checked_and_described(in
         ("OTHER = 1", "AttributeError"),
     ],
 )
-def test_a_broken_plug_in_is_a_line_of_the_doctor_and_ends_nothing(
+def test_a_broken_plugin_is_reported_by_the_doctor_and_ignored(
     install: Install, tmp_path: Path, code: str, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     install("broken", "r2c2r.readers", "mine = broken:READER", code)
@@ -281,13 +281,13 @@ def test_a_broken_plug_in_is_a_line_of_the_doctor_and_ends_nothing(
         open_recording(tmp_path)
 
 
-def test_nobody_takes_a_name_of_the_projects_own(install: Install) -> None:
+def test_a_plugin_cannot_replace_a_built_in_backend(install: Install) -> None:
     code = BACKEND.replace('"oracle"', '"sift"')
     install("impostor", "r2c2r.matchers", "sift = impostor:LINE", code)
     assert MATCHERS.get("sift").target.startswith("r2c2r_core.")
 
 
-def test_code_of_a_plug_in_is_part_of_its_stages_keys_and_of_no_others(install: Install) -> None:
+def test_the_code_of_a_plugin_changes_only_the_key_of_its_stage(install: Install) -> None:
     before = {room: source_key(room) for room in ("ingest", "align", "warp")}
     file = install("sonar", "r2c2r.readers", "sonar = sonar:READER", READER)
     added = source_key("ingest")
@@ -298,7 +298,7 @@ def test_code_of_a_plug_in_is_part_of_its_stages_keys_and_of_no_others(install: 
     assert source_key("ingest") not in (added, before["ingest"])
 
 
-def test_a_format_that_cannot_be_written_is_left_out(
+def test_a_plugin_format_that_fails_is_left_out_of_the_bundle(
     install: Install, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     install("counting", "r2c2r.formats", "count = counting:COUNT", FORMAT.replace("    Path(folder", "    1 / 0; Path(folder"))

@@ -39,7 +39,7 @@ def runner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return module
 
 
-def test_a_test_that_passes_alone_is_named_as_flaky_with_its_first_failure(
+def test_a_test_that_passes_on_rerun_is_reported_as_flaky(
     runner: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "test_a.py").write_text(ONCE)
@@ -50,7 +50,7 @@ def test_a_test_that_passes_alone_is_named_as_flaky_with_its_first_failure(
     assert (tmp_path / "build" / "flaky.txt").read_text() == "test_a.py::test_once\n"
 
 
-def test_a_test_that_fails_again_or_cannot_be_collected_fails_the_run(
+def test_a_repeated_failure_or_a_collection_error_fails_the_run(
     runner: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "test_a.py").write_text(ONCE)
@@ -64,7 +64,7 @@ def test_a_test_that_fails_again_or_cannot_be_collected_fails_the_run(
     assert runner.run_python([("-n", "0")], []) != 0
 
 
-def test_a_pass_that_chooses_no_test_is_no_failure_but_a_run_without_any_is(runner: ModuleType, tmp_path: Path) -> None:
+def test_a_pass_without_tests_succeeds_but_a_run_without_tests_fails(runner: ModuleType, tmp_path: Path) -> None:
     (tmp_path / "test_a.py").write_text("def test_always():\n    pass\n")
     assert runner.run_python([("-k", "always"), ("-k", "never")], []) == 0
     assert runner.run_python([("-k", "never")], []) == 5
@@ -81,7 +81,7 @@ def test_tests_run_in_reversed_order_within_each_file(tmp_path: Path) -> None:
     assert names == ["test_a.py::test_2", "test_a.py::test_1", "test_b.py::test_2", "test_b.py::test_1"]
 
 
-def test_what_a_block_holds_is_released_at_its_end_and_waiting_ends_with_the_condition() -> None:
+def test_the_event_of_a_block_is_set_at_its_end_and_until_waits_for_a_condition() -> None:
     with held() as released:
         assert not released.is_set()
     assert released.is_set()

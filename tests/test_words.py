@@ -27,7 +27,7 @@ STOPPED = [
 
 
 @pytest.mark.parametrize("words", STOPPED)
-def test_words_that_stopped_people_are_gone(words: str) -> None:
+def test_words_that_confused_users_are_not_used(words: str) -> None:
     pages = [*(ROOT / "static" / "js").rglob("*.js"), *(ROOT / "static").glob("*.html")]
     code = [path for room in ("app", "r2c2r_core") for path in (ROOT / room).rglob("*.py")]
     said = [path for path in (*pages, *code) if any(words in text for text in quoted(path.read_text(encoding="utf-8")))]
