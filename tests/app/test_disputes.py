@@ -147,7 +147,7 @@ def test_masks_from_before_a_restart_are_recomputed_if_other_clicks_differ(
 def test_a_new_request_cancels_masks_that_are_still_streaming(
     desk: Any, said: Lines, doors: list[ObjectPrompt], session: GeometricSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Else what is left of them would be taken for the new ones."""
+    """Otherwise masks left from the first request would be taken for those of the second."""
     streaming, streamed = threading.Event(), session.stream
 
     def stream(asked: ObjectPrompt) -> Iterator[Any]:

@@ -21,7 +21,7 @@ from tests.core.export.test_report import certificate
 
 
 def test_the_clicks_of_the_last_run_are_replaced_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A server killed meanwhile leaves the former ones: whoever has them open still reads all of them."""
+    """The file is replaced, not rewritten: a reader that has it open, or a server killed meanwhile, keeps the previous one."""
     monkeypatch.setattr(outcomes, "keep_bundle", lambda *_: None)
     files = project_files(tmp_path, "p")
     (tmp_path / "rows").mkdir()
@@ -62,7 +62,7 @@ def test_the_database_is_not_locked_while_a_bundle_is_copied(web: Running, monke
 def test_certificate_doubts_are_returned_with_object_and_reason(
     web: Running, monkeypatch: pytest.MonkeyPatch, stored_as_pairs: bool
 ) -> None:
-    """Those of a bundle are; and those of a row that an older version wrote, which holds pairs."""
+    """Also for rows of an older version, which stored each doubt as a pair."""
     made = replace(certificate(), likeness=Likeness(state="doubtful", doubts=(("drawer_1", "is 40 % sure"),)))
     project = web.sample()
     work = web.settings.data_dir / "projects" / project / "work"

@@ -122,7 +122,7 @@ def test_occluded_surface_is_drawn_faintly_over_the_photo(reviewed: Reviewed) ->
 
 
 def test_marked_joint_states_are_shown_immediately_and_undone(reviewed: Reviewed) -> None:
-    """Closed here, open by so much there: the leaf over the photos, its lane and its limit follow before any run."""
+    """The overlay, the lane and the joint limit of the leaf follow a marked state before any run."""
     web, project, number = reviewed
     filmed(reviewed, FILMED)
     address = f"/api/projects/{project}/objects/{number}"

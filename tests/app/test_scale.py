@@ -118,7 +118,7 @@ def test_get_requests_need_no_more_queries_or_bytes_with_more_data(
 
 @pytest.mark.both_databases(quick=False)
 def test_get_requests_do_not_load_the_stored_states_of_events(finished: tuple[Running, str, int]) -> None:
-    """A list of objects says what can be undone, the history who did what: neither reads a state, neither replays."""
+    """Neither the undo flags of objects nor the history need the stored states, and events are not replayed."""
     web, project, item = finished
     grow(web, project)
     with writing(web.context.engine) as session:
@@ -189,7 +189,7 @@ def test_facts_are_cached_on_disk_and_reread_when_a_noun_changes(tmp_path: Any, 
 
 
 def test_the_fields_of_cached_facts_match_their_version() -> None:
-    """A field more or less: FACTS_VERSION goes up with it, for what an older server kept lacks it."""
+    """Increase FACTS_VERSION whenever a field is added or removed: caches of an older server lack the change."""
     told = {"generate": _candidate_facts(candidates("drawer_1")), "align": plain(placement("drawer_1"))}
     fields = sorted(f"{stage} {key}" for stage, said in told.items() for key in (*said, *said.get("candidates", [{}])[0]))
     assert (views.FACTS_VERSION, content_key(fields)) == (1, "76d66364613bb625a1d514b4b602d08a")

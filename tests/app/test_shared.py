@@ -45,7 +45,7 @@ def waiting(engine: Engine, *projects: str) -> None:
 
 
 def test_job_progress_commits_asynchronously_and_job_ends_synchronously(engine: Engine, tmp_path: Path) -> None:
-    """Else each word of progress holds the one lock of all writers until the disk has turned."""
+    """Otherwise each progress update would hold the lock of all writers until the disk has synchronised."""
     waiting(engine, "p")
     server, asked = a_server(engine, tmp_path), list[str]()
     event.listen(engine, "before_cursor_execute", lambda *said: asked.append(said[2]))

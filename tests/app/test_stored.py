@@ -51,7 +51,7 @@ def test_results_of_one_server_are_shown_and_downloaded_at_another(two: tuple[Ru
 def test_results_of_a_run_are_in_the_store_before_the_row_is_committed(
     two: tuple[Running, Running], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A machine that is killed after the row is stored loses nothing of it."""
+    """A machine that is killed after the row is committed loses no results."""
     first, second = two
     project, finisher = first.sample(), FINISHERS["run"]
     kept: list[bool] = []

@@ -72,7 +72,7 @@ def test_the_camera_takes_the_pose_of_a_photo_or_a_comment(view: View) -> None:
 
 
 def test_a_page_that_connects_late_gets_the_current_camera(view: View) -> None:
-    """viser moves the cameras of pages that have told theirs; one still drawing its first view keeps where it began."""
+    """viser moves only cameras of pages that have reported theirs; a page that is still loading keeps the initial one."""
     server: Any = view.server
     server.initial_camera = SimpleNamespace(position=(3.0, 3.0, 3.0), look_at=(0.0, 0.0, 0.0), fov=USUAL_FOV, near=0.01)
     view.show({"mode": "cloud"})
