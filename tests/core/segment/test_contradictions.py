@@ -59,14 +59,14 @@ def found(*pairs: tuple[MaskTrack, ObjectPrompt]) -> tuple[Contradiction, ...]:
     return find_contradictions({track.name: track for track, _ in pairs}, [said for _, said in pairs], (WALL,))
 
 
-def test_neighbours_that_share_a_border_contradict_nothing() -> None:
+def test_neighbours_that_share_a_border_are_not_reported() -> None:
     left = (track("door_1", "cabinet", slice(0, 81)), prompt("door_1", "cabinet", 40.5))
     right = (track("door_2", "cabinet", slice(79, 160)), prompt("door_2", "cabinet", 120.5))
     assert found(left, right) == ()
 
 
 @pytest.mark.parametrize(("begins", "rule"), [(0, "same-thing"), (40, "same-thing"), (60, "masks-overlap")])
-def test_masks_that_share_many_pixels_name_both_clicks(begins: int, rule: str) -> None:
+def test_overlapping_masks_are_reported_with_both_clicks(begins: int, rule: str) -> None:
     left = (track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5))
     right = (track("door_2", "cabinet", slice(begins, begins + 80)), prompt("door_2", "cabinet", 70.5))
     (said,) = found(left, right)
@@ -75,7 +75,7 @@ def test_masks_that_share_many_pixels_name_both_clicks(begins: int, rule: str) -
     assert "\n" not in said.line
 
 
-def test_what_is_behind_an_open_door_is_not_the_door() -> None:
+def test_overlap_with_an_open_door_is_not_reported() -> None:
     left, right = track("door_1", "cabinet", slice(0, 80)), track("door_2", "cabinet", slice(0, 80))
     opened = replace(left, motions=(motion(dict.fromkeys(FRAMES, 1.0), "left"),))
     said = (prompt("door_1", "cabinet", 40.5), prompt("door_2", "cabinet", 40.5))
@@ -83,7 +83,7 @@ def test_what_is_behind_an_open_door_is_not_the_door() -> None:
     assert found((opened, said[0]), (right, said[1])) == ()
 
 
-def test_clicks_that_the_mask_disobeys() -> None:
+def test_clicks_that_disagree_with_the_mask_are_reported() -> None:
     door = track("door_1", "cabinet", slice(0, 80))
     (left_out,) = found((door, prompt("door_1", "cabinet", 120.5)))
     assert left_out.message == "door_1: the click at (120, 60) in frame 4 is on it, but outside its mask"
@@ -96,7 +96,7 @@ def test_clicks_that_the_mask_disobeys() -> None:
     assert found((door, replace(prompt("door_1", "cabinet", 40.5, frame=5), frames=(absent,)))) == ()
 
 
-def test_sizes_outside_their_category() -> None:
+def test_sizes_atypical_of_the_category_are_reported() -> None:
     wide = track("door_1", "cabinet", slice(0, 80), width_m=1.17)
     (said,) = found((wide, prompt("door_1", "cabinet", 40.5)))
     assert said.rule == "size-unlikely"
@@ -109,21 +109,21 @@ def test_sizes_outside_their_category() -> None:
     assert found((unknown, prompt("lathe_1", "lathe", 10.5))) == ()
 
 
-def test_what_stands_on_the_floor_is_not_in_the_air() -> None:
+def test_floor_standing_objects_above_the_floor_are_reported() -> None:
     chair = ("chair_1", "chair", (0.45, 0.5, 0.9))
     assert found((thing(*chair), prompt("chair_1", "chair", 10.5))) == ()
     (said,) = found((thing(*chair, support_z_m=0.45), prompt("chair_1", "chair", 10.5)))
     assert said.message == "chair_1 stands 0.45 m above the floor, a 'chair' stands on it"
 
 
-def test_a_front_on_the_bare_wall() -> None:
+def test_a_front_directly_on_the_wall_is_reported() -> None:
     drawer = track("drawer_1", "drawer", slice(0, 80), height_m=0.2)
     assert found((drawer, prompt("drawer_1", "drawer", 40.5))) == ()
     (said,) = found((track("drawer_1", "drawer", slice(0, 80), height_m=0.2, y=-0.01), prompt("drawer_1", "drawer", 40.5)))
     assert said.rule == "in-a-wall"
 
 
-def test_an_edge_that_hardly_shows_and_a_seam_that_was_not_cut_are_asked_about() -> None:
+def test_faint_edges_and_uncut_seams_are_reported() -> None:
     door, clicked = track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5)
     assert door.front is not None
     sure = replace(door, front=replace(door.front, edges=(0.9, 0.9, 0.6, 0.9), right=0.9, seam=0.1))
@@ -137,7 +137,7 @@ def test_an_edge_that_hardly_shows_and_a_seam_that_was_not_cut_are_asked_about()
     )
 
 
-def test_a_front_that_may_end_elsewhere_is_asked_about_where_all_its_edges_show() -> None:
+def test_an_uncertain_extent_is_reported_even_where_all_edges_show() -> None:
     door, clicked = track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5)
     assert door.front is not None
     (doubt,) = found((replace(door, front=replace(door.front, edges=(0.9,) * 4, right=0.6)), clicked))
@@ -146,7 +146,7 @@ def test_a_front_that_may_end_elsewhere_is_asked_about_where_all_its_edges_show(
 
 
 @pytest.mark.parametrize("category", ["double_door_cabinet", "microwave", "refrigerator", "dishwasher"])
-def test_seams_that_belong_to_such_a_front_are_not_asked_about(category: str) -> None:
+def test_expected_seams_of_multi_door_fronts_are_not_reported(category: str) -> None:
     item = track("one_1", category, slice(0, 160))
     assert item.front is not None
     sure = replace(item, front=replace(item.front, edges=(0.9,) * 4, right=0.9, seam=0.9))
@@ -155,7 +155,7 @@ def test_seams_that_belong_to_such_a_front_are_not_asked_about(category: str) ->
     assert any(said.rule == "edge-unsure" for said in found((faint, prompt("one_1", category, 40.5))))
 
 
-def test_what_cannot_be_told_of_one_object_or_two_hides_nothing_of_the_others(
+def test_a_check_that_fails_for_one_object_does_not_hide_other_reports(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     overlap, sizes = contradictions._overlap, contradictions._unlikely_sizes

@@ -20,7 +20,7 @@ SMALL = np.zeros((HEIGHT // 4, WIDTH // 4), bool)
 SMALL[10:20, 30:50] = True
 
 
-def test_what_was_said_of_a_frame_stands_and_the_others_are_as_found(session: GeometricSession, boxes: Boxes) -> None:
+def test_corrected_frames_override_and_other_frames_keep_their_masks(session: GeometricSession, boxes: Boxes) -> None:
     found = prompt("door_b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60))
     first, second, *others = sorted(session.track(found).masks)
     said = (FrameSaid(frame=first, mask=None), FrameSaid(frame=second, mask=pack_mask(SMALL)))
@@ -31,14 +31,14 @@ def test_what_was_said_of_a_frame_stands_and_the_others_are_as_found(session: Ge
     assert track.masks[others[0]] == session.track(found).masks[others[0]]
 
 
-def test_one_that_is_visible_nowhere_is_told(session: GeometricSession, boxes: Boxes) -> None:
+def test_an_object_marked_absent_in_every_frame_raises(session: GeometricSession, boxes: Boxes) -> None:
     found = prompt("door_b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60))
     said = tuple(FrameSaid(frame=frame.index, mask=None) for frame in boxes[0].frames)
     with pytest.raises(ObjectNotSeen, match="visible in 0 frames"):
         track_object(session, replace(found, frames=said))
 
 
-def test_a_frame_that_the_recording_has_not_is_refused(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_correction_of_an_unknown_frame_is_rejected(session: GeometricSession, boxes: Boxes) -> None:
     found = prompt("door_b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60))
     session.find(found)
     with pytest.raises(PromptError, match="frame 61 set right found"):
@@ -46,7 +46,7 @@ def test_a_frame_that_the_recording_has_not_is_refused(session: GeometricSession
 
 
 @pytest.mark.parametrize("size", [(WIDTH // 4, HEIGHT // 4 - 2), (2 * WIDTH, 2 * HEIGHT)])
-def test_a_mask_that_would_be_stretched_onto_its_frame_is_refused(boxes: Boxes, size: tuple[int, int]) -> None:
+def test_a_mask_of_another_aspect_or_larger_than_its_frame_is_rejected(boxes: Boxes, size: tuple[int, int]) -> None:
     found = prompt("door_b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60))
     check_prompt(boxes[0], replace(found, frames=(FrameSaid(frame=60, mask=pack_mask(SMALL)),)))
     other = pack_mask(np.ones(size[::-1], bool))
@@ -55,13 +55,13 @@ def test_a_mask_that_would_be_stretched_onto_its_frame_is_refused(boxes: Boxes, 
 
 
 @pytest.mark.parametrize("frame_px", [(1920, 1440), (1440, 1920), (1296, 968), (641, 479), (160, 120)])
-def test_a_mask_rounded_to_whole_pixels_fits_its_frame(frame_px: tuple[int, int]) -> None:
+def test_a_downscaled_mask_rounded_to_whole_pixels_is_accepted(frame_px: tuple[int, int]) -> None:
     for width in (1, 2, 97, frame_px[0] - 1, frame_px[0]):
         height = max(round(frame_px[1] * width / frame_px[0]), 1)
         check_mask_size("", pack_mask(np.ones((height, width), bool)), frame_px)
 
 
-def test_painted_frames_come_first_and_once() -> None:
+def test_painted_frames_are_streamed_first_and_only_once() -> None:
     mask, other = pack_mask(SMALL), pack_mask(~SMALL)
     said = (FrameSaid(frame=3, mask=None), FrameSaid(frame=5, mask=mask))
     found = iter([(5, other, 0.4), (3, other, 0.5), (7, other, 0.6)])
@@ -81,11 +81,11 @@ def many_masks(count: int) -> dict[str, Any]:
     return written
 
 
-def test_the_size_of_all_masks_is_checked_before_one_is_unpacked() -> None:
+def test_masks_within_the_total_pixel_limit_are_accepted() -> None:
     assert len(checked_prompts(many_masks(62)).objects[0].frames) == 62
 
 
-def test_a_mask_is_read_from_its_runs() -> None:
+def test_a_mask_is_decoded_from_its_run_lengths() -> None:
     absent, painted = parse_prompts(document()).objects[0].frames
     assert absent == FrameSaid(frame=3, mask=None)
     assert painted.mask is not None
@@ -101,6 +101,6 @@ def test_a_mask_is_read_from_its_runs() -> None:
         ({**document(), "version": 1}, "frames of 'mug' found in version 1, version 2 expected"),
     ],
 )
-def test_wrong_masks_are_refused(wrong: dict[str, Any], message: str) -> None:
+def test_invalid_masks_are_rejected(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(PromptError, match=message):
         parse_prompts(wrong)

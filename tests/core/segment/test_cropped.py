@@ -21,7 +21,7 @@ EDGES = ((0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.3))
 UPPER = CropBox(corner_capture=(0.9, -0.45, 1.02), edges_capture=EDGES)  # of the carton, which reaches from 0.90 to 1.10 m
 
 
-def test_a_thing_is_what_lies_in_its_crop_box(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_crop_box_limits_the_size_and_masks_of_an_object(session: GeometricSession, boxes: Boxes) -> None:
     capture, _ = boxes
     carton = prompt("carton", "box", click_on(capture, (1.06, -0.36, 1.06), 60))
     whole, upper = session.track(carton), session.track(replace(carton, crop=UPPER))
@@ -35,7 +35,7 @@ def test_a_thing_is_what_lies_in_its_crop_box(session: GeometricSession, boxes: 
     assert not (found & ~session.mask_at(carton, 60)).any()
 
 
-def test_what_is_seen_behind_the_box_is_none_of_it(boxes: Boxes) -> None:
+def test_surfaces_behind_the_crop_box_are_excluded_from_the_mask(boxes: Boxes) -> None:
     capture = boxes[0]
     frame = capture.frame(60)
     crop = world_crop(CropBox(corner_capture=(0.9, -0.45, 0.93), edges_capture=EDGES), Rigid3())
@@ -46,7 +46,7 @@ def test_what_is_seen_behind_the_box_is_none_of_it(boxes: Boxes) -> None:
     assert (kept & carton).sum() > 0.9 * kept.sum()  # its silhouette covers three times as much wall
 
 
-def test_the_box_is_where_it_was_drawn_however_the_world_was_turned(boxes: Boxes) -> None:
+def test_a_crop_box_keeps_its_place_when_the_world_is_rotated(boxes: Boxes) -> None:
     turn = Rigid3(rotation_about_z(0.7), np.array([1.0, -2.0, 0.3]))
     crop = world_crop(UPPER, turn)
     points = np.array([[1.0, -0.3, 1.1], [1.0, -0.3, 1.01], [0.89, -0.3, 1.1]])
@@ -54,14 +54,14 @@ def test_the_box_is_where_it_was_drawn_however_the_world_was_turned(boxes: Boxes
     assert crop.bottom_m == pytest.approx(1.32)
 
 
-def test_a_box_beside_the_thing_is_told(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_crop_box_that_misses_the_object_raises(session: GeometricSession, boxes: Boxes) -> None:
     carton = prompt("carton", "box", click_on(boxes[0], (1.06, -0.36, 1.06), 60))
     beside = replace(UPPER, corner_capture=(0.0, -0.45, 1.02))
     with pytest.raises(ObjectNotSeen, match=r"carton: 0 of its \d+ points lie in its crop box"):
         session.track(replace(carton, crop=beside))
 
 
-def test_a_front_has_no_crop_box(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_crop_box_on_a_front_is_rejected(session: GeometricSession, boxes: Boxes) -> None:
     door = prompt("door_b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60))
     with pytest.raises(PromptError, match="a crop box of a 'cabinet' found"):
         session.find(replace(door, crop=UPPER))
@@ -73,7 +73,7 @@ def document(version: int = 3, **crop: Any) -> dict[str, Any]:
     return {"version": version, "objects": [{"name": "mug", "category": "mug", "points": [point], "crop": box}]}
 
 
-def test_a_crop_box_is_read_from_version_3() -> None:
+def test_a_crop_box_is_read_from_a_version_3_file() -> None:
     assert parse_prompts(document()).objects[0].crop == UPPER
 
 
@@ -85,6 +85,6 @@ def test_a_crop_box_is_read_from_version_3() -> None:
         (document(edges_m=[[0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 0.001]]), "a crop box's edge of 0.001 m found"),
     ],
 )
-def test_what_is_no_crop_box_is_refused(written: dict[str, Any], message: str) -> None:
+def test_invalid_crop_boxes_are_rejected(written: dict[str, Any], message: str) -> None:
     with pytest.raises(PromptError, match=message):
         checked_prompts(written)

@@ -20,14 +20,14 @@ def box(left: int, top: int, right: int, bottom: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("side", [20, 60, 200])
-def test_it_is_the_overlap_of_a_box_whose_border_is_off_all_around(side: int) -> None:
+def test_expected_iou_equals_the_iou_with_a_uniformly_grown_box(side: int) -> None:
     truth, grown = box(200, 200, 200 + side, 200 + side), box(198, 198, 202 + side, 202 + side)
     with tuning(changed({"segment.expected_iou": {"slope": 1.0, "offset": 0.0}})):  # without the calibration map
         expected = expected_iou(truth, 1.0, FRAME, AT_2_M, border_m=0.008)  # 2 px
     assert expected == pytest.approx(mask_iou(truth, grown), abs=0.035)
 
 
-def test_borders_of_the_image_are_exact_and_hidden_things_are_trusted_less() -> None:
+def test_image_borders_raise_and_occlusion_lowers_expected_iou() -> None:
     inside, cut_off = box(200, 200, 260, 260), box(0, 200, 60, 260)
     assert expected_iou(cut_off, 1.0, FRAME, AT_2_M, 0.008) > expected_iou(inside, 1.0, FRAME, AT_2_M, 0.008)
     assert expected_iou(inside, 0.3, FRAME, AT_2_M, 0.008) < 0.95 * expected_iou(inside, 1.0, FRAME, AT_2_M, 0.008)
@@ -35,6 +35,6 @@ def test_borders_of_the_image_are_exact_and_hidden_things_are_trusted_less() -> 
     assert expected_iou(np.zeros((480, 640), bool), 1.0, FRAME, AT_2_M, 0.008) == 0.0
 
 
-def test_of_a_size_that_nothing_of_its_category_has_little_is_expected() -> None:
+def test_a_size_atypical_of_the_category_lowers_expected_iou() -> None:
     fits, does_not = (expected_iou(box(200, 200, 260, 260), 1.0, FRAME, AT_2_M, 0.008, fit) for fit in (1.0, 0.0))
     assert does_not < 0.5 < 0.8 < fits

@@ -6,7 +6,7 @@ from r2c2r_core.segment.occlusion import flood
 
 
 @pytest.mark.parametrize("masked", [False, True])
-def test_flooding_only_the_open_pixels_gives_the_watershed(masked: bool) -> None:
+def test_flooding_only_unlabelled_pixels_equals_the_full_watershed(masked: bool) -> None:
     rng = np.random.default_rng(2)
     ridges = rng.random((60, 80)).astype(np.float32)
     markers = np.zeros((60, 80), np.int32)

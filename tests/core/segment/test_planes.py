@@ -43,7 +43,7 @@ def only(regions: tuple[PlaneRegion, ...]) -> PlaneRegion:
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, 1.3, -2.0])
-def test_a_rectangle_is_found_where_it_is_however_the_room_is_turned(yaw: float) -> None:
+def test_a_rectangle_is_located_at_any_yaw_of_the_room(yaw: float) -> None:
     turn = rotation_about_z(yaw)
     shown = front()
     region = only(find_planes(surface(shown.vertices_world @ turn.T, shown.faces), CAMERAS @ turn.T))
@@ -55,14 +55,14 @@ def test_a_rectangle_is_found_where_it_is_however_the_room_is_turned(yaw: float)
 
 
 @pytest.mark.parametrize("yaw_deg", [0.5, 0.9, -0.6])
-def test_a_long_run_between_two_bins_of_yaw_is_one_region(yaw_deg: float) -> None:
+def test_a_long_run_between_two_yaw_bins_is_one_region(yaw_deg: float) -> None:
     turn = rotation_about_z(np.deg2rad(yaw_deg))
     shown = front(x=-4.0, width=8.0)
     region = only(find_planes(surface(shown.vertices_world @ turn.T, shown.faces), CAMERAS))
     assert region.width_m == pytest.approx(8.0, abs=2 * CELL_M)
 
 
-def test_noise_of_the_surface_averages_out_in_the_plane() -> None:
+def test_surface_noise_averages_out_in_the_fitted_plane() -> None:
     shown = front()
     noisy = shown.vertices_world + np.random.default_rng(3).normal(scale=[0, 0.003, 0], size=shown.vertices_world.shape)
     region = only(find_planes(surface(noisy, shown.faces), CAMERAS))
@@ -70,13 +70,13 @@ def test_noise_of_the_surface_averages_out_in_the_plane() -> None:
     assert abs(region.world_from_plane.translation[1]) < 1e-3
 
 
-def test_what_is_level_or_turned_away_from_every_camera_is_none() -> None:
+def test_horizontal_and_back_facing_surfaces_are_ignored() -> None:
     level = patch((0, 0, 0.9), (0.8, 0, 0), (0, 0.6, 0))
     assert find_planes(level, CAMERAS) == ()
     assert find_planes(front(), CAMERAS * [1, -1, 1]) == ()
 
 
-def test_fronts_eight_centimetres_apart_are_two_and_the_larger_is_first() -> None:
+def test_fronts_8_cm_apart_in_depth_are_two_planes_with_the_larger_first() -> None:
     regions = find_planes(together(front(width=0.5), front(x=0.7, y=0.08, width=0.9)), CAMERAS)
     assert [round(float(r.world_from_plane.translation[1]), 3) for r in regions] == [0.08, 0.0]
 
@@ -91,7 +91,7 @@ def frame(stile: float, y: float = 0.0) -> SceneSurface:
     )
 
 
-def test_a_panel_sunk_deep_in_a_frame_is_of_the_frames_plane() -> None:
+def test_a_deeply_recessed_panel_belongs_to_the_plane_of_its_frame() -> None:
     region = only(find_planes(together(frame(0.06), front(0.0, 0.032, 0.3, 0.6, 0.5)), CAMERAS))
     assert abs(region.world_from_plane.translation[1]) < 0.004
     assert region.supports(np.array([[0.3, 0.032, 0.55]]), 0.0)[0]  # a click in the middle of the panel
@@ -103,7 +103,7 @@ def framed_run(sunk_m: float) -> SceneSurface:
     return together(*(surface(part.vertices_world + np.array([0.68 * k, 0, 0]), part.faces) for k in range(3) for part in bay))
 
 
-def test_sunk_panels_are_of_their_frames_plane_though_the_plinth_below_is_at_their_depth() -> None:
+def test_recessed_panels_join_their_frame_despite_a_plinth_at_their_depth() -> None:
     run = together(framed_run(0.031), front(-0.04, 0.031, 0.21, 2.0, 0.05))
     regions = find_planes(run, CAMERAS)
     for middle in (0.3, 0.98, 1.66):
@@ -112,7 +112,7 @@ def test_sunk_panels_are_of_their_frames_plane_though_the_plinth_below_is_at_the
         assert abs(region.world_from_plane.translation[1]) < 0.004
 
 
-def test_the_plane_of_a_framed_run_is_its_frames_though_its_panels_are_larger() -> None:
+def test_a_framed_run_takes_the_plane_of_its_frame_not_of_its_panels() -> None:
     run = framed_run(0.011)
     noise = np.random.default_rng(4).normal(scale=[0, 0.0015, 0], size=run.vertices_world.shape)
     region = find_planes(surface(run.vertices_world + noise, run.faces), CAMERAS)[0]
@@ -121,7 +121,7 @@ def test_the_plane_of_a_framed_run_is_its_frames_though_its_panels_are_larger() 
 
 
 @pytest.mark.parametrize("before_m", [0.018, 0.03])
-def test_a_refrigerator_before_one_end_of_a_run_does_not_turn_its_plane(before_m: float) -> None:
+def test_a_protruding_refrigerator_does_not_rotate_the_plane_of_a_run(before_m: float) -> None:
     run, tall = front(width=1.9, height=0.7), front(x=1.9, y=-before_m, z=0.05, width=0.7, height=1.7)
     shown, turn = together(run, tall), rotation_about_z(np.deg2rad(0.45))  # between two bins of yaw
     noise = np.random.default_rng(5).normal(scale=[0, 0.002, 0], size=shown.vertices_world.shape)
@@ -132,13 +132,13 @@ def test_a_refrigerator_before_one_end_of_a_run_does_not_turn_its_plane(before_m
 
 
 @pytest.mark.parametrize("parts", [(frame(0.06), 0.07), (frame(0.02), 0.032), (front(-0.6, 0.0, 0.3, 0.6, 0.5), 0.032)])
-def test_what_lies_deeper_or_has_no_stiles_round_it_is_a_plane_of_its_own(parts: tuple[SceneSurface, float]) -> None:
+def test_deeper_panels_and_panels_without_stiles_are_separate_planes(parts: tuple[SceneSurface, float]) -> None:
     around, behind_m = parts
     regions = find_planes(together(around, front(0.0, behind_m, 0.3, 0.6, 0.5)), CAMERAS)
     assert any(abs(region.world_from_plane.translation[1] - behind_m) < 0.004 for region in regions)
 
 
-def test_a_gap_that_a_thing_in_front_leaves_is_bridged_and_a_wide_one_is_not() -> None:
+def test_an_occlusion_sized_gap_is_bridged_and_a_wide_gap_is_not() -> None:
     def count(gap_m: float) -> int:
         return len(find_planes(together(front(width=0.5), front(x=0.5 + gap_m, width=0.5)), CAMERAS))
 
@@ -146,7 +146,7 @@ def test_a_gap_that_a_thing_in_front_leaves_is_bridged_and_a_wide_one_is_not() -
     assert count(0.30) == 2
 
 
-def test_a_point_belongs_to_the_part_that_was_seen_within_reach() -> None:
+def test_only_points_near_the_observed_area_belong_to_a_region() -> None:
     region = only(find_planes(front(), CAMERAS))
     assert region.supports(region.points, 0.0).all()
     beside = np.array([[0.85, 0.0, 0.6], [1.1, 0.0, 0.6], [0.4, 0.0, 1.5]])
@@ -155,7 +155,7 @@ def test_a_point_belongs_to_the_part_that_was_seen_within_reach() -> None:
     assert region_at((region,), np.array([0.4, 0.30, 0.6])) is None
 
 
-def test_a_ray_meets_the_nearest_region_where_it_crosses_its_plane() -> None:
+def test_a_ray_hits_the_nearest_region_at_its_plane_intersection() -> None:
     near, far = front(width=0.5), front(x=-0.5, y=0.4, z=0.3, width=2.0)
     regions = find_planes(together(near, far), CAMERAS)
     for target in (np.array([0.25, 0.0, 0.6]), np.array([1.2, 0.4, 0.5])):

@@ -27,7 +27,7 @@ def written(tmp_path: Path, document: Any) -> Path:
     return path
 
 
-def test_a_good_file_is_read(tmp_path: Path) -> None:
+def test_a_valid_prompt_file_is_read(tmp_path: Path) -> None:
     prompts = read_prompts(written(tmp_path, {"version": 1, "objects": [OBJECT]}))
     assert prompts.objects[0].name == "drawer_1"
     assert prompts.objects[0].points == (PromptPoint(frame=60, x=100.0, y=50.5, label=1),)
@@ -93,7 +93,7 @@ def test_a_drawn_front_needs_no_click(tmp_path: Path) -> None:
         (r'{"version": 1, "objects": [{"name": "a", "category": "\ud800", "points": []}]}', "surrogate"),
     ],
 )
-def test_bad_files_are_refused_in_one_line(tmp_path: Path, document: Any, message: str) -> None:
+def test_invalid_prompt_files_are_rejected_with_a_one_line_message(tmp_path: Path, document: Any, message: str) -> None:
     with pytest.raises(PromptError) as caught:
         read_prompts(written(tmp_path, document))
     assert message in str(caught.value)
@@ -101,7 +101,7 @@ def test_bad_files_are_refused_in_one_line(tmp_path: Path, document: Any, messag
     assert "\n" not in str(caught.value)
 
 
-def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+def test_a_missing_prompt_file_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(PromptError, match="no such file"):
         read_prompts(tmp_path / "none.json")
 
@@ -122,14 +122,12 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
         (PromptPoint(frame=60, x=10.0, y=10.0, label=0), "drawer: 1 clicks off it found"),
     ],
 )
-def test_clicks_that_the_capture_cannot_serve_are_refused(
-    boxes: tuple[Capture, Truth], point: PromptPoint, message: str
-) -> None:
+def test_clicks_outside_the_capture_are_rejected(boxes: tuple[Capture, Truth], point: PromptPoint, message: str) -> None:
     with pytest.raises(PromptError, match=message):
         check_prompts(boxes[0], Prompts(objects=(prompt("drawer", "drawer", point),)))
 
 
-def test_no_objects_and_repeated_names_are_refused(boxes: tuple[Capture, Truth]) -> None:
+def test_missing_objects_and_duplicate_names_are_rejected(boxes: tuple[Capture, Truth]) -> None:
     with pytest.raises(PromptError, match="no objects found"):
         check_prompts(boxes[0], Prompts(objects=()))
     twice = prompt("drawer", "drawer", PromptPoint(frame=60, x=10.0, y=10.0, label=1))
@@ -137,7 +135,7 @@ def test_no_objects_and_repeated_names_are_refused(boxes: tuple[Capture, Truth])
         check_prompts(boxes[0], Prompts(objects=(twice, twice)))
 
 
-def test_a_name_that_begins_with_a_digit_is_refused_with_one_that_would_do(boxes: tuple[Capture, Truth]) -> None:
+def test_a_name_with_a_leading_digit_is_rejected_with_a_valid_suggestion(boxes: tuple[Capture, Truth]) -> None:
     numbered = prompt("2_door_cabinet_1", "cabinet", PromptPoint(frame=60, x=10.0, y=10.0, label=1))
     with pytest.raises(PromptError, match="begins with a digit") as caught:
         check_prompts(boxes[0], Prompts(objects=(numbered,)))
@@ -147,7 +145,7 @@ def test_a_name_that_begins_with_a_digit_is_refused_with_one_that_would_do(boxes
 @pytest.mark.parametrize(
     ("names", "words"), [(("Con",), "device name on Windows"), (("door_1", "Door_1"), "two objects named")]
 )
-def test_names_that_a_file_system_takes_for_another_are_refused(
+def test_reserved_names_and_names_that_differ_only_in_case_are_rejected(
     boxes: tuple[Capture, Truth], names: tuple[str, ...], words: str
 ) -> None:
     point = PromptPoint(frame=60, x=10.0, y=10.0, label=1)

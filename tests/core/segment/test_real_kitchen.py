@@ -88,7 +88,7 @@ QUICK = ("door_3", "controller")  # a front and the fastest thing; benchmarks/se
     "drawn",
     [pytest.param(d, id=d["name"], marks=() if d["name"] in QUICK else pytest.mark.slow) for d in OUTLINES],
 )
-def test_one_click_gives_the_outlines_drawn_by_hand(session: GeometricSession, drawn: dict[str, Any]) -> None:
+def test_one_click_reproduces_hand_drawn_outlines(session: GeometricSession, drawn: dict[str, Any]) -> None:
     frame, x, y = drawn["click"]
     click = PromptPoint(frame=frame, x=float(x), y=float(y), label=1)
     prompt = ObjectPrompt(name=drawn["name"], category=drawn["category"], points=(click,))
@@ -113,7 +113,7 @@ def test_doors_have_catalogue_widths(session: GeometricSession, name: str, width
 
 
 @pytest.mark.parametrize("names", [("door_4", "door_5"), pytest.param(None, marks=pytest.mark.slow, id="all")])
-def test_nothing_is_said_to_move_where_everything_is_closed(session: GeometricSession, names: tuple[str, ...] | None) -> None:
+def test_no_motion_is_reported_where_everything_is_closed(session: GeometricSession, names: tuple[str, ...] | None) -> None:
     asked = [prompt for prompt in read_prompts(PROMPTS).objects if names is None or prompt.name in names]
     assert asked
     for prompt in asked:

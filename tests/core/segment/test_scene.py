@@ -29,24 +29,24 @@ def at(column: float, *, gap: int, far_m: float = FAR_M) -> float | None:
     return Scene.depth_at_step(cast(Scene, scene), 0, column * SCALE, 300.0)
 
 
-def test_a_pixel_in_the_gap_between_two_surfaces_is_of_the_nearer_one() -> None:
+def test_a_gap_pixel_takes_the_depth_of_the_surface_it_is_nearer_to() -> None:
     assert at(STEP_COLUMN + 1.5, gap=5) == pytest.approx(NEAR_M)
     assert at(STEP_COLUMN + 4.0, gap=5) == pytest.approx(FAR_M)
 
 
-def test_a_pixel_that_has_depth_asks_nobody() -> None:
+def test_a_pixel_with_sensor_depth_is_not_filled_in() -> None:
     assert at(STEP_COLUMN - 0.5, gap=5) is None
 
 
-def test_a_hole_in_one_surface_is_no_gap_between_two() -> None:
+def test_a_hole_within_one_surface_is_not_treated_as_a_gap() -> None:
     assert at(STEP_COLUMN + 1.5, gap=5, far_m=NEAR_M + 0.02) is None
 
 
-def test_a_wide_hole_returns_no_light() -> None:
+def test_a_wide_hole_is_not_treated_as_a_gap() -> None:
     assert at(STEP_COLUMN + 20.0, gap=40) is None
 
 
-def test_the_corner_of_a_picture_is_answered() -> None:
+def test_a_hole_at_the_image_corner_gives_no_depth() -> None:
     assert at(255.9, gap=136) is None
 
 
@@ -85,7 +85,7 @@ def with_hob(*, opening: bool) -> Capture:
 
 
 @pytest.mark.parametrize(("opening", "height_m"), [(False, TABLE_M), (True, 0.0)])
-def test_a_click_on_a_glass_hob_is_on_the_worktop_unless_frames_look_through(
+def test_a_glass_hob_click_hits_the_worktop_unless_frames_see_through_it(
     opening: bool, height_m: float, tmp_path: Path
 ) -> None:
     capture = with_hob(opening=opening)

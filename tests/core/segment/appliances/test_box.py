@@ -19,7 +19,7 @@ def lines(count: int, length: int, scores: dict[int, float]) -> Evidence:
     return Evidence(score, np.ones_like(score, bool), BLOCK)
 
 
-def test_depth_that_goes_on_above_a_refrigerator_does_not_outvote_the_clearer_of_two_lines() -> None:
+def test_depth_above_a_refrigerator_does_not_outvote_its_clearer_top_edge() -> None:
     """The worktop or shadow gap over it lies in its plane, and ends in a line that is nearly as clear."""
     seen = np.zeros((400, 160), bool)
     seen[ABOVE:BOTTOM, LEFT:RIGHT] = True
@@ -48,7 +48,7 @@ def corners(cell: Any) -> list[float]:
     return [cell.left, cell.top, cell.right, cell.bottom]
 
 
-def test_lines_of_a_wall_that_depth_sees_past_the_front_are_not_a_microwaves() -> None:
+def test_wall_lines_behind_the_front_plane_are_not_edges_of_a_microwave() -> None:
     """Its left and upper edge are fainter than where the wall's tiles end, and the larger size is the more usual one."""
     run = on_a_wall({40: 4.0, 70: 3.0, 150: 4.0}, {30: 4.0, 60: 3.0, 104: 4.0}, (slice(62, 104), slice(72, 150)))
     past = np.zeros_like(run.seen)
@@ -58,7 +58,7 @@ def test_lines_of_a_wall_that_depth_sees_past_the_front_are_not_a_microwaves() -
     np.testing.assert_allclose(corners(found), [70, 60, 150, 104], atol=1.0)
 
 
-def test_a_line_that_shows_on_one_side_of_a_click_only_is_looked_at() -> None:
+def test_an_edge_that_shows_on_only_one_side_of_the_click_is_used() -> None:
     """The click lies at the left end; many fainter lines of the wall go on to either side of it."""
     run = on_a_wall({70: 4.0, 150: 4.0}, {104: 4.0}, (slice(62, 104), slice(72, 150)))
     for row in [*range(1, 56, 3), *range(108, 198, 3)]:
@@ -70,7 +70,7 @@ def test_a_line_that_shows_on_one_side_of_a_click_only_is_looked_at() -> None:
     np.testing.assert_allclose(corners(found), [70, 60, 150, 104], atol=1.0)
 
 
-def test_a_front_cut_just_under_the_least_size_is_possible() -> None:
+def test_a_front_slightly_below_the_minimum_size_is_accepted() -> None:
     least = round(category_of("microwave").height.low / CELL_M)
     top = 104 - least + 2  # 10 mm less
     run = on_a_wall({70: 4.0, 150: 4.0}, {20: 3.0, top: 4.0, 104: 4.0}, (slice(top, 104), slice(70, 150)))
@@ -80,7 +80,7 @@ def test_a_front_cut_just_under_the_least_size_is_possible() -> None:
     np.testing.assert_allclose(corners(found), [70, top, 150, 104], atol=1.0)
 
 
-def test_what_depth_saw_it_stand_on_is_its_lower_edge_though_its_doors_edge_is_clearer() -> None:
+def test_the_support_height_wins_over_a_clearer_door_edge() -> None:
     support = 110.0
     run = on_a_wall({70: 4.0, 150: 4.0}, {60: 4.0, 104: 4.0}, (slice(62, 104), slice(72, 150)))
     clicks, none = np.array([[100.0, 85.0]]), np.zeros((0, 2))

@@ -18,25 +18,25 @@ def candidates(places_px: list[float], contrasts: list[float]) -> EdgeView:
     return EdgeView(CAMERA, HERE, np.array([0]), one, np.array([[1.0, 0.0]]), np.array([0.002]), peaks, heights)
 
 
-def test_a_much_clearer_line_farther_off_does_not_outweigh_the_edge_at_its_place() -> None:
+def test_a_clear_distant_line_does_not_outweigh_a_nearby_edge() -> None:
     """White keys beside the dark edge of a door: what is clear enough to be an edge is no more an edge when it is clearer."""
     found = associate(np.zeros(1), candidates([0.5, 10.0], [12.0, 60.0]), 0.005)
     assert found.target_px[0] == pytest.approx(0.5, abs=0.4)
 
 
-def test_where_no_colour_changes_the_photograph_says_nothing() -> None:
+def test_a_candidate_without_colour_change_has_zero_weight() -> None:
     found = associate(np.zeros(1), candidates([3.0], [0.0]), 0.005)
     assert found.weight[0] == 0.0
     assert found.gain[0] == 0.0
 
 
-def test_candidates_count_less_the_farther_they_are_and_more_at_a_wider_spread() -> None:
+def test_candidate_gain_falls_with_distance_and_grows_with_spread() -> None:
     near, far = (associate(np.zeros(1), candidates([at], [20.0]), 0.005).gain[0] for at in (1.0, 8.0))
     assert near > far
     assert associate(np.zeros(1), candidates([8.0], [20.0]), 0.02).gain[0] > far
 
 
-def test_only_edges_of_faces_that_the_camera_looks_at_are_asked_for() -> None:
+def test_only_edges_of_visible_faces_are_selected() -> None:
     left, right = (look_across(TRUE, [photo(eye)], HERE, 0.02)[0] for eye in (EYES[0], EYES[-1]))
     assert BACK_LEFT & set(left.parts.tolist())
     assert not BACK_RIGHT & set(left.parts.tolist())
@@ -44,12 +44,12 @@ def test_only_edges_of_faces_that_the_camera_looks_at_are_asked_for() -> None:
     assert not BACK_LEFT & set(right.parts.tolist())
 
 
-def test_a_photograph_from_behind_or_with_something_in_front_shows_none() -> None:
+def test_views_from_behind_and_occluded_views_give_no_edges() -> None:
     assert look_across(TRUE, [photo((0.3, 1.6, 0.4))], HERE, 0.02) == []
     assert look_across(TRUE, [photo(EYES[0], hidden=True)], HERE, 0.02) == []
 
 
-def test_edges_are_displaced_as_far_as_the_box_is() -> None:
+def test_edge_displacement_equals_the_displacement_of_the_box() -> None:
     view = look_across(TRUE, [photo(EYES[3])], HERE, 0.02)[0]
     moved = TRUE.copy()
     moved[LEFT] -= 0.01
@@ -59,7 +59,7 @@ def test_edges_are_displaced_as_far_as_the_box_is() -> None:
     np.testing.assert_allclose(displacements(edge_parts(TRUE), view), 0.0, atol=1e-9)
 
 
-def test_many_photographs_of_an_edge_count_as_the_few_that_err_on_their_own() -> None:
+def test_the_total_weight_of_many_views_of_an_edge_is_capped() -> None:
     views = look_across(TRUE, [photo(eye) for eye in EYES], HERE, 0.02)
     total = np.zeros(24)
     for view, counted in zip(views, shares(views, 4.0), strict=True):

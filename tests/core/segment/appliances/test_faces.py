@@ -46,7 +46,7 @@ def scene_of(*sheets: tuple[np.ndarray, np.ndarray]) -> Scene:
     return cast(Scene, SimpleNamespace(parts=parts_of(surface)))
 
 
-def test_patches_know_their_faces() -> None:
+def test_patches_are_assigned_to_the_face_they_lie_on() -> None:
     found = patches_on(
         DEEP,
         scene_of(
@@ -63,12 +63,12 @@ def test_patches_know_their_faces() -> None:
         np.testing.assert_allclose(found.points[on][:, axis], at, atol=1e-6)
 
 
-def test_depth_on_the_front_ends_to_the_left_and_right_unless_it_goes_on() -> None:
+def test_depth_on_the_front_has_an_end_only_where_depth_stops() -> None:
     front = sheet(1, 0.0, (-0.24, 0.33), (-0.14, 0.14), -1)
     found = patches_on(DEEP, scene_of(front), HERE).ends
     assert found.keys() == {LEFT}
     assert found[LEFT] == pytest.approx(-0.24, abs=CELL_M)
 
 
-def test_a_face_of_which_depth_saw_next_to_nothing_is_left_out() -> None:
+def test_a_face_with_almost_no_depth_has_no_patches() -> None:
     assert not len(patches_on(DEEP, scene_of(sheet(0, 0.25, (0.1, 0.13), (0.0, 0.03), 1)), HERE).points)

@@ -50,19 +50,19 @@ def asked_for(
     return asked[0]
 
 
-def test_a_click_on_its_front_means_the_front() -> None:
+def test_a_click_on_the_front_selects_the_front() -> None:
     assert asked_for(np.array([0.1, 0.0, 1.0])) is FRONT
 
 
-def test_a_click_on_its_side_means_the_front_before_it_and_not_the_rounded_edge() -> None:
+def test_a_click_on_the_side_selects_the_front_and_not_the_rounded_edge() -> None:
     assert asked_for(np.array([-0.32, 0.12, 0.5])) is FRONT
 
 
-def test_a_click_on_its_rounded_edge_means_the_front() -> None:
+def test_a_click_on_the_rounded_edge_selects_the_front() -> None:
     assert asked_for(np.array([-0.30, 0.02, 0.5])) is FRONT
 
 
-def test_a_side_looked_at_more_squarely_is_not_the_front_where_the_clicked_plane_is_as_wide_as_one() -> None:
+def test_a_wide_clicked_plane_wins_over_a_side_viewed_more_squarely() -> None:
     wide = plane((0.0, 0.0, 0.87), (0.0, -1.0), 0.91, 1.74)
     beside = plane((-0.46, 0.33, 0.87), (-1.0, 0.0), 0.68, 1.74)
     clicked = np.array([-0.3, 0.0, 1.0])

@@ -30,7 +30,7 @@ def solved(
     return solve(evidence, photos, world_from_front or FRONT_POSE)
 
 
-def test_top_and_back_are_found_from_a_line_of_the_front_and_the_depth_of_the_wall() -> None:
+def test_top_and_back_converge_from_a_wrong_line_and_the_wall_depth() -> None:
     start = TRUE.copy()
     start[[TOP, BACK]] = LINE_Z, 0.42
     found = solved(start, [photo(eye) for eye in EYES])
@@ -38,7 +38,7 @@ def test_top_and_back_are_found_from_a_line_of_the_front_and_the_depth_of_the_wa
     assert found.box[BACK] == pytest.approx(BACK_M, abs=0.006)  # seen at a grazing angle
 
 
-def test_depths_that_are_unlike_are_judged_by_their_edges_at_the_finest_spread(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_different_depths_are_compared_by_edges_at_the_finest_spread(monkeypatch: pytest.MonkeyPatch) -> None:
     """At the widest one, a shadow on the wall behind is the likelier back."""
 
     def annealed(_: Evidence, __: list[Photo], ___: Rigid3, box: np.ndarray, spreads_m: tuple[float, ...]) -> Solution:
@@ -52,7 +52,7 @@ def test_depths_that_are_unlike_are_judged_by_their_edges_at_the_finest_spread(m
 
 
 @pytest.mark.parametrize("turn_deg", [1.4, -1.1])
-def test_edges_tell_a_turn_that_depth_missed(turn_deg: float) -> None:
+def test_photo_edges_correct_yaw_and_sides_of_the_box(turn_deg: float) -> None:
     """And where its front and sides are, from a guess a centimetre off."""
     turn, start = np.radians(turn_deg), TRUE.copy()
     start[[LEFT, RIGHT]] = LEFT_M + 0.004, RIGHT_M - 0.004
@@ -63,19 +63,19 @@ def test_edges_tell_a_turn_that_depth_missed(turn_deg: float) -> None:
     assert found.box[RIGHT] == pytest.approx(RIGHT_M - 0.006, abs=PIXEL_M)
 
 
-def test_a_box_that_stands_where_it_was_thought_stays() -> None:
+def test_a_correct_initial_box_stays_in_place() -> None:
     found = solved(TRUE, [photo(eye) for eye in EYES])
     assert abs(found.box[YAW]) < np.radians(0.15)
     np.testing.assert_allclose(found.box[1:5], TRUE[1:5], atol=PIXEL_M)
 
 
-def test_a_white_box_before_a_white_wall_keeps_a_depth_it_does_not_claim_to_know() -> None:
+def test_depth_of_a_white_box_before_a_white_wall_is_uncertain() -> None:
     found = solved(TRUE, [photo(eye, 200, side_grey=200, tiles=False) for eye in EYES])
     assert depth_sigma(found) > tuned(Params).sure * KIND.depth.usual * KIND.depth.spread
     assert depth_sigma(solved(TRUE, [photo(eye) for eye in EYES])) < 0.01
 
 
-def test_edges_behind_something_nearer_say_nothing() -> None:
+def test_occluded_edges_do_not_move_the_box() -> None:
     start = TRUE.copy()
     start[BACK] = KIND.depth.usual
     found = solved(start, [photo(eye, hidden=True) for eye in EYES])
@@ -83,7 +83,7 @@ def test_edges_behind_something_nearer_say_nothing() -> None:
 
 
 @pytest.mark.parametrize("off_m", [0.045, -0.02])
-def test_a_box_stands_on_the_support_near_its_lower_edge(off_m: float) -> None:
+def test_a_lower_edge_near_the_support_snaps_to_the_support(off_m: float) -> None:
     """The line taken for its lower edge is that of its window, or a seam of the worktop."""
     start = TRUE.copy()
     start[BOTTOM] = TRUE[BOTTOM] + off_m
@@ -91,7 +91,7 @@ def test_a_box_stands_on_the_support_near_its_lower_edge(off_m: float) -> None:
 
 
 @pytest.mark.parametrize("back_m", [0.30, 0.42])
-def test_a_box_ends_where_depth_begins_to_pass_its_sides(back_m: float) -> None:
+def test_the_rear_of_a_box_is_where_depth_starts_to_pass_its_sides(back_m: float) -> None:
     evidence = Evidence(TRUE, KIND, NOTHING, WALL_Y, None, 0.0085, np.array([[0.355, 0.365]]))
     start = TRUE.copy()
     start[BACK] = back_m
@@ -99,25 +99,25 @@ def test_a_box_ends_where_depth_begins_to_pass_its_sides(back_m: float) -> None:
     assert found.box[BACK] == pytest.approx(BACK_M, abs=0.006)
 
 
-def test_a_box_that_hangs_keeps_its_lower_edge() -> None:
+def test_a_hanging_box_keeps_its_lower_edge() -> None:
     hanging = solved(TRUE, [], support_m=float(TRUE[BOTTOM]) - 0.5)
     assert hanging.box[BOTTOM] == pytest.approx(TRUE[BOTTOM], abs=0.003)
 
 
 @pytest.mark.parametrize("short_m", [0.02, 0.045])
-def test_depth_beyond_a_line_of_the_front_leads_to_its_edge(short_m: float) -> None:
+def test_depth_beyond_a_line_on_the_front_moves_the_side_to_the_true_edge(short_m: float) -> None:
     start, seen = TRUE.copy(), Patches(*NOTHING[:3], {RIGHT: RIGHT_M - 0.01})
     start[RIGHT] = RIGHT_M - short_m
     assert solved(start, [photo(eye) for eye in EYES], patches=seen).box[RIGHT] == pytest.approx(RIGHT_M, abs=PIXEL_M)
 
 
-def test_a_front_without_depth_beside_its_edge_keeps_it() -> None:
+def test_an_edge_without_depth_beside_it_stays_in_place() -> None:
     dark = Patches(*NOTHING[:3], {LEFT: LEFT_M + 0.3})
     assert solved(TRUE, [photo(eye) for eye in EYES], patches=dark).box[LEFT] == pytest.approx(LEFT_M, abs=PIXEL_M)
 
 
 @pytest.mark.parametrize("turn_deg", [-4.0, 0.0, 3.0])
-def test_a_side_in_depth_tells_how_a_body_is_turned_whose_front_is_mostly_glass(turn_deg: float) -> None:
+def test_depth_of_a_side_determines_the_yaw_of_a_mostly_glass_appliance(turn_deg: float) -> None:
     """A strip of keys and the right side, 3 mm rough; no photographs."""
     rng, turn = np.random.default_rng(1), np.radians(turn_deg)
     keys = np.column_stack([rng.uniform(0.15, 0.25, 40), np.zeros(40), rng.uniform(-0.15, 0.15, 40)])
@@ -131,7 +131,7 @@ def test_a_side_in_depth_tells_how_a_body_is_turned_whose_front_is_mostly_glass(
     assert found.box[RIGHT] == pytest.approx(0.25, abs=0.004)
 
 
-def test_the_covariance_is_of_centre_yaw_and_sizes() -> None:
+def test_the_covariance_covers_centre_yaw_and_sizes() -> None:
     """By perturbing the parameters: the box of a turned front, 1 mm and 1 mrad."""
     box = np.array([0.3, -0.2, 0.4, 0.05, 0.5, -0.1, 0.4])
     world_from_front = Rigid3(rotation_about_z(0.7), np.array([1.0, 2.0, 0.5]))
@@ -147,7 +147,7 @@ def test_the_covariance_is_of_centre_yaw_and_sizes() -> None:
     np.testing.assert_allclose(covariance, slope @ np.diag(sigma**2) @ slope.T, atol=1e-12)
 
 
-def test_more_depth_of_a_side_means_less_spread() -> None:
+def test_more_depth_points_on_a_side_reduce_its_sigma() -> None:
     def side(count: int) -> Patches:
         points = np.column_stack([np.full(count, RIGHT_M), np.linspace(0.04, 0.3, count), np.zeros(count)])
         return on_the_right(points)

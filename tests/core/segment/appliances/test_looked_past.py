@@ -9,7 +9,7 @@ from r2c2r_core.segment.planes import region_at
 from tests.core.segment.scenes import FRONT_Y, TOP_M
 
 
-def test_nothing_is_above_the_worktop_or_under_the_floor_and_the_doors_are_there(session: GeometricSession) -> None:
+def test_frames_see_past_the_front_plane_except_on_the_doors(session: GeometricSession) -> None:
     on_door = np.array([0.25, FRONT_Y, 0.5])
     region = region_at(session.planes, on_door)
     assert region is not None

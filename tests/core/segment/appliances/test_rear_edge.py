@@ -22,20 +22,20 @@ def ends(scene: Scene, box: np.ndarray = BOX) -> np.ndarray:
     return rear_edge(box, category_of("microwave").depth, 0.60, scene.frames, scene, FRONT)
 
 
-def test_an_appliance_ends_where_the_wall_shows_past_its_sides(scene: Scene) -> None:
+def test_the_rear_edge_is_where_the_wall_shows_past_the_sides(scene: Scene) -> None:
     found = ends(scene)
     assert len(found)
     assert found.mean(axis=1) == pytest.approx(0.34, abs=0.015)
 
 
-def test_sides_that_no_frame_looks_past_have_no_end(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sides_without_depth_past_them_have_no_rear_edge(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     blind = {frame.index: np.zeros_like(scene.depth(frame.index)) for frame in scene.frames}
     monkeypatch.setattr(Scene, "depth", lambda _, frame: blind[frame])
     assert not len(ends(scene))
 
 
 @pytest.mark.parametrize(("wall_m", "ends"), [(0.30, False), (0.36, True)])
-def test_a_face_that_ends_at_the_wall_has_no_rear_edge_before_it(wall_m: float, ends: bool) -> None:
+def test_a_side_that_ends_at_the_wall_has_no_rear_edge(wall_m: float, ends: bool) -> None:
     """A refrigerator stands against the wall: rays beyond its side meet the wall where that begins."""
     y = np.arange(-0.2, 0.40, 0.001)
     noise = np.random.default_rng(0).normal(0, 0.002, len(y))

@@ -29,13 +29,13 @@ def front(*rows: int) -> Front:
     return Front(cast(Run, run), FRONT, None, 0.0)
 
 
-def test_of_several_lines_the_likeliest_comes_first() -> None:
+def test_candidate_seams_are_sorted_by_likelihood() -> None:
     assert drawer_seams(front(FAINTER, LIKELIER)) == pytest.approx([(180 - LIKELIER) * CELL_M, (180 - FAINTER) * CELL_M])
 
 
-def test_lines_beside_each_other_are_one_seam() -> None:
+def test_adjacent_lines_are_merged_into_one_seam() -> None:
     assert drawer_seams(front(LIKELIER - 2, LIKELIER)) == pytest.approx([(180 - LIKELIER) * CELL_M], abs=2 * CELL_M)
 
 
-def test_no_drawer_is_as_low_or_as_high_as_those() -> None:
+def test_lines_too_low_or_too_high_for_a_drawer_are_ignored() -> None:
     assert drawer_seams(front(30, 340)) == ()

@@ -37,16 +37,16 @@ def run() -> Run:
     return cast(Run, SimpleNamespace(odds=odds, mosaic=mosaic, grid=SimpleNamespace(cell_m=CELL_M)))
 
 
-def test_clear_edges_are_right() -> None:
+def test_clear_edges_give_high_confidence() -> None:
     assert edges_right(run(), PANEL) > 0.9
 
 
 @pytest.mark.parametrize("why", FAINT)
-def test_a_front_is_doubted_where(why: str) -> None:
+def test_weak_evidence_lowers_the_confidence_of_a_front(why: str) -> None:
     faint = run()
     FAINT[why](faint)
     assert 1 - edges_right(faint, PANEL) > 2 * (1 - edges_right(run(), PANEL))
 
 
-def test_a_panel_may_end_where_the_mosaic_ends() -> None:
+def test_a_panel_that_fills_the_mosaic_has_low_but_nonzero_confidence() -> None:
     assert 0 < edges_right(run(), Cell(0, 0, COLUMNS * STEP, ROWS * STEP)) < 0.5

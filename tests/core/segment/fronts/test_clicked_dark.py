@@ -55,7 +55,7 @@ FACE, REAR = _plane(0.0, hole=True), _plane(THICKNESS_M + 0.45, hole=False)
 CLICK = PromptPoint(frame=1, x=96.0, y=76.0, label=1)
 
 
-def test_a_click_on_black_glass_lies_on_the_plane_of_what_is_round_it() -> None:
+def test_a_click_on_black_glass_lies_on_the_plane_of_its_surroundings() -> None:
     place = dark_place(cast(Scene, Film(glass=True)), (REAR, FACE), CLICK)
     assert place is not None
     local = LEAF.world_from_front.inverse.apply(place)
@@ -63,20 +63,20 @@ def test_a_click_on_black_glass_lies_on_the_plane_of_what_is_round_it() -> None:
     assert (np.abs(local[[0, 2]]) < LEAF.half_m).all()
 
 
-def test_a_click_that_has_depth_is_where_that_is() -> None:
+def test_a_click_with_sensor_depth_gets_no_dark_place() -> None:
     assert dark_place(cast(Scene, Film(glass=False)), (REAR, FACE), CLICK) is None
 
 
-def test_a_click_in_the_gap_at_a_silhouette_is_on_no_black_glass(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_click_in_a_silhouette_gap_is_not_taken_for_black_glass(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Film, "depth_at_step", lambda *_: 2.0)
     assert dark_place(cast(Scene, Film(glass=True)), (REAR, FACE), CLICK) is None
 
 
-def test_a_hole_that_no_plane_surrounds_tells_nothing() -> None:
+def test_a_depth_hole_without_a_surrounding_plane_gives_no_place() -> None:
     assert dark_place(cast(Scene, Film(glass=True)), (REAR,), CLICK) is None
 
 
-def test_a_hole_that_goes_on_beyond_the_picture_is_no_front_s() -> None:
+def test_a_depth_hole_that_leaves_the_image_gives_no_place() -> None:
     corner = PromptPoint(frame=1, x=2.0, y=2.0, label=1)
     assert dark_place(cast(Scene, Film(glass=False, dark_corner=True)), (REAR, FACE), corner) is None
 
@@ -92,14 +92,14 @@ def _band(top_m: float, bottom_m: float) -> PlaneRegion:
 ABOVE, BELOW = _band(HEIGHT_M / 2, LEAF.half_m[1]), _band(-LEAF.half_m[1], -HEIGHT_M / 2)
 
 
-def test_black_glass_between_two_parts_of_a_plane_is_surrounded_by_both() -> None:
+def test_black_glass_between_two_coplanar_regions_lies_on_their_plane() -> None:
     film = cast(Scene, Film(glass=True))
     place = dark_place(film, (REAR, ABOVE, BELOW), CLICK)
     assert place is not None
     assert abs(LEAF.world_from_front.inverse.apply(place[None])[0, 1]) < 1e-6
 
 
-def test_a_front_may_go_on_beyond_its_plane_only_where_that_has_no_depth() -> None:
+def test_a_front_extends_beyond_its_plane_only_over_missing_depth() -> None:
     glass, wood = (cast(Scene, Film(glass=shown)) for shown in (True, False))
     under = ABOVE.world_from_plane.apply(np.array([0.0, 0.0, -ABOVE.height_m / 2]))  # its lower border
     oven = category_of("oven")

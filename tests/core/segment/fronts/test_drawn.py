@@ -24,7 +24,7 @@ def prompted(category: str, front: DrawnFront) -> ObjectPrompt:
     return ObjectPrompt(name="it", category=category, points=(), front=front)
 
 
-def test_a_drawn_front_is_the_rectangle_to_the_tenth_of_a_millimetre(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_drawn_front_keeps_its_rectangle_within_a_tenth_of_a_millimetre(session: GeometricSession, boxes: Boxes) -> None:
     # where there is no line: half of one door and half of the next
     front = drawn(boxes[0], 0.251, 0.7533, 0.1307, 0.8011)
     track = session.track(prompted("cabinet", front))
@@ -36,7 +36,7 @@ def test_a_drawn_front_is_the_rectangle_to_the_tenth_of_a_millimetre(session: Ge
     assert track.kind == "front"
 
 
-def test_its_masks_are_what_is_visible_of_it(session: GeometricSession, boxes: Boxes) -> None:
+def test_masks_of_a_drawn_front_cover_only_its_visible_part(session: GeometricSession, boxes: Boxes) -> None:
     capture, truth = boxes
     left, width = DOORS["door_b"]
     track = session.track(prompted("cabinet", drawn(capture, left, left + width, BOTTOM_M, TOP_M)))
@@ -46,7 +46,7 @@ def test_its_masks_are_what_is_visible_of_it(session: GeometricSession, boxes: B
         assert mask_iou(mask, truth["door_b"][frame.index]) > 0.94  # without the post before it
 
 
-def test_its_handle_is_found_or_drawn_or_none(session: GeometricSession, boxes: Boxes) -> None:
+def test_the_handle_of_a_drawn_front_is_found_drawn_or_omitted(session: GeometricSession, boxes: Boxes) -> None:
     left, width, bottom, height = DRAWERS["drawer_mid"]
     front = drawn(boxes[0], left, left + width, bottom, bottom + height)
     found = session.find(prompted("drawer", front)).panel()
@@ -63,7 +63,7 @@ def test_its_handle_is_found_or_drawn_or_none(session: GeometricSession, boxes: 
     assert bare.handle is None
 
 
-def test_clicks_do_not_move_it(session: GeometricSession, boxes: Boxes) -> None:
+def test_clicks_do_not_move_a_drawn_front(session: GeometricSession, boxes: Boxes) -> None:
     front = drawn(boxes[0], 0.25, 0.75, 0.2, 0.8)
     clicked = replace(prompted("cabinet", front), points=(click_on(boxes[0], (1.2, FRONT_Y, 0.4), 60),))
     panel = session.find(clicked).panel()
@@ -71,24 +71,24 @@ def test_clicks_do_not_move_it(session: GeometricSession, boxes: Boxes) -> None:
     assert panel.width_m == pytest.approx(0.5, abs=1e-4)
 
 
-def test_one_where_nothing_was_seen_is_told(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_drawn_front_seen_in_no_frame_raises(session: GeometricSession, boxes: Boxes) -> None:
     with pytest.raises(ObjectNotSeen, match="seen in 0 of"):
         session.track(prompted("cabinet", drawn(boxes[0], 40.0, 40.5, 0.2, 0.8)))
 
 
-def test_a_thing_has_no_drawn_front(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_drawn_front_on_a_thing_is_rejected(session: GeometricSession, boxes: Boxes) -> None:
     with pytest.raises(PromptError, match="a front drawn of a 'bottle' found"):
         session.find(prompted("bottle", drawn(boxes[0], 0.25, 0.75, 0.2, 0.8)))
 
 
-def test_an_appliance_has_the_box_behind_what_was_drawn(session: GeometricSession, boxes: Boxes) -> None:
+def test_an_appliance_gets_a_box_behind_its_drawn_front(session: GeometricSession, boxes: Boxes) -> None:
     track = session.track(prompted("refrigerator", drawn(boxes[0], 0.25, 0.75, 0.2, 0.8)))
     assert track.kind == "appliance"
     assert track.box is not None
     assert track.box.dimensions_m[[0, 2]] == pytest.approx([0.5, 0.6], abs=1e-4)
 
 
-def test_elevations_are_to_scale_in_the_recordings_own_world(session: GeometricSession, boxes: Boxes) -> None:
+def test_elevations_are_to_scale_in_capture_coordinates(session: GeometricSession, boxes: Boxes) -> None:
     capture = boxes[0]
     first = next(session.elevations())
     lefts = np.array(sorted({cell[0] for cell in first.cells}))[:, None] * first.cell_m

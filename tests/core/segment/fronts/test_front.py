@@ -38,7 +38,7 @@ def test_one_click_measures_a_door_within_3_mm(session: GeometricSession, boxes:
     assert np.sign(panel.handle.centre[0]) == (-1 if name == "door_b" else 1)
 
 
-def test_the_refined_edges_of_a_front_are_kept_clear_of_a_face_frame(
+def test_refined_front_edges_exclude_the_rails_of_a_face_frame(
     session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def halved(contrast: Contrast, panel: Cell, cut: Cell, cells: Sequence[Cell], cell_m: float) -> Cell:
@@ -52,7 +52,7 @@ def test_the_refined_edges_of_a_front_are_kept_clear_of_a_face_frame(
     assert panel.height_m == pytest.approx((TOP_M - BOTTOM_M) / 2, abs=3e-3)
 
 
-def test_the_refined_upper_edge_of_a_front_is_as_far_from_its_sunk_panel_as_the_others(
+def test_the_refined_upper_edge_of_a_front_is_evenly_framed(
     session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def lowered(contrast: Contrast, relief: Relief, refined: Refined, cell_m: float) -> Cell:
@@ -65,7 +65,7 @@ def test_the_refined_upper_edge_of_a_front_is_as_far_from_its_sunk_panel_as_the_
     assert panel.height_m == pytest.approx(TOP_M - BOTTOM_M - 0.05, abs=3e-3)
 
 
-def test_an_edge_without_a_change_of_colour_is_unsure(session: GeometricSession, boxes: Boxes) -> None:
+def test_an_edge_without_colour_contrast_has_low_strength(session: GeometricSession, boxes: Boxes) -> None:
     left, _ = DOORS["door_a"]
     found = session.find(prompt("pale", "cabinet", click_on(boxes[0], (left + 0.3, FRONT_Y, 0.4), 60)))
     assert isinstance(found, FoundFront)
@@ -75,7 +75,7 @@ def test_an_edge_without_a_change_of_colour_is_unsure(session: GeometricSession,
 
 
 @pytest.mark.parametrize("name", DRAWERS)
-def test_a_stack_is_cut_into_its_drawers(session: GeometricSession, boxes: Boxes, name: str) -> None:
+def test_a_drawer_stack_is_cut_into_its_drawers(session: GeometricSession, boxes: Boxes, name: str) -> None:
     left, width, bottom, height = DRAWERS[name]
     panel = session.find(prompt(name, "drawer", click_on(boxes[0], (left + 0.1, FRONT_Y, bottom + 0.06), 60))).panel()
     assert panel is not None
@@ -86,7 +86,7 @@ def test_a_stack_is_cut_into_its_drawers(session: GeometricSession, boxes: Boxes
     np.testing.assert_allclose(panel.handle.centre, (0, 0), atol=8e-3)
 
 
-def test_masks_follow_the_door_in_every_frame_and_keep_the_post_out(session: GeometricSession, boxes: Boxes) -> None:
+def test_masks_follow_the_door_in_every_frame_and_exclude_the_post(session: GeometricSession, boxes: Boxes) -> None:
     capture, truth = boxes
     track = session.track(prompt("door_b", "cabinet", click_on(capture, (0.9, FRONT_Y, 0.4), 60)))
     for frame in capture.frames:
@@ -98,7 +98,7 @@ def test_masks_follow_the_door_in_every_frame_and_keep_the_post_out(session: Geo
     assert track.kind == "front"
 
 
-def test_a_double_door_is_one_object_from_one_click(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_double_door_is_found_as_one_object_from_one_click(session: GeometricSession, boxes: Boxes) -> None:
     point = click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60)
     single, double = (
         session.find(prompt("a", "cabinet", point)).panel(),
@@ -110,7 +110,7 @@ def test_a_double_door_is_one_object_from_one_click(session: GeometricSession, b
     assert double.width_m > 1.9 * single.width_m
 
 
-def test_a_second_click_joins_and_a_negative_click_cuts(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_second_click_joins_panels_and_a_negative_click_cuts_them(session: GeometricSession, boxes: Boxes) -> None:
     on_a, on_b = (click_on(boxes[0], (x, FRONT_Y, 0.4), 60) for x in (0.3, 0.9))
     joined = session.find(prompt("ab", "cabinet", on_a, on_b)).panel()
     assert joined is not None
@@ -122,23 +122,21 @@ def test_a_second_click_joins_and_a_negative_click_cuts(session: GeometricSessio
 
 
 @pytest.mark.parametrize("label", [1, 0])
-def test_a_click_within_pose_error_of_the_border_takes_in_no_neighbour_and_cuts_nothing(
-    session: GeometricSession, boxes: Boxes, label: int
-) -> None:
+def test_a_click_within_pose_error_of_the_border_changes_nothing(session: GeometricSession, boxes: Boxes, label: int) -> None:
     beside = click_on(boxes[0], (0.508 if label else 0.495, FRONT_Y, 0.3), 60, label)
     panel = session.find(prompt("a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60), beside)).panel()
     assert panel is not None
     assert panel.width_m == pytest.approx(0.5, abs=4e-3)
 
 
-def test_a_click_on_what_stands_in_front_leaves_the_panel_whole(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_negative_click_on_an_occluder_keeps_the_panel_whole(session: GeometricSession, boxes: Boxes) -> None:
     on_post = click_on(boxes[0], (0.67, FRONT_Y - 0.25, 0.5), 60, label=0)
     panel = session.find(prompt("b", "cabinet", click_on(boxes[0], (0.9, FRONT_Y, 0.4), 60), on_post)).panel()
     assert panel is not None
     assert panel.width_m == pytest.approx(0.5, abs=4e-3)
 
 
-def test_tracks_do_not_depend_on_the_order_of_objects_nor_on_the_cache(boxes: Boxes, tmp_path: Path, cache: Path) -> None:
+def test_tracks_do_not_depend_on_object_order_or_the_cache(boxes: Boxes, tmp_path: Path, cache: Path) -> None:
     capture = boxes[0]
     first = prompt("door_a", "cabinet", click_on(capture, (0.3, FRONT_Y, 0.4), 60))
     second = prompt("drawer", "drawer", click_on(capture, (1.6, FRONT_Y, 0.2), 80))
@@ -159,7 +157,7 @@ def test_the_stream_starts_at_the_click_and_spreads_outwards(session: GeometricS
     assert len(order) == len(set(order))
 
 
-def test_two_names_on_one_panel_part_it_where_a_line_is(boxes: Boxes, cache: Path) -> None:
+def test_a_panel_clicked_for_two_objects_is_split_at_a_seam(boxes: Boxes, cache: Path) -> None:
     session = open_session(boxes[0], cache)
     assert isinstance(session, GeometricSession)
     doors = two_doors(boxes[0])
@@ -186,11 +184,11 @@ def test_two_names_on_one_panel_part_it_where_a_line_is(boxes: Boxes, cache: Pat
         np.testing.assert_allclose(panel.world_from_front.translation, own.world_from_front.translation, atol=6e-3)
 
 
-def test_neighbours_that_are_apart_dispute_nothing(session: GeometricSession, boxes: Boxes) -> None:
+def test_separate_neighbours_do_not_dispute_a_panel(session: GeometricSession, boxes: Boxes) -> None:
     assert session.disputed(two_doors(boxes[0])) == {}
 
 
-def test_fronts_whose_clicks_stay_are_not_found_again(
+def test_fronts_with_unchanged_clicks_are_not_searched_again(
     session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session.disputed(two_doors(boxes[0]))
@@ -209,7 +207,7 @@ def two_doors(capture: Capture) -> list[ObjectPrompt]:
     return [prompt(name, "cabinet", click_on(capture, (left + 0.2, FRONT_Y, 0.4), 60)) for name, (left, _) in places]
 
 
-def test_a_click_just_past_a_fronts_edge_means_the_front(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_click_just_past_the_edge_selects_the_front(session: GeometricSession, boxes: Boxes) -> None:
     """Under it is a strip that no door is as low as: the plinth's shadow, or the gap below the worktop."""
     left, width = DOORS["door_a"]
     panel = session.find(prompt("a", "cabinet", click_on(boxes[0], (left + 0.2, FRONT_Y, TOP_M + 0.008), 60))).panel()
@@ -227,7 +225,7 @@ def test_a_click_just_past_a_fronts_edge_means_the_front(session: GeometricSessi
         (2, 2, 98, 48, None),  # the raised frame of a framed front
     ],
 )
-def test_a_panels_handle_lies_on_it_and_is_not_its_frame(
+def test_only_a_handle_on_the_panel_is_kept_and_not_its_raised_frame(
     left: float, top: float, right: float, bottom: float, kept: tuple[float, ...] | None
 ) -> None:
     found = own_handle(GridHandle(left=left, top=top, right=right, bottom=bottom, confidence=0.9), Cell(0, 0, 100, 50))

@@ -28,7 +28,7 @@ def swung(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
     return capture, truth, open_session(capture, tmp_path_factory.mktemp("swung"))
 
 
-def test_a_drawer_open_in_the_last_frames_is_told_from_the_closed_one(drawn_out: Filmed) -> None:
+def test_a_drawer_open_in_the_last_frames_is_tracked_and_measured(drawn_out: Filmed) -> None:
     capture, truth, session = drawn_out
     drawer = prompt("drawer_mid", "drawer", click_on(capture, (1.5, FRONT_Y, 0.5), 60))
     track = session.track(drawer)
@@ -45,12 +45,12 @@ def test_a_drawer_open_in_the_last_frames_is_told_from_the_closed_one(drawn_out:
     assert (track.front.width_m, track.front.height_m) == pytest.approx((0.45, 0.297), abs=0.015)
 
 
-def test_a_door_open_in_most_frames_tells_its_hinge_and_its_angle(swung: Filmed) -> None:
+def test_hinge_and_angle_are_found_for_a_door_open_in_most_frames(swung: Filmed) -> None:
     assert_hinge_and_angle(swung, closed_frame=20, from_frame=40)
 
 
 @pytest.mark.slow
-def test_a_door_open_in_the_last_frames_tells_its_hinge_and_its_angle(tmp_path: Path) -> None:
+def test_hinge_and_angle_are_found_for_a_door_open_in_the_last_frames(tmp_path: Path) -> None:
     capture, truth = kitchen(from_step=8, swung_rad=np.deg2rad(60.0))
     assert_hinge_and_angle((capture, truth, open_session(capture, tmp_path)), closed_frame=60, from_frame=80)
 
@@ -72,7 +72,7 @@ def assert_hinge_and_angle(filmed: Filmed, closed_frame: int, from_frame: int) -
     assert np.mean(overlap) > 0.85
 
 
-def test_clicks_on_what_stands_open_mean_what_is_closed_there(drawn_out: Filmed) -> None:
+def test_a_click_on_an_open_drawer_selects_its_closed_front(drawn_out: Filmed) -> None:
     """The same click on a front, where it is closed and where it stands open for a while."""
     capture, _, session = drawn_out
     closed, opened = (
@@ -86,7 +86,7 @@ def test_clicks_on_what_stands_open_mean_what_is_closed_there(drawn_out: Filmed)
 
 
 @pytest.mark.parametrize(("swung_deg", "frame"), [(0.0, 20), (60.0, 100)])
-def test_a_door_filmed_open_for_longer_than_closed_is_clicked_in_either(swung_deg: float, frame: int, swung: Filmed) -> None:
+def test_a_mostly_open_door_is_found_from_an_open_or_a_closed_click(swung_deg: float, frame: int, swung: Filmed) -> None:
     capture, _, session = swung
     x, width = DOORS["door_c"]
     half = width / 2 * np.array([np.cos(np.deg2rad(swung_deg)), -np.sin(np.deg2rad(swung_deg))])
@@ -98,7 +98,7 @@ def test_a_door_filmed_open_for_longer_than_closed_is_clicked_in_either(swung_de
     assert motion.largest == pytest.approx(np.deg2rad(60.0), abs=np.deg2rad(1.0))
 
 
-def test_a_drawer_that_is_held_open_is_no_front_where_it_stands(drawn_out: Filmed) -> None:
+def test_an_open_drawer_gets_its_front_at_the_closed_position(drawn_out: Filmed) -> None:
     """For half of the recording it is a board in the room, on a plane of its own."""
     capture, _, session = drawn_out
     drawer = prompt("drawer_mid", "drawer", click_on(capture, (1.5, FRONT_Y - OUT_M, 0.5), 110))

@@ -37,7 +37,7 @@ def panel(back_m: float, height_m: float = HEIGHT) -> PlaneRegion:
     return PlaneRegion(Rigid3(front_rotation(OUTWARD), middle), 0.5, height_m, support, 0.02, 0.5 * height_m)
 
 
-def test_a_door_before_a_panel_one_track_behind_slides() -> None:
+def test_a_door_one_track_before_a_panel_is_a_sliding_door() -> None:
     assert sliding_chance(door(), (panel(0.04),)) > 0.9
 
 
@@ -46,10 +46,10 @@ def test_a_door_before_a_panel_one_track_behind_slides() -> None:
     [(), (panel(0.02),), (panel(0.0),), (panel(0.3),), (panel(0.04, height_m=1.4),)],
     ids=["nothing", "a blind panel", "the next door", "a shelf's back", "what is higher"],
 )
-def test_other_doors_do_not(beside: tuple[PlaneRegion, ...]) -> None:
+def test_doors_without_a_panel_one_track_behind_are_not_sliding_doors(beside: tuple[PlaneRegion, ...]) -> None:
     assert sliding_chance(door(), beside) < 0.7
 
 
-def test_a_pull_beside_the_panel_speaks_for_hinges() -> None:
+def test_a_pull_near_the_adjacent_panel_lowers_the_sliding_probability() -> None:
     away, none, near = (sliding_chance(door(x), (panel(0.04),)) for x in (0.04, None, 0.46))
     assert away > none > near

@@ -22,14 +22,14 @@ from tests.core.segment.scenes import FRONT_Y, click_on, prompt
 from tests.waiting import until
 
 
-def test_runs_come_back_from_disk_as_they_were(session: GeometricSession, tmp_path: Path) -> None:
+def test_runs_are_restored_unchanged_from_disk(session: GeometricSession, tmp_path: Path) -> None:
     run = session.run_of(session.planes[0])
     kept(tmp_path / "run.noun", lambda: run)
     back = kept(tmp_path / "run.noun", lambda: None)
     assert _same(run, back)
 
 
-def test_a_damaged_file_is_computed_anew(tmp_path: Path) -> None:
+def test_a_damaged_cache_file_is_recomputed(tmp_path: Path) -> None:
     path = tmp_path / "value.noun"
     kept(path, lambda: (1, 2))
     path.write_bytes(path.read_bytes()[:40])
@@ -37,7 +37,7 @@ def test_a_damaged_file_is_computed_anew(tmp_path: Path) -> None:
     assert kept(path, lambda: (5, 6)) == (3, 4)
 
 
-def test_what_two_ask_for_at_once_is_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_concurrent_requests_compute_a_value_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     computed: list[int] = []
     locking: list[int] = []
     lock = fcntl.flock
@@ -57,21 +57,21 @@ def test_what_two_ask_for_at_once_is_computed_once(tmp_path: Path, monkeypatch: 
     assert computed == [1]
 
 
-def test_a_run_is_cut_when_something_on_it_is_clicked(boxes: tuple[Capture, Truth], tmp_path: Path) -> None:
+def test_a_run_is_computed_on_the_first_click(boxes: tuple[Capture, Truth], tmp_path: Path) -> None:
     session = open_session(boxes[0], tmp_path)
     assert not list(tmp_path.glob("*/run*.noun"))
     session.track(prompt("a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60)))
     assert len(list(tmp_path.glob("*/run*.noun"))) == 1
 
 
-def test_a_prepared_session_cuts_nothing_at_a_click(session: GeometricSession, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_prepared_session_computes_no_run_later(session: GeometricSession, monkeypatch: pytest.MonkeyPatch) -> None:
     session.prepare()
     monkeypatch.setattr(geometric, "make_run", lambda *_: pytest.fail("cut at a click"))
     for region in session.planes:
         session.run_of(region)
 
 
-def test_other_code_never_reads_what_this_code_prepared(
+def test_the_cache_key_changes_with_the_source_code(
     boxes: tuple[Capture, Truth], session: GeometricSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = geometric._cache_key(boxes[0], session.config)
@@ -79,7 +79,7 @@ def test_other_code_never_reads_what_this_code_prepared(
     assert geometric._cache_key(boxes[0], session.config) != before
 
 
-def test_preparing_reports_and_stops_when_asked(boxes: tuple[Capture, Truth], tmp_path: Path) -> None:
+def test_preparation_reports_progress_and_can_be_cancelled(boxes: tuple[Capture, Truth], tmp_path: Path) -> None:
     seen: list[float] = []
     stop = Progress(lambda _, fraction, text: seen.append(fraction), lambda: len(seen) > 5)
     with pytest.raises(Cancelled):
@@ -88,7 +88,7 @@ def test_preparing_reports_and_stops_when_asked(boxes: tuple[Capture, Truth], tm
     assert seen[-1] < 0.9
 
 
-def test_drawing_only_the_parts_in_view_changes_no_pixel(boxes: tuple[Capture, Truth]) -> None:
+def test_rendering_only_visible_parts_changes_no_pixel(boxes: tuple[Capture, Truth]) -> None:
     capture = boxes[0]
     surface, parts = capture.surface, parts_of(capture.surface)
     for frame in capture.frames[::6]:
@@ -98,19 +98,19 @@ def test_drawing_only_the_parts_in_view_changes_no_pixel(boxes: tuple[Capture, T
         assert np.array_equal(draw(parts, frame), (whole.depth_m * 1000 + 0.5).astype(np.uint16))
 
 
-def test_no_face_within_reach_is_missed(boxes: tuple[Capture, Truth]) -> None:
+def test_faces_near_returns_every_face_within_reach(boxes: tuple[Capture, Truth]) -> None:
     surface = boxes[0].surface
     point, reach = np.array([1.0, -0.3, 1.0]), 0.4
     away = np.linalg.norm(surface.vertices_world[surface.faces] - point, axis=2).min(axis=1)
     assert set(np.flatnonzero(away < reach)) <= set(parts_of(surface).faces_near(point, reach).tolist())
 
 
-def test_the_first_look_at_a_front_is_its_mask(boxes: tuple[Capture, Truth], session: GeometricSession) -> None:
+def test_the_glimpse_of_a_front_equals_its_first_streamed_mask(boxes: tuple[Capture, Truth], session: GeometricSession) -> None:
     door = prompt("a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60), click_on(boxes[0], (0.3, FRONT_Y, 0.5), 40))
     assert session.glimpse(door) == next(session.stream(door))
 
 
-def test_the_first_look_at_a_small_thing_agrees_with_its_mask(
+def test_the_glimpse_of_a_small_thing_agrees_with_its_mask(
     boxes: tuple[Capture, Truth], session: GeometricSession, cache: Path
 ) -> None:
     carton = prompt("c", "box", click_on(boxes[0], (1.06, -0.36, 1.0), 70))

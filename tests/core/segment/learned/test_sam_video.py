@@ -41,7 +41,7 @@ def same(a: list[Seen], b: list[Seen]) -> bool:
 
 
 @FAMILIES
-def test_an_object_is_followed_both_ways_from_its_click(family: Family) -> None:
+def test_an_object_is_tracked_in_both_directions_from_its_click(family: Family) -> None:
     found = followed(tiny(family), 6, {2: [Click(0.5, 0.5, 1), Click(0.1, 0.1, 0)]})
     assert [seen.position for seen in found] == [2, 3, 1, 4, 0, 5]
     assert {seen.mask.shape for seen in found} == {(HEIGHT, WIDTH)}
@@ -49,13 +49,13 @@ def test_an_object_is_followed_both_ways_from_its_click(family: Family) -> None:
     assert all(0 <= seen.confidence <= 1 for seen in found)
 
 
-def test_the_frame_clicked_last_comes_first_then_the_other_clicked_ones() -> None:
+def test_clicked_frames_are_returned_first_starting_with_the_last() -> None:
     clicks = {1: [Click(0.5, 0.5, 1)], 4: [Click(0.9, 0.9, 0)]}
     assert [seen.position for seen in followed(tiny(SAM2), 7, clicks)] == [4, 1, 5, 3, 6, 2, 0]
 
 
 @MOST_FAMILIES
-def test_frames_after_the_click_are_as_in_the_models_own_loop(family: Family) -> None:
+def test_frames_after_the_click_match_the_reference_propagation_loop(family: Family) -> None:
     """`propagate_in_video_iterator` holds the whole video and forgets nothing; forgetting must not change an answer."""
     model, count = tiny(family), 24  # more than the 16 frames of pointers and 7 of memories that it attends to
     session = model.session()
@@ -74,7 +74,7 @@ def test_frames_after_the_click_are_as_in_the_models_own_loop(family: Family) ->
 
 
 @FAMILIES
-def test_half_precision_works(family: Family) -> None:
+def test_half_precision_gives_finite_confidences(family: Family) -> None:
     found = followed(tiny(family, torch.bfloat16), 3, {1: [Click(0.5, 0.5, 1)]})
     assert all(np.isfinite(seen.confidence) for seen in found)
 
@@ -96,7 +96,7 @@ def test_memory_stays_flat_over_sixty_frames(family: Family, monkeypatch: pytest
     assert not sessions[0].processed_frames
 
 
-def test_the_same_clicks_give_the_same_masks_whatever_was_followed_before() -> None:
+def test_earlier_tracking_does_not_change_later_masks() -> None:
     clicks = {2: [Click(0.5, 0.5, 1)]}
     fresh = followed(tiny(SAM2), 5, clicks)
     model = tiny(SAM2)
@@ -104,7 +104,7 @@ def test_the_same_clicks_give_the_same_masks_whatever_was_followed_before() -> N
     assert same(followed(model, 5, clicks), fresh)
 
 
-def test_two_objects_may_be_followed_in_turns() -> None:
+def test_two_objects_tracked_in_alternation_keep_their_masks() -> None:
     model = tiny(SAM2)
     a, b = {2: [Click(0.5, 0.5, 1)]}, {1: [Click(0.9, 0.1, 1)]}
     alone = followed(model, 5, a), followed(model, 5, b)
@@ -113,14 +113,14 @@ def test_two_objects_may_be_followed_in_turns() -> None:
     assert same([y for _, y in turns], alone[1])
 
 
-def test_a_second_click_and_a_click_off_it_change_the_logits() -> None:
+def test_positive_and_negative_second_clicks_change_the_logits() -> None:
     model = tiny(SAM2)
     one = logits(model, {0: [Click(0.5, 0.5, 1)]}, 1)[0]
     assert not np.array_equal(one, logits(model, {0: [Click(0.5, 0.5, 1), Click(0.9, 0.9, 1)]}, 1)[0])
     assert not np.array_equal(one, logits(model, {0: [Click(0.5, 0.5, 1), Click(0.9, 0.9, 0)]}, 1)[0])
 
 
-def test_a_click_in_another_frame_is_read_with_the_memory_of_the_first() -> None:
+def test_a_click_in_another_frame_uses_the_memory_of_the_first() -> None:
     model = tiny(SAM2)
     off = {3: [Click(0.9, 0.9, 0)]}
     with_memory = logits(model, {0: [Click(0.5, 0.5, 1)], **off})
@@ -128,7 +128,7 @@ def test_a_click_in_another_frame_is_read_with_the_memory_of_the_first() -> None
     assert not np.array_equal(with_memory[3], other_memory[3])
 
 
-def test_a_refinement_reaches_frames_before_and_after_it() -> None:
+def test_a_refinement_changes_frames_before_and_after_it() -> None:
     model = tiny(SAM2)
     plain, refined = {2: [Click(0.5, 0.5, 1)]}, {2: [Click(0.5, 0.5, 1)], 4: [Click(0.9, 0.9, 0)]}
     before, after = logits(model, plain), logits(model, refined)
@@ -156,14 +156,14 @@ def test_a_model_loads_from_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert same(followed(load_model(tmp_path, SAM2), 2, clicks), followed(model, 2, clicks))
 
 
-def test_a_folder_with_something_else_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_a_folder_without_the_weights_is_rejected_with_a_one_line_message(tmp_path: Path) -> None:
     (tmp_path / "config.json").write_text("{}")
     with pytest.raises(BackendUnavailable, match="not the weights of a Sam2VideoModel") as refused:
         load_model(tmp_path, SAM2)
     assert "\n" not in str(refused.value)
 
 
-def test_images_are_resized_and_normalised_as_the_processor_of_transformers_does() -> None:
+def test_images_are_resized_and_normalised_like_the_transformers_processor() -> None:
     model = tiny(SAM2)
     flat = np.full((HEIGHT, WIDTH, 3), (255, 0, 128), np.uint8)
     pixels = model.pixels(flat)

@@ -94,7 +94,7 @@ def test_true_masks_of_a_thing_give_its_box(session: GeometricSession, boxes: Bo
     assert np.mean(ious(boxes, "carton", track.masks)) > 0.95
 
 
-def test_a_leak_over_a_depth_edge_is_cut_off(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+def test_a_mask_leak_over_a_depth_edge_is_removed(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
     """In one frame of three the mask grows over what stands behind the carton."""
 
     def leaking(position: int, mask: np.ndarray) -> np.ndarray:
@@ -107,7 +107,9 @@ def test_a_leak_over_a_depth_edge_is_cut_off(session: GeometricSession, boxes: B
     assert min(ious(boxes, "carton", fused.masks)) > 0.85
 
 
-def test_a_frame_the_model_lost_is_filled_in_and_said(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+def test_a_frame_lost_by_the_model_is_filled_in_with_a_warning(
+    session: GeometricSession, boxes: Boxes, carton: ObjectPrompt
+) -> None:
     model = TrueMasks(true_masks(boxes, "carton"), lambda position, mask: mask & (position != 6))
     fused = opened(session, model).track(carton)
     lost = boxes[0].frames[6].index
@@ -117,7 +119,7 @@ def test_a_frame_the_model_lost_is_filled_in_and_said(session: GeometricSession,
     assert lost not in opened(session, model, fusion="none").track(carton).masks
 
 
-def test_the_papers_intersection_takes_both_masks_and_falls_back(
+def test_depth_mask_fusion_intersects_masks_and_falls_back_to_rgb(
     session: GeometricSession, boxes: Boxes, carton: ObjectPrompt
 ) -> None:
     """Right of the carton's middle the depth mask is empty; in the first frame it is empty altogether."""
@@ -138,7 +140,7 @@ def test_the_papers_intersection_takes_both_masks_and_falls_back(
     assert any("disagreed in" in line for line in track.warnings)
 
 
-def test_stream_gives_the_clicked_frame_first_and_nothing_is_computed_twice(
+def test_the_stream_starts_at_the_clicked_frame_and_reuses_masks(
     session: GeometricSession, boxes: Boxes, carton: ObjectPrompt
 ) -> None:
     model = TrueMasks(true_masks(boxes, "carton"))
@@ -159,12 +161,12 @@ def test_an_object_the_model_never_sees_is_an_error(session: GeometricSession, b
         opened(session, model).track(carton)
 
 
-def test_a_frame_that_does_not_exist_is_refused(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+def test_a_nonexistent_frame_is_rejected(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
     with pytest.raises(PromptError, match="frame 7 found"):
         opened(session, TrueMasks(true_masks(boxes, "carton"))).mask_at(carton, 7)
 
 
-def test_the_real_class_with_random_weights_runs_through(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
+def test_the_real_model_class_runs_with_random_weights(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
     """Random masks say nothing, but every call is the real one: RGB-sized masks, one a frame, in the protocol's order."""
     learned = opened(session, tiny(SAM2), least_area_px=0)
     found = list(learned.stream(carton))

@@ -14,7 +14,7 @@ from r2c2r_core.segment.runs.panels import cut_panels
 ROWS, COLUMNS, CELL_M = 160, 200, 0.0025
 
 
-def test_where_a_mosaic_has_no_colour_no_front_is_likely() -> None:
+def test_unobserved_mosaic_cells_have_minimal_front_odds() -> None:
     mosaic = np.full((ROWS, COLUMNS, 3), 120, np.uint8)
     mosaic[:, 120:] = 0
     empty = np.zeros((ROWS // STEP, COLUMNS // STEP))
@@ -26,7 +26,7 @@ def test_where_a_mosaic_has_no_colour_no_front_is_likely() -> None:
     assert (odds.front[:, : 120 // STEP] > -4).any()
 
 
-def test_what_nobody_saw_does_not_speak_against_a_line_through_it() -> None:
+def test_unobserved_cells_are_no_evidence_against_a_line() -> None:
     """A door ends at column 120, clear over the upper half; the lower half was hidden."""
     layers = [np.full((ROWS, COLUMNS // STEP), -4.0, np.float32) for _ in range(4)]
     upright, level, handle, front = layers
@@ -48,7 +48,7 @@ def _two_dark_doors(gap: int) -> np.ndarray:
     return (rgb + np.random.default_rng(0).normal(0, 1, rgb.shape)).astype(np.uint8)
 
 
-def test_a_lit_gap_between_dark_doors_is_an_edge() -> None:
+def test_a_bright_gap_between_dark_doors_is_an_edge() -> None:
     mosaic = _two_dark_doors(gap=84)
     empty = np.zeros((140, 200))
     relief = Relief(CELL_M * STEP, empty + 10, empty, empty, empty)
@@ -61,7 +61,7 @@ def test_a_lit_gap_between_dark_doors_is_an_edge() -> None:
     assert np.median(odds.along(0, 110, 30, 250)) < 0
 
 
-def test_a_lit_line_shows_as_well_as_a_dark_one() -> None:
+def test_a_bright_gap_scores_as_high_as_a_dark_gap() -> None:
     def clearest(gap: int) -> float:
         lab = cv2.cvtColor(_two_dark_doors(gap), cv2.COLOR_RGB2LAB)
         vertical, _ = scored(Tile(0, lab, np.ones(lab.shape[:2], np.float32)), CELL_M).scores
@@ -70,7 +70,7 @@ def test_a_lit_line_shows_as_well_as_a_dark_one() -> None:
     assert clearest(gap=74) > 0.8 * clearest(gap=66)
 
 
-def test_a_step_back_is_an_edge_where_the_network_holds_one_possible_and_else_the_border_of_a_sunk_panel() -> None:
+def test_a_depth_step_is_an_edge_only_where_the_network_allows_one() -> None:
     level = np.zeros((140, 200))
     level[:, 100:] = -0.03
     empty = np.zeros(level.shape)
@@ -90,7 +90,7 @@ def test_a_step_back_is_an_edge_where_the_network_holds_one_possible_and_else_th
 
 
 @pytest.mark.parametrize(("before_it", "found"), [(False, 105), (True, 100)])
-def test_depth_falls_short_of_an_end_where_it_shows_nothing_beyond(before_it: bool, found: int) -> None:
+def test_a_depth_end_moves_the_edge_only_if_depth_continues_beyond(before_it: bool, found: int) -> None:
     """It ends at 100; the network thinks an edge likelier at 105, as it is, than there, and possible at both."""
     count, raised = np.zeros((140, 200)), np.zeros((140, 200))
     count[:, :100] = 10

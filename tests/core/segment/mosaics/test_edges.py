@@ -35,14 +35,14 @@ def edges(image: np.ndarray, cut: Cell, on_plane: Cell, *heights: tuple[Cell, fl
     return found.left, found.top, found.right, found.bottom
 
 
-def test_an_edge_is_where_colour_changes_though_depth_ends_3_cm_short_of_it() -> None:
+def test_an_edge_follows_the_colour_change_where_depth_ends_3_cm_short() -> None:
     short = Cell(72, 72, 248, 288)
     true = pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
     assert edges(mosaic((PANEL, BLUE)), short, short) == true  # the cut followed depth
     assert edges(mosaic((PANEL, BLUE)), PANEL, short) == true  # the cut followed colour
 
 
-def test_a_black_door_ends_where_it_was_cut_over_a_plinth_as_black_that_depth_sees_behind_it() -> None:
+def test_a_black_door_ends_at_its_cut_above_an_equally_black_plinth() -> None:
     """The plinth's own light begins 25 mm lower: where depth sees nothing, that would be the door's edge."""
     black, lit = (12, 12, 14), (60, 60, 64)
     image, cut = mosaic((PANEL, black), (Cell(60, 300, 260, 340), black), (Cell(60, 310, 260, 340), lit)), PANEL
@@ -50,7 +50,7 @@ def test_a_black_door_ends_where_it_was_cut_over_a_plinth_as_black_that_depth_se
     assert edges(image, cut, cut, (Cell(60, 300, 260, 340), -0.03))[3] == pytest.approx(300, abs=EDGE_CELLS)
 
 
-def test_a_lip_of_the_panels_colour_is_none_of_it_and_a_grip_along_its_edge_is() -> None:
+def test_a_protruding_lip_is_excluded_and_a_grip_edge_is_included() -> None:
     lip = Cell(40, 52, 280, 60)
     whole = Cell(PANEL.left, lip.top, PANEL.right, PANEL.bottom)
     image = mosaic((whole, BLUE), (Cell(60, 59, 260, 60), (62, 92, 121)))
@@ -59,7 +59,7 @@ def test_a_lip_of_the_panels_colour_is_none_of_it_and_a_grip_along_its_edge_is()
     assert edges(image, whole, PANEL, (lip, 0.014), (Cell(40, 0, 280, 52), 0.0))[1] == pytest.approx(52, abs=EDGE_CELLS)
 
 
-def test_an_edge_that_only_the_network_sees_is_where_it_was_cut_though_a_tile_ends_3_cm_beyond() -> None:
+def test_a_network_edge_is_kept_despite_a_tile_edge_3_cm_beyond() -> None:
     ivory, tile = (235, 234, 230), (Cell(60, 40, 260, 47), (205, 205, 200))
     image = mosaic(tile, background=ivory)
     thought = [np.full((image.shape[0] // STEP, image.shape[1] // STEP), -4.0, np.float32) for _ in range(4)]
@@ -73,18 +73,18 @@ def test_an_edge_that_only_the_network_sees_is_where_it_was_cut_though_a_tile_en
     assert top() == pytest.approx(PANEL.top, abs=EDGE_CELLS)
 
 
-def test_a_cut_10_mm_outside_the_panel_finds_its_edge() -> None:
+def test_a_cut_10_mm_outside_the_panel_moves_to_the_panel_edge() -> None:
     outside = Cell(56, 56, 264, 304)
     assert edges(mosaic((PANEL, BLUE)), outside, outside) == pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
 
 
-def test_a_faint_gap_in_one_colour_is_the_edge_though_the_frame_beyond_it_ends_more_clearly() -> None:
+def test_a_faint_gap_wins_over_the_clearer_end_of_the_face_frame() -> None:
     """The gap round an inset front shows less than the end of the face frame, 20 mm on, against a wall."""
     framed = mosaic((Cell(52, 60, 260, 300), BLUE), (Cell(59, 60, 60, 300), (55, 80, 105)), background=WALL)
     assert edges(framed, Cell(57, 60, 260, 300), Cell(52, 60, 260, 300))[0] == pytest.approx(60, abs=EDGE_CELLS)
 
 
-def test_the_grain_of_a_rail_is_no_gap_though_the_panel_below_it_has_none_along_it() -> None:
+def test_wood_grain_on_a_rail_is_not_taken_for_a_gap() -> None:
     oak, dark = (205, 170, 120), (197, 162, 112)
     grain = [(Cell(60, row, 260, row + 2), dark) for row in range(64, 84, 5)]
     assert edges(mosaic((PANEL, oak), *grain), PANEL, PANEL) == pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
@@ -96,33 +96,33 @@ def in_shade(colour: tuple[int, int, int], share: float) -> tuple[int, int, int]
 
 
 @pytest.mark.parametrize("colour", [BLUE, WALL])
-def test_the_shadow_of_a_worktop_lies_on_the_panel(colour: tuple[int, int, int]) -> None:
+def test_a_worktop_shadow_belongs_to_the_panel(colour: tuple[int, int, int]) -> None:
     worktop, shadow = Cell(40, 46, 280, 60), Cell(60, 60, 260, 67)
     image = mosaic((PANEL, colour), (worktop, STONE), (shadow, in_shade(colour, 0.4)))
     assert edges(image, PANEL, PANEL)[1] == pytest.approx(60, abs=EDGE_CELLS)
 
 
-def test_a_gap_between_two_panels_is_no_shadow() -> None:
+def test_a_gap_between_two_panels_is_not_taken_for_a_shadow() -> None:
     upper, gap = Cell(60, 20, 260, 57), Cell(60, 57, 260, 60)
     image = mosaic((PANEL, BLUE), (upper, BLUE), (gap, in_shade(BLUE, 0.3)))
     assert edges(image, PANEL, PANEL)[1] == pytest.approx(59, abs=EDGE_CELLS)
 
 
 @pytest.mark.parametrize("stone", [(190, 190, 185), (110, 112, 115)])
-def test_a_blurred_shadow_ends_where_light_is_half_way_to_the_worktop_s(stone: tuple[int, int, int]) -> None:
+def test_a_blurred_shadow_ends_at_half_the_brightness_of_the_worktop(stone: tuple[int, int, int]) -> None:
     worktop, shadow = Cell(40, 30, 280, 60), Cell(60, 60, 260, 67)
     image = mosaic((PANEL, BLUE), (worktop, stone), (shadow, in_shade(BLUE, 0.35)), blur=1.8)
     assert edges(image, PANEL, PANEL)[1] == pytest.approx(60, abs=1.2)
 
 
-def test_the_upper_face_of_a_front_below_a_wide_gap_is_not_its_front() -> None:
+def test_the_top_face_of_a_panel_below_a_wide_gap_is_excluded() -> None:
     upper, gap, face = Cell(60, 10, 260, 49), Cell(60, 49, 260, 54), Cell(60, 54, 260, 60)
     image = mosaic((PANEL, BLUE), (upper, BLUE), (gap, in_shade(BLUE, 0.02)), (face, in_shade(BLUE, 0.75)))
     for cut in (52, 54, 60):
         assert edges(image, Cell(60, cut, 260, 300), PANEL)[1] == pytest.approx(60, abs=1.0)
 
 
-def test_the_shadow_of_a_worktop_as_white_as_its_front_is_no_gap_to_see_into() -> None:
+def test_a_shadow_under_a_white_worktop_is_not_taken_for_a_gap() -> None:
     """It fades from 5 to 30 mm below, as light from a room does."""
     white, shade = (178, 178, 172), np.interp(np.arange(20), [2, 12], [0.66, 1.0])
     image = np.full((360, 320, 3), white, np.float64)
@@ -131,7 +131,7 @@ def test_the_shadow_of_a_worktop_as_white_as_its_front_is_no_gap_to_see_into() -
     assert found[1] == pytest.approx(60, abs=EDGE_CELLS)
 
 
-def test_a_panel_cut_at_the_far_side_of_a_dark_gap_ends_before_it() -> None:
+def test_a_panel_cut_beyond_a_dark_gap_ends_before_the_gap() -> None:
     gap, lower = Cell(60, 300, 260, 306), Cell(60, 306, 260, 350)
     image = mosaic((PANEL, BLUE), (gap, in_shade(BLUE, 0.02)), (lower, BLUE))
     assert edges(image, Cell(60, 60, 260, 306), PANEL)[3] == pytest.approx(300, abs=1.0)
@@ -141,7 +141,7 @@ CHANNEL = Cell(60, 45, 260, 60)
 
 
 @pytest.mark.parametrize("rail", [(150, 150, 150), (30, 32, 35)])
-def test_a_front_below_a_recessed_channel_begins_where_depth_meets_its_plane(rail: tuple[int, int, int]) -> None:
+def test_a_front_below_a_recessed_channel_starts_where_depth_meets_its_plane(rail: tuple[int, int, int]) -> None:
     upper, recess, face = Cell(60, 0, 260, 45), Cell(60, 45, 260, 52), Cell(60, 52, 260, 60)
     image = mosaic((PANEL, BLUE), (upper, BLUE), (recess, rail), (face, in_shade(BLUE, 0.8)))
     depth = ((upper, 0.0), (recess, -0.022), (face, -0.011))
@@ -156,26 +156,26 @@ def test_a_front_above_a_recessed_channel_ends_where_depth_leaves_its_plane() ->
     assert edges(image, Cell(60, 60, 260, 307), PANEL, *depth)[3] == pytest.approx(300, abs=1.5)
 
 
-def test_a_front_hides_the_top_of_a_channel_below_it_from_depth_and_ends_over_it_all_the_same() -> None:
+def test_a_front_ends_above_a_channel_whose_top_is_hidden_from_depth() -> None:
     recess, lower = Cell(60, 300, 260, 313), Cell(60, 313, 260, 360)
     image = mosaic((PANEL, BLUE), (recess, (150, 150, 150)), (lower, BLUE), (Cell(60, 306, 260, 308), (60, 60, 60)))
     depth = ((Cell(60, 307, 260, 313), -0.022), (lower, 0.0))
     assert edges(image, Cell(60, 60, 260, 301), PANEL, *depth)[3] == pytest.approx(300, abs=1.5)
 
 
-def test_depth_that_falls_off_at_a_free_end_moves_no_edge() -> None:
+def test_mixed_depth_at_a_free_edge_does_not_move_the_edge() -> None:
     image = mosaic((PANEL, BLUE))
     flying = (Cell(60, 60, 260, 66), -0.015)  # depth at an edge is mixed with the surface behind it
     assert edges(image, PANEL, PANEL, flying)[1] == pytest.approx(60, abs=EDGE_CELLS)
 
 
-def test_a_wall_darker_than_the_front_before_it_is_no_shadow_on_it() -> None:
+def test_a_wall_darker_than_the_front_is_not_taken_for_a_shadow() -> None:
     wall = Cell(0, 0, 320, 60)
     image = mosaic((PANEL, (200, 203, 190)), (wall, (165, 171, 168)), (Cell(60, 50, 260, 60), in_shade((200, 203, 190), 0.7)))
     assert edges(image, PANEL, PANEL, (wall, -0.03))[1] == pytest.approx(60, abs=EDGE_CELLS)
 
 
-def test_the_upper_rail_of_a_frame_is_no_lip_and_a_lip_over_it_is() -> None:
+def test_a_frame_top_rail_is_kept_and_a_lip_above_is_excluded() -> None:
     whole = Cell(PANEL.left, 52, PANEL.right, PANEL.bottom)
     sunk, lip = Cell(whole.left + 24, whole.top + 24, whole.right - 24, whole.bottom - 24), Cell(40, 52, 280, 60)
     image = mosaic((whole, BLUE), (Cell(60, 75, 260, 76), (62, 92, 121)), (Cell(60, 59, 260, 60), (62, 92, 121)))

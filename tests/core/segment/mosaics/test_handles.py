@@ -27,7 +27,7 @@ def found(*parts: tuple[slice, slice, float], raised: tuple[slice, slice] | None
     return PanelOdds(nothing, nothing, handle, -nothing), relief
 
 
-def test_the_handle_is_where_the_network_sees_it_as_far_out_as_depth_does() -> None:
+def test_a_handle_has_its_place_from_the_network_and_protrusion_from_depth() -> None:
     bar = (slice(20, 50), slice(60, 64))
     handle = find_handle(*found((*bar, 3.0), raised=bar), PANEL)
     assert handle is not None
@@ -36,13 +36,13 @@ def test_the_handle_is_where_the_network_sees_it_as_far_out_as_depth_does() -> N
     assert handle.confidence == pytest.approx(1 / (1 + np.exp(-3.0)))
 
 
-def test_a_panel_on_which_nothing_is_likelier_a_handle_than_not_has_none() -> None:
+def test_a_panel_without_likely_handle_cells_has_no_handle() -> None:
     assert find_handle(*found((slice(20, 50), slice(60, 64), -0.1)), PANEL) is None
     assert find_handle(*found((slice(20, 50), slice(2, 6), 3.0)), PANEL) is None  # the neighbour's
     assert find_handle(*found((slice(20, 50), slice(60, 64), 3.0)), Cell(0, 0, 0, 0)) is None
 
 
-def test_parts_of_a_bar_are_one_handle_and_a_speck_elsewhere_is_none_of_it() -> None:
+def test_parts_of_a_bar_are_merged_and_a_distant_speck_is_ignored() -> None:
     upper, lower, speck = (slice(20, 32), slice(60, 64)), (slice(38, 50), slice(60, 64)), (slice(90, 92), slice(20, 22))
     handle = find_handle(*found((*upper, 2.0), (*lower, 2.0), (*speck, 4.0)), PANEL)
     assert handle is not None
@@ -50,20 +50,20 @@ def test_parts_of_a_bar_are_one_handle_and_a_speck_elsewhere_is_none_of_it() -> 
     assert handle.protrusion_m == 0.0  # depth showed no protrusion
 
 
-def test_a_handle_at_the_edge_of_its_panel_stays_as_large_as_it_is() -> None:
+def test_a_handle_at_the_panel_edge_is_not_cropped() -> None:
     handle = find_handle(*found((slice(20, 50), slice(12, 16), 2.0)), PANEL)
     assert handle is not None
     assert handle.left == 12 * STEP
 
 
-def test_a_handle_is_where_depth_has_it_not_where_the_flat_mosaic_shows_it() -> None:
+def test_the_depth_position_of_a_handle_wins_over_its_mosaic_position() -> None:
     seen, stands = (slice(20, 50), slice(60, 64)), (slice(22, 52), slice(57, 61))
     handle = find_handle(*found((*seen, 3.0), raised=stands), PANEL)
     assert handle is not None
     assert (handle.left, handle.right, handle.top, handle.bottom) == (57 * STEP, 61 * STEP, 22 * STEP, 52 * STEP)
 
 
-def test_the_middle_of_a_handle_is_not_drawn_to_the_end_that_depth_saw_more_often() -> None:
+def test_a_handle_centre_is_not_biased_to_the_end_with_more_depth() -> None:
     bar, recognised = (slice(20, 24), slice(30, 62)), (slice(20, 24), slice(33, 62))
     odds, relief = found((*recognised, 3.0), raised=bar)
     relief.count[:, 30:46] = 3

@@ -32,24 +32,24 @@ def _shares(film: Film, surface: Film) -> np.ndarray:
     return np.array([opened_cells(GRID, scan, frame).mean() for frame in film.frames])
 
 
-def test_a_frame_that_looks_into_an_open_unit_shows_no_front_there() -> None:
+def test_frames_that_look_into_an_open_unit_are_excluded() -> None:
     found = _shares(filmed("left", OPEN), CLOSED)
     assert (found[OPEN == 0] == 0).all()
     assert (found[OPEN > 0] > 0.5).all()  # the leaf itself occludes the rest
 
 
-def test_what_every_frame_looks_past_is_glass_and_stays_in_the_mosaic() -> None:
+def test_a_front_that_all_frames_see_through_stays_in_the_mosaic() -> None:
     assert (_shares(HOLLOW, HOLLOW) == 0).all()
 
 
-def test_what_a_gap_lets_through_is_no_open_front() -> None:
+def test_depth_through_a_narrow_gap_is_not_an_open_front() -> None:
     film = filmed("left", np.zeros(3))
     for depth in film.depths.values():
         depth[:, 90:94] = 4.0
     assert (_shares(film, CLOSED) == 0).all()
 
 
-def test_an_end_that_few_frames_show_and_none_of_them_well_is_shown_by_one_of_the_first_frames_chosen() -> None:
+def test_frame_selection_covers_poorly_observed_parts_early() -> None:
     quality = np.zeros((40, 12))  # frames, parts
     quality[:36, :9] = np.random.default_rng(0).uniform(0.8, 1.0, (36, 9))
     quality[36:, 6:] = [[0.02], [0.03], [0.025], [0.01]]

@@ -29,11 +29,11 @@ def on_cells(layer: np.ndarray) -> np.ndarray:
     return layer[: rows * 2, : columns * 2].reshape(rows, 2, columns, 2).max(axis=(1, 3)) > 0
 
 
-def test_the_networks_are_small_enough_to_come_with_the_code() -> None:
+def test_the_networks_are_smaller_than_5_mb() -> None:
     assert 0 < sum(path.stat().st_size for path in NETWORKS) < 5_000_000
 
 
-def test_edges_and_handles_it_never_saw_are_likely_and_the_rest_is_not(
+def test_unseen_edges_and_handles_are_detected_with_few_false_positives(
     judgements: list[tuple[np.ndarray, PanelOdds]],
 ) -> None:
     for k, layer in enumerate(("upright", "level", "handle")):
@@ -43,7 +43,7 @@ def test_edges_and_handles_it_never_saw_are_likely_and_the_rest_is_not(
         assert likely[~true].mean() < 0.02, layer
 
 
-def test_its_odds_are_calibrated(judgements: list[tuple[np.ndarray, PanelOdds]]) -> None:
+def test_front_odds_are_calibrated(judgements: list[tuple[np.ndarray, PanelOdds]]) -> None:
     true = np.concatenate([on_cells(truth[3]).ravel() for truth, _ in judgements])
     sure = 1 / (1 + np.exp(-np.concatenate([odds.front.ravel() for _, odds in judgements])))
     for low, high in ((0.0, 0.2), (0.8, 1.01)):
@@ -51,7 +51,7 @@ def test_its_odds_are_calibrated(judgements: list[tuple[np.ndarray, PanelOdds]])
         assert true[within].mean() == pytest.approx(sure[within].mean(), abs=0.1)
 
 
-def test_what_it_is_fed_does_not_depend_on_the_number_of_depth_points() -> None:
+def test_input_features_do_not_depend_on_the_depth_point_count() -> None:
     sight = seen(draw(10_000_000))
     once = features(sight.mosaic, sight.count, sight.raised, sight.level_m)
     twice = features(sight.mosaic, 2 * sight.count, sight.raised, sight.level_m)
@@ -67,7 +67,7 @@ def touching(seed: int) -> float:
 
 
 @pytest.mark.parametrize("seed", [10_000_003, 10_000_005])
-def test_fronts_that_are_drawn_in_a_face_frame_stand_apart(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fronts_drawn_in_a_face_frame_do_not_touch(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     frame = FaceFrame(
         top_m=0.04, bottom_m=0.04, between_m=0.03, stile_m=0.04, mullion_m=0.04, light=np.ones(3), behind_m=0, joint_light=1
     )
@@ -81,7 +81,7 @@ def test_fronts_that_are_drawn_in_a_face_frame_stand_apart(seed: int, monkeypatc
     assert touching(seed) < 0.1
 
 
-def test_training_draws_crops_of_one_size_with_their_truth() -> None:
+def test_training_crops_have_a_fixed_size_and_labels() -> None:
     for inputs, truth in crops(10_000_001, count=2):
         assert inputs.shape == (19, 256, 256)
         assert truth.shape == (4, 256, 256)

@@ -38,26 +38,26 @@ def flat() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.zeros(COLUMNS), np.zeros(COLUMNS), np.full(COLUMNS, 20.0)
 
 
-def test_where_a_front_ends_is_told_to_a_cell() -> None:
+def test_the_end_of_a_front_is_located_to_one_cell() -> None:
     level, lift, seen = flat()
     seen[70:] = 0
     (found,) = ends(relief(level, lift, seen))
     assert abs(found - 70) <= 1.0
 
 
-def test_a_front_goes_on_behind_its_bar_and_the_bars_shadow() -> None:
+def test_a_front_continues_behind_a_bar_handle_and_its_shadow() -> None:
     level, lift, seen = flat()
     lift[50:56], seen[56:58] = 0.04, 1.0
     assert ends(relief(level, lift, seen)) == []
 
 
-def test_a_front_ends_at_the_edge_of_a_worktop_as_thick_as_a_bar() -> None:
+def test_a_front_ends_at_a_worktop_edge_as_thick_as_a_bar() -> None:
     level, lift, seen = flat()
     lift[50:56], seen[56:] = 0.04, 0.0
     assert any(abs(found - 50) <= 2.0 for found in ends(relief(level, lift, seen)))
 
 
-def test_a_plane_steps_back_where_a_door_stands_before_another_and_not_where_its_panel_is_sunk() -> None:
+def test_a_depth_step_is_found_between_doors_but_not_at_a_recessed_panel() -> None:
     level, lift, seen = flat()
     level[60:] = -0.03
     (found,) = steps(relief(level, lift, seen))
@@ -67,7 +67,7 @@ def test_a_plane_steps_back_where_a_door_stands_before_another_and_not_where_its
     assert steps(relief(level, lift, seen)) == []
 
 
-def test_the_plane_does_not_end_at_a_pane_of_glass_in_a_frame_but_at_a_channel_between_fronts() -> None:
+def test_a_plane_ends_at_a_channel_but_not_at_a_glass_pane() -> None:
     def framed(top: int, bottom: int) -> list[float]:
         """Level lines of an isolated plane with a hole between these rows."""
         seen = np.zeros((120, 120))

@@ -31,13 +31,13 @@ def cleared(image: np.ndarray, cut: Cell = PANEL) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(("front", "strip"), [(RED, BLACK), (WHITE, BLACK), (BLACK, WHITE), (RED, GREY)])
-def test_a_worktops_edge_and_a_plinth_are_no_part_of_a_front(front: Colour, strip: Colour) -> None:
+def test_a_worktop_edge_and_a_plinth_are_excluded_from_a_front(front: Colour, strip: Colour) -> None:
     image = mosaic(front)
     image[60:76], image[320:340] = strip, strip
     assert cleared(image) == pytest.approx((16, 20), abs=1.5)
 
 
-def test_a_worktops_edge_is_no_part_of_a_drawer_14_cm_high() -> None:
+def test_a_worktop_edge_is_excluded_from_a_14_cm_high_drawer() -> None:
     image = mosaic(RED)
     image[60:76] = BLACK
     assert cleared(image, Cell(80, 60, 260, 132)) == pytest.approx((16, 0), abs=1.5)
@@ -50,26 +50,26 @@ def test_a_handle_below_the_worktop_stays_on_the_front() -> None:
     assert cleared(image) == pytest.approx((16, 0), abs=1.5)
 
 
-def test_a_shadow_is_a_part_of_the_front() -> None:
+def test_a_shadow_stays_part_of_the_front() -> None:
     image = mosaic(RED)
     image[60:72] *= 0.5
     assert cleared(image) == (0, 0)
 
 
-def test_the_rails_of_a_framed_front_are_a_part_of_it_though_its_neighbours_have_them_too() -> None:
+def test_rails_shared_by_neighbouring_fronts_stay_part_of_a_front() -> None:
     image = mosaic(WHITE)
     for left in (-100, 80, 260):
         image[84:316, max(left, 0) + 24 : left + 156] = BLACK  # glass
     assert cleared(image) == (0, 0)
 
 
-def test_a_strip_of_controls_that_ends_with_its_front_is_a_part_of_it() -> None:
+def test_a_control_panel_as_wide_as_its_front_stays_part_of_it() -> None:
     image = mosaic(WHITE)
     image[60:84, 80:260] = BLACK
     assert cleared(image) == (0, 0)
 
 
-def test_a_panel_that_nobody_saw_stays_as_it_was_cut() -> None:
+def test_an_unobserved_panel_stays_as_cut() -> None:
     nothing = np.zeros((400, 340))
     surface = Surface(*as_lab(np.zeros((400, 340, 3), np.uint8)), nothing, nothing)
     assert clear_of_strips(PANEL, surface, CELL_M) == PANEL

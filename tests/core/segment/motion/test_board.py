@@ -29,7 +29,7 @@ class OnePhoto:
         return np.where(self._hand[..., None], np.uint8(40), np.uint8(180)).repeat(3, axis=2)
 
 
-def test_a_dark_hand_on_a_handle_is_no_part_of_the_front_that_it_draws() -> None:
+def test_a_hand_on_a_handle_is_excluded_from_the_mask_of_the_open_front() -> None:
     """It stands no further before the face than a handle does: depth alone keeps it."""
     opened = OpenLeaf(leaf=LEAF.at(joint("out").pose(HELD_M)), movement="out", out_m=HELD_M)
     place = opened.leaf.world_from_front

@@ -12,25 +12,25 @@ def stays(frame: Frame) -> Rigid3 | None:
     return LEAF.world_from_front if HELD[frame.index] else None
 
 
-def test_the_rear_board_of_an_open_unit_tells_its_inner_depth() -> None:
+def test_inner_depth_is_measured_from_the_rear_board_of_an_open_unit() -> None:
     inside = measure_inside(LEAF, stays, filmed("left", HELD))
     assert inside is not None
     assert inside.depth_m == pytest.approx(0.45 + THICKNESS_M - 0.019, abs=0.005)  # the unit's rear, minus a usual front
     assert inside.shelves_m == ()
 
 
-def test_a_row_of_jars_is_no_rear_board() -> None:
+def test_a_row_of_jars_is_not_taken_for_the_rear_board() -> None:
     """One looks past it along the shelf, to a rear that returns no light."""
     inside = measure_inside(LEAF, stays, filmed("left", HELD, jars=True))
     assert inside is None or inside.depth_m is None
 
 
-def test_what_stays_closed_has_no_inside_that_was_seen() -> None:
+def test_a_unit_that_stays_closed_has_no_measured_inside() -> None:
     assert measure_inside(LEAF, lambda frame: None, filmed("left", HELD)) is None
     assert measure_inside(LEAF, lambda frame: LEAF.world_from_front, filmed("left", [0.0] * 12)) is None
 
 
-def test_what_stands_behind_a_unit_is_not_its_rear_board() -> None:
+def test_surfaces_deeper_than_the_unit_are_not_its_rear_board() -> None:
     assert measure_inside(LEAF, stays, filmed("left", HELD), deepest_m=0.4) is None
 
 
@@ -42,7 +42,7 @@ def comes_out(frame: Frame) -> Rigid3 | None:
     return LEAF.world_from_front @ joint("out").pose(state) if state else None
 
 
-def test_what_stays_in_the_unit_is_no_rear_of_a_drawer() -> None:
+def test_the_static_rear_of_a_unit_is_not_the_rear_of_a_drawer() -> None:
     """The unit's own rear board is seen over the front of a drawer, in every frame farther behind that."""
     film = filmed("out", DRAWN)
     assert measure_inside(LEAF, comes_out, film, drawn_out_m=0.1) is None
@@ -54,7 +54,7 @@ def stays_behind(frame: Frame) -> Rigid3 | None:
 
 
 @pytest.mark.parametrize(("thickness_m", "found_m"), [(THICKNESS_M, None), (0.06, 0.06)])
-def test_a_door_thicker_than_a_board_shows_it_at_its_edge(thickness_m: float, found_m: float | None) -> None:
+def test_the_thickness_of_a_thick_door_is_measured_at_its_edge(thickness_m: float, found_m: float | None) -> None:
     film = filmed("left", HELD, thickness_m=thickness_m)
     found = front_thickness(LEAF, lambda frame: LEAF.world_from_front @ joint("left").pose(HELD[frame.index]), film)
     assert found == (None if found_m is None else pytest.approx(found_m, abs=0.015))  # depth blurs an edge by a pixel

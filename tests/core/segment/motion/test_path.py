@@ -5,7 +5,7 @@ import numpy as np
 from r2c2r_core.segment.motion.path import Params, best_path
 
 
-def test_the_path_is_the_best_of_all() -> None:
+def test_best_path_matches_exhaustive_search() -> None:
     """By trying every one."""
     log = np.random.default_rng(2).normal(0, 2, (6, 4))
     params = Params()

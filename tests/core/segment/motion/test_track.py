@@ -32,7 +32,7 @@ def quick(ways: tuple[str, ...], few: tuple[str, ...]) -> list[Any]:
 
 
 @pytest.mark.parametrize("way", quick(RAD + M, ("left", "bottom", "out", "slides_left")))
-def test_each_joint_is_told_from_the_others_and_measured(way: str) -> None:
+def test_each_joint_type_is_classified_and_measured(way: str) -> None:
     states = opened_and_held(np.deg2rad(75) if way in RAD else 0.33)
     motion = find_motion(LEAF, scene(way, states))
     assert motion is not None
@@ -46,7 +46,7 @@ def test_each_joint_is_told_from_the_others_and_measured(way: str) -> None:
     assert motion.stop_seen
 
 
-def test_a_leaf_that_rests_almost_closed_is_closed() -> None:
+def test_a_leaf_resting_almost_closed_counts_as_closed() -> None:
     """A pose or a frame's profile turns all depth of a closed leaf by more than a frame errs by itself."""
     states = np.maximum(opened_and_held(np.deg2rad(75)), np.deg2rad(2.6))
     motion = find_motion(LEAF, scene("left", states))
@@ -55,12 +55,12 @@ def test_a_leaf_that_rests_almost_closed_is_closed() -> None:
     assert motion.states[9].value == pytest.approx(states[9], abs=np.deg2rad(2))  # while moving it is where it was observed
 
 
-def test_a_flap_opens_no_further_than_its_stays_let_it() -> None:
+def test_flap_hypotheses_are_limited_to_120_degrees() -> None:
     assert max(joint(way).states.max() for way in ("top", "bottom")) <= np.deg2rad(120) < joint("left").states.max()
 
 
 @pytest.mark.parametrize("way", quick(RAD, ("left", "top")))
-def test_a_hinge_behind_its_edge_is_found_there(way: str) -> None:
+def test_a_concealed_hinge_is_located_behind_the_edge(way: str) -> None:
     """A concealed hinge turns about a line inside the unit: far from what is usual, and three ranges of angles tell it."""
     off = (0.012, 0.015, 0.0) if way in ("left", "right") else (0.0, 0.015, 0.012)
     states = np.concatenate([np.zeros(4), np.linspace(0, np.deg2rad(95), 45)])
@@ -77,15 +77,15 @@ def test_a_hinge_behind_its_edge_is_found_there(way: str) -> None:
     assert 0.0005 < spread < 0.006
 
 
-def test_a_leaf_that_never_moves_has_no_motion() -> None:
+def test_a_static_leaf_has_no_motion() -> None:
     assert find_motion(LEAF, scene("left", np.zeros(30))) is None
 
 
-def test_an_arm_before_a_closed_leaf_is_no_motion() -> None:
+def test_an_arm_before_a_closed_leaf_is_not_reported_as_motion() -> None:
     assert find_motion(LEAF, scene("left", np.zeros(30), hands=range(5, 20))) is None
 
 
-def test_an_arm_before_an_open_leaf_leaves_its_joint_as_it_is() -> None:
+def test_an_arm_before_an_open_leaf_does_not_change_its_joint() -> None:
     states = opened_and_held(np.deg2rad(60))
     motion = find_motion(LEAF, scene("right", states, hands=range(8, 24, 2)))
     assert motion is not None
@@ -100,7 +100,7 @@ HELD_THEN_CLOSED = np.concatenate([np.full(12, 1.2), np.linspace(1.2, 0, 12), np
 @pytest.mark.parametrize(
     "states", [np.linspace(1.2, 0, 30), np.linspace(0, 1.2, 30), np.repeat([0.0, 1.2], 15), HELD_THEN_CLOSED]
 )
-def test_open_at_the_start_left_open_or_opened_unseen(states: np.ndarray) -> None:
+def test_partly_filmed_openings_are_tracked_without_a_stop(states: np.ndarray) -> None:
     motion = find_motion(LEAF, scene("left", states))
     assert motion is not None
     values = np.array([motion.states[k].value for k in range(len(states))], dtype=float)
@@ -108,35 +108,35 @@ def test_open_at_the_start_left_open_or_opened_unseen(states: np.ndarray) -> Non
     assert not motion.stop_seen
 
 
-def test_evidence_overrules_what_is_usual() -> None:
+def test_evidence_overrides_a_wrong_prior() -> None:
     motion = find_motion(LEAF, scene("left", opened_and_held(1.0)), {"out": 8.0})
     assert motion is not None
     assert motion.kind == "revolute"
 
 
 @pytest.mark.parametrize("way", ["left", "slides_left"])
-def test_what_stands_so_all_the_time_is_no_motion(way: str) -> None:
+def test_a_constant_open_state_is_not_reported_as_motion(way: str) -> None:
     """A rectangle drawn too wide looks like a leaf that is half slid away: only a change tells a joint."""
     assert find_motion(LEAF, scene(way, np.full(30, 0.3))) is None
 
 
-def test_half_a_front_is_a_leaf_only_where_it_opens_as_one_of_a_pair() -> None:
+def test_a_leaf_of_a_pair_must_open_about_the_given_side() -> None:
     states = opened_and_held(1.0)
     assert find_motion(LEAF, scene("bottom", states), {"left": 8.0}, "left", only=True) is None
     assert find_motion(LEAF, scene("left", states), {"left": 8.0}, "left", only=True) is not None
 
 
-def test_another_leaf_that_stands_where_this_one_would_is_not_this_one() -> None:
+def test_another_leaf_in_the_opened_position_is_not_reported_as_motion() -> None:
     """Its place is only hidden then: a door that is open leaves it to be seen into."""
     assert find_motion(LEAF, scene("left", np.zeros(36), other=range(10, 26))) is None
 
 
-def test_machines_beside_a_leaf_are_not_that_leaf_opened() -> None:
+def test_static_appliances_beside_a_leaf_are_not_reported_as_motion() -> None:
     """One stands where an open door would, the other hides the closed one; but they stand there in every frame."""
     assert find_motion(LEAF, scene("left", np.zeros(36), niche=True)) is None
 
 
-def test_what_stands_open_when_the_film_begins_has_met_no_stop() -> None:
+def test_a_leaf_open_at_the_start_has_no_observed_stop() -> None:
     """Its first frames err by a little: nobody saw it arrive."""
     states = np.concatenate([[1.15], np.full(14, 1.2), np.linspace(1.2, 0, 12), np.zeros(6)])
     motion = find_motion(LEAF, scene("left", states))
@@ -144,7 +144,7 @@ def test_what_stands_open_when_the_film_begins_has_met_no_stop() -> None:
     assert not motion.stop_seen
 
 
-def test_black_glass_is_closed_where_it_is_silent() -> None:
+def test_black_glass_counts_as_closed_where_it_has_no_depth() -> None:
     """An oven's door: its outer face returns no light, its inner one does."""
     states = opened_and_held(1.4)
     motion = find_motion(LEAF, scene("bottom", states, glass=True))
@@ -154,7 +154,7 @@ def test_black_glass_is_closed_where_it_is_silent() -> None:
     assert np.quantile(np.abs(held - 1.4), 0.9) < np.deg2rad(2)
 
 
-def test_a_drawer_below_a_door_is_a_leaf_of_its_own() -> None:
+def test_a_drawer_below_a_door_is_tracked_as_a_separate_leaf() -> None:
     whole = Leaf(
         world_from_front=LEAF.world_from_front @ Rigid3(np.eye(3), np.array([0.0, 0.0, 0.15])), width_m=0.5, height_m=0.9
     )
@@ -166,13 +166,13 @@ def test_a_drawer_below_a_door_is_a_leaf_of_its_own() -> None:
     assert drawer.largest == pytest.approx(0.3, abs=0.006)
 
 
-def test_a_door_that_swings_is_no_drawer_below_a_seam() -> None:
+def test_a_swinging_door_is_not_reported_as_a_drawer_below_a_seam() -> None:
     film = scene("left", opened_and_held(1.2))
     (door,) = FilmedLeaves(LEAF, category_of("refrigerator"), film, 0.6, (-0.1,)).motions
     assert (door.part, door.kind) == ("", "revolute")
 
 
-def test_a_leaf_opens_no_further_than_to_the_floor() -> None:
+def test_a_bottom_hinged_leaf_opens_at_most_to_the_floor() -> None:
     def widest(floor_m: float | None) -> float:
         return float(next(one for one in hypotheses(LEAF, floor_m) if one.way == "bottom").states[-1])
 

@@ -38,7 +38,7 @@ def name_of(proposal: Proposal, truth: Truth) -> str | None:
     return names[0] if names else None
 
 
-def test_each_front_is_proposed_once_under_its_name(proposals: tuple[Proposal, ...], boxes: Boxes) -> None:
+def test_each_front_is_proposed_once_with_its_category(proposals: tuple[Proposal, ...], boxes: Boxes) -> None:
     fronts = [proposal for proposal in proposals if proposal.kind == "front"]
     named = {name_of(proposal, boxes[1]): proposal.category for proposal in fronts}
     assert named == dict.fromkeys(DOORS, "cabinet") | dict.fromkeys(DRAWERS, "drawer")
@@ -46,7 +46,7 @@ def test_each_front_is_proposed_once_under_its_name(proposals: tuple[Proposal, .
 
 
 @pytest.mark.parametrize("things", [1, pytest.param(None, marks=pytest.mark.slow, id="all")])
-def test_the_click_alone_gives_the_outline(
+def test_the_proposed_click_reproduces_the_proposed_outline(
     proposals: tuple[Proposal, ...], session: GeometricSession, things: int | None
 ) -> None:
     found = [proposal for proposal in proposals if proposal.kind != "front"]
@@ -58,7 +58,7 @@ def test_the_click_alone_gives_the_outline(
         assert mask[int(proposal.click.y), int(proposal.click.x)]
 
 
-def test_handles_come_with_their_fronts_and_clicks_avoid_them(proposals: tuple[Proposal, ...]) -> None:
+def test_proposed_clicks_avoid_the_handles_of_their_fronts(proposals: tuple[Proposal, ...]) -> None:
     for proposal in proposals:
         if proposal.kind != "front":
             continue
@@ -66,7 +66,7 @@ def test_handles_come_with_their_fronts_and_clicks_avoid_them(proposals: tuple[P
         assert not (u.min() <= proposal.click.x <= u.max() and v.min() <= proposal.click.y <= v.max())
 
 
-def test_the_work_is_told_and_proposals_grow(steps: list[tuple[float, tuple[Proposal, ...]]]) -> None:
+def test_progress_and_proposals_increase_until_done(steps: list[tuple[float, tuple[Proposal, ...]]]) -> None:
     fractions = [fraction for fraction, _ in steps]
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
@@ -76,7 +76,7 @@ def test_the_work_is_told_and_proposals_grow(steps: list[tuple[float, tuple[Prop
     assert confidences == sorted(confidences, reverse=True)
 
 
-def test_a_clicked_object_takes_its_proposal_and_no_other(proposals: tuple[Proposal, ...], boxes: Boxes) -> None:
+def test_a_mask_covers_its_own_proposal_and_no_other(proposals: tuple[Proposal, ...], boxes: Boxes) -> None:
     for proposal in (proposal for proposal in proposals if proposal.kind == "front"):
         masks = {name: masks[proposal.click.frame] for name, masks in boxes[1].items()}
         own = name_of(proposal, boxes[1])
@@ -84,7 +84,7 @@ def test_a_clicked_object_takes_its_proposal_and_no_other(proposals: tuple[Propo
             assert is_taken(covered_share(unpack_mask(proposal.outline), mask)) == (name == own)
 
 
-def test_fronts_that_overlap_are_doubted_and_neighbours_are_not(
+def test_overlapping_proposals_are_flagged_and_neighbours_are_not(
     proposals: tuple[Proposal, ...], session: GeometricSession
 ) -> None:
     assert {proposal.doubts for proposal in proposals} == {()}
@@ -127,13 +127,13 @@ def bar(width: float, height: float) -> GridHandle:
         (FrontLook(width_m=0.6, height_m=0.7, bottom_m=0.1, handle=None, dark=0.9), "cabinet"),
     ],
 )
-def test_size_place_and_handle_name_a_front(look: FrontLook, category: str) -> None:
+def test_size_position_and_handle_determine_the_category_of_a_front(look: FrontLook, category: str) -> None:
     named, usual = name_front(look)
     assert (named, usual) == (category, pytest.approx(1.0, abs=0.01))
 
 
 @pytest.mark.parametrize(("width", "height", "bottom"), [(1.9, 0.08, 0.02), (1.4, 0.9, 0.9), (0.1, 0.8, 0.1), (0.5, 1.1, 0.7)])
-def test_plinths_walls_and_fillers_are_unusual_fronts(width: float, height: float, bottom: float) -> None:
+def test_plinths_walls_and_fillers_get_a_low_front_score(width: float, height: float, bottom: float) -> None:
     assert name_front(FrontLook(width_m=width, height_m=height, bottom_m=bottom, handle=None))[1] < 0.2
 
 
@@ -141,11 +141,11 @@ def test_plinths_walls_and_fillers_are_unusual_fronts(width: float, height: floa
     ("extent", "base", "category"),
     [((0.08, 0.08, 0.28), 0.9, "bottle"), ((0.09, 0.11, 0.1), 0.9, "mug"), ((0.5, 0.5, 0.9), 0.0, "chair")],
 )
-def test_size_names_a_thing(extent: tuple[float, float, float], base: float, category: str) -> None:
+def test_size_determines_the_category_of_a_thing(extent: tuple[float, float, float], base: float, category: str) -> None:
     assert name_thing(np.array(extent), base) == category
 
 
-def test_what_stands_needs_no_edge_at_its_foot_and_a_front_needs_all_four(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_lower_edge_is_ignored_only_for_floor_standing_objects(monkeypatch: pytest.MonkeyPatch) -> None:
     """A refrigerator's foot lies in shadow: the network sees no edge there."""
     monkeypatch.setattr(panels, "edge_strengths", lambda _: (0.96, 0.97, 0.98, 0.12))
     front = cast(Front, None)  # only the edges of the front are evaluated

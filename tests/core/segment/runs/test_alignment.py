@@ -26,10 +26,10 @@ def topped(cuts: tuple[Cell, ...], shown: int, cut: Cell) -> float:
 
 
 @pytest.mark.parametrize("shown", [0, 2])
-def test_a_top_that_does_not_show_is_level_with_the_nearest_that_does(shown: int) -> None:
+def test_an_invisible_top_edge_aligns_with_the_nearest_visible_one(shown: int) -> None:
     assert topped(CUTS, shown, CUTS[1]) == pytest.approx(40, abs=1.5)
     assert topped(CUTS, shown, CUTS[2 - shown]) == pytest.approx(40, abs=1.5)  # across another invisible one
 
 
-def test_a_front_that_was_cut_lower_than_depth_ends_short_keeps_its_top() -> None:
+def test_a_front_cut_much_lower_keeps_its_own_top_edge() -> None:
     assert topped((*CUTS, LOW), 2, LOW) == pytest.approx(LOW.top, abs=1.5)

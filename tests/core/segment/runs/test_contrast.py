@@ -23,20 +23,20 @@ def mosaic(fill: tuple[int, int, int], gap: str | None = None) -> np.ndarray:
     return np.asarray(cv2.GaussianBlur(image, (0, 0), 0.8))
 
 
-def test_what_is_painted_as_the_wall_changes_nowhere() -> None:
+def test_a_panel_in_the_wall_colour_has_no_edge_contrast() -> None:
     assert max(edge_changes(mosaic(WALL), PANEL)) == pytest.approx(0, abs=0.1)
 
 
-def test_another_hue_of_the_same_lightness_changes_at_every_edge() -> None:
+def test_a_hue_change_at_equal_lightness_gives_contrast_on_every_edge() -> None:
     assert min(edge_changes(mosaic(PAINT), PANEL)) > 3
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_a_gap_is_a_change_at_its_own_edge_alone(side: str) -> None:
+def test_a_gap_gives_contrast_only_at_its_own_edge(side: str) -> None:
     shown = dict(zip(SIDES, edge_changes(mosaic(WALL, gap=side), PANEL), strict=True))
     assert shown.pop(side) > 10
     assert max(shown.values()) < 3
 
 
-def test_a_panel_may_end_where_the_mosaic_ends() -> None:
+def test_a_panel_that_fills_the_mosaic_has_four_edge_values() -> None:
     assert len(edge_changes(mosaic(PAINT)[58:302, 58:262], Cell(0, 0, 204, 244))) == 4

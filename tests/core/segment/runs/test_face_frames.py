@@ -58,13 +58,13 @@ def edges(cell: Cell) -> tuple[float, ...]:
 @pytest.mark.parametrize(
     "cut", [grown(top=RAIL), grown(left=2 * RAIL), grown(top=RAIL, bottom=RAIL), grown(left=2 * RAIL, top=RAIL, right=2 * RAIL)]
 )
-def test_a_front_is_what_its_gaps_enclose_not_the_frame_round_it(cut: Cell) -> None:
+def test_a_front_is_bounded_by_its_gaps_without_the_face_frame(cut: Cell) -> None:
     cells = inset_fronts(mosaic(FRONT), relief(), odds(), [cut], CELL_M)
     assert edges(cells[0]) == pytest.approx(edges(FRONT), abs=CLOSE)
     assert sum(cell.width * cell.height for cell in cells) == pytest.approx(cut.width * cut.height)  # they tile it
 
 
-def test_grain_where_the_network_rules_edges_out_is_no_gap() -> None:
+def test_wood_grain_is_no_gap_where_the_network_excludes_edges() -> None:
     cut, lowest = grown(left=2 * RAIL, top=RAIL, right=2 * RAIL), Cell(FRONT.left, FRONT.bottom, FRONT.right, FRONT.bottom)
     grain = mosaic(lowest, grain=[FRONT])
     assert inset_fronts(grain, relief(), odds(-4.0), [cut], CELL_M) == [cut]
@@ -72,37 +72,37 @@ def test_grain_where_the_network_rules_edges_out_is_no_gap() -> None:
 
 
 @pytest.mark.parametrize("cut", [grown(top=RAIL), grown(top=RAIL, right=RAIL)])
-def test_a_line_as_clear_as_the_other_gaps_is_one_whatever_the_network_says(cut: Cell) -> None:
+def test_a_line_as_clear_as_the_other_gaps_overrides_the_network(cut: Cell) -> None:
     cells = inset_fronts(mosaic(FRONT), relief(), odds(-4.0), [cut], CELL_M)
     assert edges(cells[0]) == pytest.approx(edges(FRONT), abs=CLOSE)
 
 
-def test_a_worktops_edge_that_goes_on_over_a_stile_does_not_make_it_a_part_of_the_front() -> None:
+def test_a_worktop_edge_over_a_stile_does_not_extend_the_front() -> None:
     under = mosaic(FRONT, dark=150, worktop=round(FRONT.top))
     cells = inset_fronts(under, relief(), odds(), [grown(right=RAIL)], CELL_M)
     assert edges(cells[0]) == pytest.approx(edges(FRONT), abs=CLOSE)
 
 
 @pytest.mark.parametrize("frame", [RAIL, 2 * RAIL])
-def test_a_panel_sunk_in_a_front_is_a_part_of_it(frame: int) -> None:
+def test_a_recessed_panel_stays_part_of_its_front(frame: int) -> None:
     sunk = Cell(FRONT.left + frame, FRONT.top + frame, FRONT.right - frame, FRONT.bottom - frame)
     assert inset_fronts(mosaic(FRONT, sunk), relief(), odds(), [FRONT], CELL_M) == [FRONT]
 
 
-def test_a_panel_that_lies_behind_what_is_round_it_is_a_frames_and_no_front() -> None:
+def test_a_recessed_panel_is_not_an_inset_front_but_a_shaker_door_is() -> None:
     inset = grown(left=2 * RAIL, top=RAIL, right=2 * RAIL)
     assert inset_fronts(mosaic(FRONT), relief(0.012), odds(), [inset], CELL_M) == [inset]
     sunk = Cell(FRONT.left + 20, FRONT.top + 20, FRONT.right - 20, FRONT.bottom - 20)  # a shaker door inset in a face frame
     assert len(inset_fronts(mosaic(FRONT), relief(0.012, sunk), odds(), [inset], CELL_M)) > 1
 
 
-def test_what_lies_behind_beside_a_cell_makes_no_front_in_it_sunk() -> None:
+def test_a_recessed_plinth_outside_a_cell_does_not_affect_its_front() -> None:
     plinth = Cell(FRONT.left, FRONT.bottom, FRONT.right, FRONT.bottom + 20)
     cells = inset_fronts(mosaic(FRONT), relief(0.05, plinth), odds(), [grown(top=RAIL)], CELL_M)
     assert edges(cells[0]) == pytest.approx(edges(FRONT), abs=CLOSE)
 
 
-def test_lines_that_end_at_the_stiles_of_a_frame_part_what_is_between_them() -> None:
+def test_lines_between_the_stiles_of_a_frame_separate_fronts() -> None:
     seen, row = odds(-6.0), 180
     seen.level[row // STEP, round(FRONT.left) // STEP : round(FRONT.right) // STEP] = 4.0
     gaps = mosaic(FRONT, Cell(FRONT.left, row, FRONT.right, row))
@@ -111,7 +111,7 @@ def test_lines_that_end_at_the_stiles_of_a_frame_part_what_is_between_them() -> 
     assert [front[1::2] for front in fronts] == [pytest.approx((60, row), abs=CLOSE), pytest.approx((row, 300), abs=CLOSE)]
 
 
-def test_a_shadow_across_a_front_is_none_of_a_frame() -> None:
+def test_a_shadow_across_a_front_is_not_a_face_frame() -> None:
     shadow = Cell(-5, -5, 325, FRONT.top + RAIL)  # from wall to wall
     assert inset_fronts(mosaic(FRONT, shadow), relief(), odds(), [FRONT], CELL_M) == [FRONT]
 
@@ -120,14 +120,14 @@ def strips(cut: Cell) -> Sequence[Cell]:
     return [cut, Cell(cut.left, cut.top - 8, cut.right, cut.top), Cell(cut.left, 0, cut.right, cut.top - 8)]
 
 
-def test_the_gaps_of_a_front_end_before_a_rail_and_go_on_beside_its_own() -> None:
+def test_gaps_stop_at_a_face_frame_rail_but_continue_beside_an_own_rail() -> None:
     _, strip, _ = strips(FRONT)
     assert is_rail(mosaic(FRONT), FRONT, strip, axis=1)
     assert not is_rail(mosaic(FRONT, grown(top=8)), FRONT, strip, axis=1)
     assert not is_rail(mosaic(), FRONT, strip, axis=1)  # nothing is visible
 
 
-def test_an_edge_refined_past_a_rail_stays_where_it_was_cut() -> None:
+def test_an_edge_refined_past_a_face_frame_rail_is_reset_to_its_cut() -> None:
     refined = grown(top=7)
     assert edges(clear_of_rails(mosaic(FRONT), refined, FRONT, strips(FRONT), CELL_M)) == edges(FRONT)
     near = grown(top=2)

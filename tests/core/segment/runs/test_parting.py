@@ -29,7 +29,7 @@ PANEL = Cell(0.0, 0.0, WIDE * STEP, HIGH * STEP)
 STACK = [at(50, 20), at(50, 70), at(50, 120), at(150, 30)]  # three drawers, and a door beside them
 
 
-def test_a_faint_seam_between_stacks_comes_before_sure_ones_that_end_at_it() -> None:
+def test_a_faint_seam_between_stacks_is_cut_before_clear_seams_ending_at_it() -> None:
     level, upright = unseen()
     upright[:, 100] = -1.0  # faint
     level[45:47, :100] = level[93:95, :100] = 5.0
@@ -42,7 +42,7 @@ def test_a_faint_seam_between_stacks_comes_before_sure_ones_that_end_at_it() -> 
         assert sum(part.contains(column * STEP, row * STEP) for part in parts) == 1
 
 
-def test_it_is_the_same_partition_whichever_object_asks() -> None:
+def test_the_partition_does_not_depend_on_object_order() -> None:
     level, upright = unseen()
     upright[:, 100] = -1.0
     level[45:47, :100] = level[93:95, :100] = 5.0
@@ -52,12 +52,12 @@ def test_it_is_the_same_partition_whichever_object_asks() -> None:
     }
 
 
-def test_where_no_seam_is_at_all_likely_objects_share_a_part() -> None:
+def test_objects_share_a_part_where_no_seam_is_likely() -> None:
     level, upright = (np.full((HIGH, WIDE), -9.0, np.float32) for _ in range(2))
     assert parted(field_of(level, upright), PANEL, [at(50, 70), at(60, 75)]).parts == (PANEL,)
 
 
-def test_clicks_of_one_object_are_never_parted() -> None:
+def test_clicks_of_one_object_are_never_separated() -> None:
     level, upright = unseen()
     upright[:, 100] = 5.0  # between the two clicks of the first
     level[69:71] = 1.0

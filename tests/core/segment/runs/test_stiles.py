@@ -54,7 +54,7 @@ FLAT = Relief(2 * CELL_M, np.full((170, 160), 10.0), *(np.zeros((170, 160)) for 
 PANEL_LINES = ([PANEL.left, PANEL.right], [PANEL.top, PANEL.bottom])
 
 
-def test_a_strip_as_wide_as_the_opposite_stile_belongs_to_the_door() -> None:
+def test_a_strip_as_wide_as_the_opposite_stile_joins_the_door() -> None:
     cells = whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), BLANK, FLAT)
     door = door_of(cells)
     assert (door.left, door.top, door.right, door.bottom) == pytest.approx((80, 20, 280, 320), abs=2)
@@ -70,17 +70,17 @@ def test_a_strip_as_wide_as_the_opposite_stile_belongs_to_the_door() -> None:
         ([], []),  # slab
     ],
 )
-def test_a_strip_beside_a_whole_door_is_none_of_it(upright: list[float], level: list[float]) -> None:
+def test_a_strip_beside_a_complete_door_is_not_joined(upright: list[float], level: list[float]) -> None:
     assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(upright, level), BLANK, FLAT)) == CUT
 
 
-def test_a_strip_of_a_face_frame_is_no_stile() -> None:
+def test_a_face_frame_strip_outside_the_door_gap_is_not_joined() -> None:
     gaps = np.full((340, 320), 170, np.float32)
     cv2.rectangle(gaps, (round(CUT.left), round(CUT.top)), (round(CUT.right), round(CUT.bottom)), 90, 1)
     assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), Contrast(gaps), FLAT)) == CUT
 
 
-def test_what_is_beyond_a_line_from_corner_to_corner_is_no_stile() -> None:
+def test_a_strip_beyond_a_full_height_line_is_not_joined() -> None:
     """A gap parts it from the front; the line round a sunk panel ends at the stiles. Faint borders do not tell a rail."""
     light = np.full((340, 320), 170, np.float32)
     light[round(CUT.top) : round(CUT.bottom), round(CUT.left)] = 150
@@ -90,7 +90,7 @@ def test_what_is_beyond_a_line_from_corner_to_corner_is_no_stile() -> None:
 
 
 @pytest.mark.parametrize(("sunk_m", "marked", "whole"), [(0.007, True, True), (0.007, False, False), (0.001, True, False)])
-def test_light_may_hide_a_line_around_a_panel_that_depth_shows_sunk(sunk_m: float, marked: bool, whole: bool) -> None:
+def test_a_strip_is_joined_by_depth_only_with_a_line_and_a_recessed_panel(sunk_m: float, marked: bool, whole: bool) -> None:
     """Nothing shows opposite the strip: depth and a line between them tell that it is a stile."""
     light = np.full((340, 320), 170, np.float32)
     light[round(PANEL.top) : round(PANEL.bottom), round(CUT.left)] = 150 if marked else 170
@@ -101,7 +101,7 @@ def test_light_may_hide_a_line_around_a_panel_that_depth_shows_sunk(sunk_m: floa
     assert (door_of(cells) != CUT) == whole
 
 
-def test_grain_on_a_sunk_panel_does_not_part_it_from_its_stile() -> None:
+def test_wood_grain_on_a_recessed_panel_does_not_separate_its_stile() -> None:
     """Lines of the grain lie where a panel of its own would begin; the panel's line ends at both rails."""
     light, level = np.full((340, 320), 170, np.float32), np.zeros((170, 160))
     light[round(PANEL.top) : round(PANEL.bottom), round(CUT.left)] = 150
@@ -114,7 +114,7 @@ def test_grain_on_a_sunk_panel_does_not_part_it_from_its_stile() -> None:
 
 
 @pytest.mark.parametrize(("rail", "found"), [(30, 30), (15, 22)])
-def test_an_edge_in_a_shadow_is_as_far_from_the_sunk_panel_as_the_others(rail: int, found: float) -> None:
+def test_a_shadowed_edge_is_placed_at_the_common_frame_width(rail: int, found: float) -> None:
     """The shadow ends at row 30; it was followed up to row 22. All other stiles and rails are 30 cells wide."""
     sunk = Cell(110, 30 + rail, 250, 290)
     light = np.full((340, 320), 170, np.float32)
@@ -125,7 +125,7 @@ def test_an_edge_in_a_shadow_is_as_far_from_the_sunk_panel_as_the_others(rail: i
 
 
 @pytest.mark.parametrize(("sunk_m", "found"), [(0.007, 30), (0.0, 22)])
-def test_an_edge_in_a_shadow_is_as_far_from_a_panel_that_only_depth_shows_sunk(sunk_m: float, found: float) -> None:
+def test_a_shadowed_edge_is_placed_from_a_panel_recessed_only_in_depth(sunk_m: float, found: float) -> None:
     """Light from above shows the upper line of the panel alone."""
     light, level = np.full((340, 320), 170, np.float32), np.zeros((170, 160))
     light[60, 110:250], level[30:145, 55:125] = 120, -sunk_m
@@ -134,11 +134,11 @@ def test_an_edge_in_a_shadow_is_as_far_from_a_panel_that_only_depth_shows_sunk(s
     assert evenly_framed(contrast, relief, followed, CELL_M).top == pytest.approx(found, abs=3)
 
 
-def test_a_door_beside_a_door_is_no_stile() -> None:
+def test_an_adjacent_door_is_not_joined_as_a_stile() -> None:
     assert door_of(whole_frames(odds(0), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), BLANK, FLAT)) == CUT
 
 
-def test_the_panels_of_a_run_are_whole_frames(session: GeometricSession, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_panels_of_a_run_pass_through_whole_frames(session: GeometricSession, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[list[Cell]] = []
 
     def noted(
@@ -158,9 +158,7 @@ def test_the_panels_of_a_run_are_whole_frames(session: GeometricSession, monkeyp
     assert list(run.cells) in made
 
 
-def test_the_panels_of_a_run_are_inset_before_they_are_made_whole(
-    session: GeometricSession, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_panels_of_a_run_pass_through_inset_fronts(session: GeometricSession, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[Cell] = []
 
     def halved(contrast: Contrast, relief: Relief, odds: PanelOdds, cells: Sequence[Cell], cell_m: float) -> list[Cell]:

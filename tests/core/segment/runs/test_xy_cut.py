@@ -41,13 +41,13 @@ def cut(width: int, height: int, upright: list[Line], level: list[Line]) -> list
     return cut_panels(odds(width, height, upright, level), Cell(0, 0, width, height), CELL_M)
 
 
-def test_a_line_that_shows_over_most_of_its_span_is_a_cut_and_one_over_the_half_is_not() -> None:
+def test_a_line_is_cut_where_most_but_not_half_of_its_span_shows() -> None:
     assert len(cut(240, 288, [], [(144, 0, 240)])) == 2
     assert len(cut(240, 288, [], [(144, 0, 100), (144, 160, 240)])) == 2  # a handle is across the line
     assert len(cut(240, 288, [], [(144, 60, 180)])) == 1
 
 
-def test_handles_that_are_level_do_not_cut_two_units_at_once() -> None:
+def test_level_handles_do_not_cut_two_units_at_once() -> None:
     cells = cut(480, 288, [(240, 0, 288)], [(90, 36, 180), (90, 300, 444)])
     assert sorted((round(cell.left), round(cell.right), round(cell.height)) for cell in cells) == [
         (0, 241, 288),
@@ -55,19 +55,19 @@ def test_handles_that_are_level_do_not_cut_two_units_at_once() -> None:
     ]
 
 
-def test_a_drawer_stack_is_cut_beside_a_door_that_goes_past_it() -> None:
+def test_a_drawer_stack_is_cut_beside_a_full_height_door() -> None:
     cells = cut(480, 288, [(240, 0, 288)], [(96, 0, 240), (192, 0, 240)])
     assert sorted((round(cell.left), round(cell.top)) for cell in cells) == [(0, 0), (0, 97), (0, 193), (241, 0)]
 
 
-def test_a_door_between_two_stacks_is_parted_from_them_before_their_seams_in_line_cut_it() -> None:
+def test_aligned_seams_of_two_stacks_do_not_cut_the_door_between_them() -> None:
     stacks = [(row, *span) for row in (96, 192) for span in ((0, 600), (760, 1400))]
     cells = cut(1400, 288, [(600, 0, 288), (760, 0, 288)], stacks)
     assert [(round(cell.left), round(cell.right)) for cell in cells if cell.height > 280] == [(601, 761)]
     assert len(cells) == 7
 
 
-def test_a_seam_that_poses_bend_is_one_cut_at_its_mean() -> None:
+def test_a_seam_bent_by_pose_errors_is_one_cut_at_its_mean() -> None:
     bent = odds(240, 288, [(112 + 2 * (row // 48), row, row + 48) for row in range(0, 288, 48)], [])
     left, right = sorted(cut_panels(bent, Cell(0, 0, 240, 288), CELL_M), key=lambda cell: cell.left)
     assert left.right == right.left == pytest.approx(118, abs=1.5)
@@ -75,13 +75,13 @@ def test_a_seam_that_poses_bend_is_one_cut_at_its_mean() -> None:
     assert len(cut_panels(jagged, Cell(0, 0, 240, 288), CELL_M)) == 1
 
 
-def test_a_faint_seam_between_two_handles_is_a_cut_and_without_them_is_not() -> None:
+def test_a_faint_seam_is_cut_only_between_two_handles() -> None:
     whole = Cell(0, 0, 240, 144)
     assert len(cut_panels(odds(240, 144, [], [(72, 0, 240)], sure=-0.3), whole, CELL_M)) == 1
     assert len(cut_panels(odds(240, 144, [], [(72, 0, 240)], sure=-0.3, handles=[(120, 30), (120, 104)]), whole, CELL_M)) == 2
 
 
-def test_a_stile_with_the_handle_on_it_is_no_front() -> None:
+def test_a_narrow_stile_with_the_handle_is_not_cut_off() -> None:
     """A faint line at 6 cm from a door's edge: a strip so narrow is hardly ever a front, nor the rest without handle."""
     whole, line = Cell(0, 0, 200, 288), [(176, 0, 288)]
     assert len(cut_panels(odds(200, 288, line, [], sure=1.0, handles=[(188, 60)]), whole, CELL_M)) == 1
@@ -90,17 +90,17 @@ def test_a_stile_with_the_handle_on_it_is_no_front() -> None:
 
 
 @pytest.mark.parametrize("grid", [Cell(0, 0, 8, 400), Cell(0, 0, 400, 8), Cell(0, 0, 2, 2), Cell(0, 0, 1, 1)])
-def test_what_is_too_small_to_cut_stays_whole(grid: Cell) -> None:
+def test_cells_too_small_to_cut_stay_whole(grid: Cell) -> None:
     assert cut_panels(odds(400, 400, [(4, 0, 400)], [(4, 0, 400)]), grid, CELL_M) == [grid]
 
 
-def test_edges_far_from_any_front_cut_nothing() -> None:
+def test_edges_outside_fronts_are_not_cut() -> None:
     tiles = odds(240, 288, [(120, 0, 288)], [])
     tiles.front[:] = -4
     assert len(cut_panels(tiles, Cell(0, 0, 240, 288), CELL_M)) == 1
 
 
-def test_an_unlikely_line_is_found_where_somebody_says_that_there_is_one() -> None:
+def test_an_unlikely_line_is_found_only_when_requested() -> None:
     faint = odds(240, 288, [(100, 0, 288)], [], sure=-1.0)
     whole = Cell(0, 0, 240, 288)
     assert cut_panels(faint, whole, CELL_M) == [whole]
@@ -111,13 +111,13 @@ def test_an_unlikely_line_is_found_where_somebody_says_that_there_is_one() -> No
 
 
 @pytest.mark.parametrize(("front_odds", "cells"), [(-0.5, 1), (-3.5, 2)])
-def test_a_front_ends_at_an_unlikely_line_only_before_what_is_surely_none(front_odds: float, cells: int) -> None:
+def test_an_unlikely_line_is_cut_only_beside_a_clear_non_front_area(front_odds: float, cells: int) -> None:
     seen = odds(240, 288, [], [(180, 0, 240)], sure=-2.0)
     seen.front[90:] = front_odds
     assert len(cut_panels(seen, Cell(0, 0, 240, 288), CELL_M)) == cells
 
 
-def test_a_click_on_an_ovens_window_means_the_oven() -> None:
+def test_a_click_on_an_oven_window_selects_the_whole_oven() -> None:
     window, frame = Cell(36, 96, 204, 240), Cell(0, 0, 240, 288)
     cells = (window, Cell(0, 0, 240, 96), Cell(0, 240, 240, 288), Cell(0, 96, 36, 240), Cell(204, 96, 240, 240))
     lines = odds(
@@ -130,7 +130,7 @@ def test_a_click_on_an_ovens_window_means_the_oven() -> None:
     assert unit_cell(run, 120.0, 150.0, category_of("oven")) == frame
 
 
-def test_a_range_reaches_up_to_its_own_edge_beside_a_door_that_ends_lower() -> None:
+def test_a_range_extends_to_its_own_top_edge_beside_a_lower_door() -> None:
     """Three clear edges, a usual size and a row do not make up for a fourth that nothing shows."""
     cells = (whole := Cell(0, 0, 240, 372), Cell(240, 0, 372, 108), Cell(240, 108, 372, 372))
     lines = odds(380, 380, [(0, 0, 372), (240, 0, 372), (372, 0, 372)], [(0, 0, 372), (108, 240, 372), (372, 0, 372)])
@@ -138,14 +138,14 @@ def test_a_range_reaches_up_to_its_own_edge_beside_a_door_that_ends_lower() -> N
     assert unit_cell(run, 120.0, 300.0, category_of("range")) == whole
 
 
-def test_a_machine_is_parted_from_the_drawers_beside_it() -> None:
+def test_an_oven_is_separated_from_the_drawers_beside_it() -> None:
     cells = (oven := Cell(0, 0, 160, 288), *(Cell(160, top, 320, top + 96) for top in (0, 96, 192)))
     lines = odds(332, 300, [(0, 0, 288), (160, 0, 288), (320, 0, 288)], [(0, 0, 320), (288, 0, 320)])
     run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=0.0028), odds=lines, seen=np.ones(SEEN, bool))
     assert unit_cell(run, 80.0, 150.0, category_of("oven")) == oven
 
 
-def test_an_oven_of_black_glass_is_parted_from_the_drawer_below_it() -> None:
+def test_a_black_glass_oven_is_separated_from_the_drawer_below_it() -> None:
     """All edges are clear, and a rectangle of both is as near an oven's usual size: but the drawer's front returns light."""
     cells = (oven := Cell(0, 0, 240, 200), Cell(0, 200, 240, 372), Cell(240, 0, 372, 372))
     lines = odds(380, 380, [(0, 0, 372), (240, 0, 372), (372, 0, 372)], [(0, 0, 372), (200, 0, 240), (372, 0, 372)])
@@ -162,7 +162,7 @@ def door_under_a_rail(uprights_from: int) -> PanelOdds:
     return field
 
 
-def test_a_front_ends_where_both_lines_at_its_sides_do() -> None:
+def test_a_front_ends_where_both_of_its_side_lines_end() -> None:
     def tops(uprights_from: int) -> set[int]:
         cells = cut_panels(door_under_a_rail(uprights_from), Cell(0, 0, 360, 320), CELL_M)
         return {round(cell.top / 2) for cell in cells if cell.contains(180, 200)}
@@ -171,7 +171,7 @@ def test_a_front_ends_where_both_lines_at_its_sides_do() -> None:
     assert tops(uprights_from=20) == {10}
 
 
-def test_a_line_too_faint_for_one_front_cuts_a_row_of_them() -> None:
+def test_a_line_too_faint_for_one_front_cuts_a_row_of_fronts() -> None:
     seams = [(160 * k, 0, 320) for k in range(1, 4)]
     row = odds(640, 320, [(2, 0, 320), *seams], [])
     row.level[22] = 0.8  # below what one drawer of this height needs
@@ -183,7 +183,7 @@ def test_a_line_too_faint_for_one_front_cuts_a_row_of_them() -> None:
     assert len(cut_panels(row, Cell(0, 0, 640, 320), CELL_M)) == 4
 
 
-def test_a_strip_with_a_handle_is_no_filler() -> None:
+def test_a_narrow_strip_with_a_handle_is_not_cut_off_as_filler() -> None:
     """A line 6 cm before a door's end, with the knob beyond it: the inner line of its stile, not the end of the door."""
     door, line = Cell(0, 0, 176, 300), [(152, 0, 300)]
     assert len(cut_panels(odds(176, 300, line, [], sure=3.5, handles=[(164, 30)]), door, CELL_M)) == 1
@@ -191,7 +191,7 @@ def test_a_strip_with_a_handle_is_no_filler() -> None:
 
 
 @pytest.mark.parametrize("apart", [24, 36])
-def test_seams_of_stacks_at_other_heights_are_no_line_through_the_door_between_them(apart: int) -> None:
+def test_seams_at_different_heights_do_not_cut_the_door_between_stacks(apart: int) -> None:
     """A path along both bends by 60 to 90 mm over the door, and shows over three quarters of its span."""
     run = odds(1000, 300, [(260, 0, 300), (480, 0, 300)], [(150 + apart, 0, 260), (150, 480, 1000)], sure=4.0)
     found = {(round(cell.left), round(cell.top)) for cell in cut_panels(run, Cell(0, 0, 1000, 300), CELL_M)}

@@ -11,7 +11,7 @@ def disk(size: int, centre: tuple[float, float], radius: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("size", [80, 240])  # the larger one is cut at a lower resolution
-def test_the_border_follows_the_colour_edge_where_the_odds_are_a_guess(size: int) -> None:
+def test_weak_odds_are_refined_to_the_colour_edge(size: int) -> None:
     truth = disk(size, (0.5 * size, 0.5 * size), 0.3 * size)
     guess = disk(size, (0.54 * size, 0.47 * size), 0.3 * size)
     rng = np.random.default_rng(0)
@@ -21,7 +21,7 @@ def test_the_border_follows_the_colour_edge_where_the_odds_are_a_guess(size: int
     assert mask_iou(found, truth) > 0.97
 
 
-def test_a_learned_model_tells_the_things_colours_from_those_around_it() -> None:
+def test_a_colour_model_separates_object_and_background_colours() -> None:
     lab = np.zeros((40, 40, 3), np.uint8)
     lab[:, :20], lab[:, 20:] = (140, 180, 160), (120, 128, 130)
     left = np.zeros((40, 40), bool)
@@ -34,7 +34,7 @@ def test_a_learned_model_tells_the_things_colours_from_those_around_it() -> None
     assert abs(float(unseen[0, 0])) < 0.1  # a colour seen in neither is uninformative
 
 
-def test_colours_that_mix_at_a_border_decide_nothing_there_and_all_within() -> None:
+def test_mixed_border_pixels_get_zero_odds_and_interiors_keep_theirs() -> None:
     odds = np.full((9, 12), -2.0, np.float32)
     odds[:, 6:] = 2.5
     odds[:, 6] = 1.0  # a mixture closer to the object
@@ -44,7 +44,7 @@ def test_colours_that_mix_at_a_border_decide_nothing_there_and_all_within() -> N
     assert (said[:, 8:] == 2.5).all()
 
 
-def test_one_pixel_of_another_colour_decides_nothing() -> None:
+def test_a_single_pixel_of_another_colour_is_ignored() -> None:
     odds = np.full((9, 9), -2.0, np.float32)
     odds[4, 4] = 2.5
     assert unmixed(odds).max() == 0

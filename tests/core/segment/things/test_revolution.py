@@ -63,7 +63,7 @@ def opened(scan: tuple[Capture, Truth], tmp_path_factory: pytest.TempPathFactory
 
 
 @pytest.mark.parametrize("point", [ON_BODY, ON_NECK], ids=["body", "neck"])
-def test_a_bottle_is_measured_to_its_cap_from_a_click_anywhere(
+def test_a_bottle_is_measured_to_its_cap_from_any_click(
     opened: GeometricSession, scan: tuple[Capture, Truth], point: tuple[float, float, float]
 ) -> None:
     click = click_on(scan[0], point, FRAME)
@@ -81,7 +81,7 @@ def test_a_bottle_is_measured_to_its_cap_from_a_click_anywhere(
 
 
 @pytest.mark.parametrize(("beside_m", "taken"), [(0.0, False), (0.06, True)])
-def test_a_body_that_a_click_says_no_on_is_not_taken(
+def test_a_round_body_with_a_negative_click_is_rejected(
     opened: GeometricSession, scan: tuple[Capture, Truth], beside_m: float, taken: bool
 ) -> None:
     def sight(x: float, y: float, z: float) -> Sight:
@@ -94,7 +94,7 @@ def test_a_body_that_a_click_says_no_on_is_not_taken(
     assert (found is not None) == taken
 
 
-def test_a_neck_of_a_colour_that_nothing_else_has_is_told_by_its_likeness_from_all_sides() -> None:
+def test_a_neck_is_detected_by_its_consistent_colour_in_all_views() -> None:
     """Neither depth nor colours learned elsewhere say anything of it."""
     views, levels, cells, radius = 12, 20, 24, 8
     rng = np.random.default_rng(0)
@@ -110,7 +110,7 @@ def test_a_neck_of_a_colour_that_nothing_else_has_is_told_by_its_likeness_from_a
     assert (odds[15:] < 0).all()
 
 
-def test_the_profile_keeps_to_edges_where_odds_go_on_beyond_and_ends_where_nothing_is() -> None:
+def test_the_profile_stops_at_edges_despite_similar_colours_beyond() -> None:
     """A dark wall continues a body sideways with the same colours; the true border is an edge in all views."""
     levels, cells, radius, top = 40, 24, 10, 30
     odds = np.full((levels, cells), -2.0)
@@ -123,7 +123,7 @@ def test_the_profile_keeps_to_edges_where_odds_go_on_beyond_and_ends_where_nothi
     np.testing.assert_array_equal(profile.cells, np.where(np.arange(levels) < top, radius, 0))
 
 
-def test_nothing_stands_above_a_level_that_has_none() -> None:
+def test_the_profile_ends_at_its_first_empty_level() -> None:
     levels, cells = 30, 12
     odds = np.full((levels, cells), -2.0)
     odds[:10, :6] = 2.0
@@ -135,7 +135,7 @@ def test_nothing_stands_above_a_level_that_has_none() -> None:
     assert (profile.cells[10:] == 0).all()
 
 
-def test_a_profile_grows_and_shrinks_by_metres() -> None:
+def test_a_profile_grows_and_shrinks_by_a_metric_offset() -> None:
     grid = Grid(0.002, 0.004, 20, 30)
     cells = np.where(np.arange(30) < 20, 10, 0)
     assert grid.within(cells, 0.004).sum(axis=1).max() == 24

@@ -32,7 +32,7 @@ class Enlarged:
         return self._of.depth(frame_index)
 
 
-def test_a_phones_photos_are_outlined_at_a_bounded_size_and_their_masks_keep_their_edges(
+def test_large_photos_are_outlined_at_bounded_size_with_accurate_masks(
     session: GeometricSession, boxes: tuple[Capture, Truth]
 ) -> None:
     capture, truth = boxes
@@ -58,7 +58,7 @@ def test_a_phones_photos_are_outlined_at_a_bounded_size_and_their_masks_keep_the
 
 
 @pytest.mark.parametrize("radius_px", [6.3, 11.0])
-def test_an_outline_covers_the_pixels_that_points_cover_by_half(radius_px: float) -> None:
+def test_an_outline_has_the_area_of_the_disc_covered_by_its_points(radius_px: float) -> None:
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     rings = [share * radius_px * np.column_stack([np.cos(angle), np.sin(angle)]) for share in np.linspace(0, 1, 60)]
     mask = splat(np.concatenate(rings) + 32.4, (64, 64), 1.0)

@@ -25,7 +25,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     ("name", "where", "corners"),
     [("table", (0.4, 0.1, 0.73), TABLE), ("chair", (0.26, -0.65, 0.45), CHAIR)],
 )
-def test_it_reaches_the_floor_on_all_its_legs(
+def test_chairs_and_tables_are_segmented_down_to_all_their_legs(
     room: Scene, name: str, where: tuple[float, float, float], corners: tuple[tuple[float, ...], tuple[float, ...]]
 ) -> None:
     capture, truth, session = room
@@ -45,7 +45,7 @@ def test_it_reaches_the_floor_on_all_its_legs(
     assert (mask & legs).sum() > 0.7 * legs.sum()
 
 
-def test_what_stands_on_a_table_is_not_the_table(room: Scene) -> None:
+def test_a_table_mask_excludes_the_objects_on_it(room: Scene) -> None:
     capture, truth, session = room
     table = prompt("table", "table", click_on(capture, (0.4, 0.1, 0.73), 120))
     masks = np.stack([session.mask_at(table, f.index) for f in capture.frames])

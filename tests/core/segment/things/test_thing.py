@@ -18,7 +18,7 @@ from tests.core.segment.scenes import FRONT_Y, Pixels, click_on, prompt
 Boxes = tuple[Capture, Truth]
 
 
-def test_a_carton_on_the_worktop_is_cut_from_it(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_carton_is_separated_from_the_worktop(session: GeometricSession, boxes: Boxes) -> None:
     capture, truth = boxes
     carton = prompt("carton", "box", click_on(capture, (1.06, -0.36, 1.0), 60))
     track = session.track(carton)
@@ -32,13 +32,15 @@ def test_a_carton_on_the_worktop_is_cut_from_it(session: GeometricSession, boxes
     assert track.box.dimensions_m[2] == pytest.approx(0.20, abs=0.012)
 
 
-def test_a_category_that_hints_wrong_falls_back_with_a_warning(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_wrong_category_still_gives_a_mask(session: GeometricSession, boxes: Boxes) -> None:
     found = session.find(prompt("carton", "dishwasher", click_on(boxes[0], (1.06, -0.36, 1.0), 60)))
     assert found.kind in ("front", "thing")
     assert np.count_nonzero(found.see(boxes[0].frame(60)).mask) > 300
 
 
-def test_a_click_on_nothing_names_the_click_and_the_next_step(boxes: Boxes, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_a_click_without_surface_raises_with_its_position_and_advice(
+    boxes: Boxes, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     capture = boxes[0]
     blind = Pixels(capture.images.colours, {k: np.zeros_like(v) for k, v in capture.images.depths.items()})  # type: ignore[attr-defined]
     bare = dataclasses.replace(capture.surface, faces=capture.surface.faces[:0])
@@ -49,7 +51,7 @@ def test_a_click_on_nothing_names_the_click_and_the_next_step(boxes: Boxes, tmp_
         session.mask_at(prompt("mug", "mug", PromptPoint(frame=60, x=240.0, y=180.0, label=1)), 60)
 
 
-def test_a_second_click_on_what_has_no_depth_does_not_lose_the_object(
+def test_a_second_click_without_depth_does_not_lose_the_object(
     session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = (click_on(boxes[0], (1.06, -0.36, height), frame) for height, frame in ((1.0, 60), (1.05, 70)))
@@ -59,7 +61,7 @@ def test_a_second_click_on_what_has_no_depth_does_not_lose_the_object(
     assert mask_iou(once, session.mask_at(prompt("carton", "box", first, second), 60)) > 0.9
 
 
-def test_a_point_is_judged_by_the_ray_of_its_own_click(
+def test_each_point_is_checked_with_the_ray_of_its_own_click(
     session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An appliance's first clicks may hit nothing; where it is cut as a thing, the others still belong to their points."""
@@ -76,16 +78,14 @@ def test_a_point_is_judged_by_the_ray_of_its_own_click(
     assert rays == [70]
 
 
-def test_an_object_that_no_frame_sees_is_an_error(
-    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_object_seen_in_no_frame_raises(session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch) -> None:
     door = prompt("door_a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60))
     strict = dataclasses.replace(session, config=dataclasses.replace(session.config, least_area_px=10**9))
     with pytest.raises(ObjectNotSeen, match="door_a: seen in 0 of 14 frames"):
         strict.track(door)
 
 
-def test_a_frame_that_does_not_exist_is_refused(session: GeometricSession, boxes: Boxes) -> None:
+def test_a_nonexistent_frame_is_rejected(session: GeometricSession, boxes: Boxes) -> None:
     door = prompt("door_a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60))
     with pytest.raises(PromptError, match=r"door_a: frame 7 found, a frame of 0\.\.130 expected"):
         session.mask_at(door, 7)

@@ -37,7 +37,7 @@ def hull(scene: Scene) -> Thing:
     return found
 
 
-def test_the_hull_is_the_carton_to_a_centimetre_and_stands_on_the_worktop(hull: Thing) -> None:
+def test_the_hull_matches_the_carton_and_stands_on_the_worktop(hull: Thing) -> None:
     low, high = hull.vertices.min(axis=0), hull.vertices.max(axis=0)
     np.testing.assert_allclose(low[[0, 2]], LOW[[0, 2]], atol=0.012)
     np.testing.assert_allclose(high[[0, 2]], HIGH[[0, 2]], atol=0.012)
@@ -46,7 +46,7 @@ def test_the_hull_is_the_carton_to_a_centimetre_and_stands_on_the_worktop(hull: 
     assert hull.support_z_m == pytest.approx(0.90, abs=0.005)
 
 
-def test_the_silhouettes_of_the_hull_are_the_cartons_masks(hull: Thing, scene: Scene, boxes: Boxes) -> None:
+def test_hull_silhouettes_match_the_carton_masks(hull: Thing, scene: Scene, boxes: Boxes) -> None:
     truth = boxes[1]["carton"]
     overlaps = []
     for frame in scene.frames:
@@ -58,26 +58,26 @@ def test_the_silhouettes_of_the_hull_are_the_cartons_masks(hull: Thing, scene: S
     assert np.mean(overlaps) > 0.9
 
 
-def test_the_first_look_agrees_with_the_hull(hull: Thing, scene: Scene) -> None:
+def test_the_glimpse_agrees_with_the_hull(hull: Thing, scene: Scene) -> None:
     glimpsed = glimpse_small(scene, ON_IT, NO_POINTS, CARTON, ())
     assert glimpsed is not None
     np.testing.assert_allclose(glimpsed.vertices.mean(axis=0)[[0, 2]], hull.vertices.mean(axis=0)[[0, 2]], atol=0.02)
 
 
-def test_where_depth_shows_nothing_there_is_no_hull(scene: Scene) -> None:
+def test_a_click_in_empty_space_gives_no_hull(scene: Scene) -> None:
     in_the_air = np.array([[1.06, -0.80, 1.5]])
     assert find_small(scene, in_the_air, NO_POINTS, CARTON, ()) is None
 
 
 @pytest.mark.parametrize("lift_m", [-0.02, -0.01, 0.0, 0.01, 0.02])
-def test_a_frame_whose_pose_is_off_in_height_says_by_how_much(scene: Scene, lift_m: float) -> None:
+def test_the_height_error_of_a_frame_pose_is_measured(scene: Scene, lift_m: float) -> None:
     frame = scene.frame(70)
     lifted = dataclasses.replace(frame, world_from_camera=Rigid3(np.eye(3), np.array([0, 0, lift_m])) @ frame.world_from_camera)
     offset = support_offset(scene, lifted, 0.90, np.array([1.06, -0.31, 1.0]))
     assert offset == pytest.approx(lift_m, abs=0.003)
 
 
-def test_outlines_lie_on_colour_edges_where_poses_are_right_and_off_them_where_not(hull: Thing, scene: Scene) -> None:
+def test_pose_errors_shift_outlines_off_the_colour_edges(hull: Thing, scene: Scene) -> None:
     views = [frame for frame in scene.frames if 40 <= frame.index <= 100]
     assert usual_shift(hull, scene, views) < 0.004
 
@@ -89,7 +89,7 @@ def test_outlines_lie_on_colour_edges_where_poses_are_right_and_off_them_where_n
     assert usual_shift(hull, scene, [aside(frame) for frame in views]) > 0.007
 
 
-def test_a_thing_stands_on_the_highest_level_surface_around_it_or_on_the_floor(scene: Scene) -> None:
+def test_a_thing_stands_on_the_level_surface_below_it_or_on_the_floor(scene: Scene) -> None:
     assert support_height(scene, ON_IT, CARTON) == pytest.approx(0.90, abs=0.005)
     assert support_height(scene, np.add(ON_IT, [0.0, 0.05, 0.08]), CARTON) == pytest.approx(0.90, abs=0.005)
     assert support_height(scene, ON_IT, dataclasses.replace(CARTON, on_floor=True)) == 0.0
@@ -97,7 +97,7 @@ def test_a_thing_stands_on_the_highest_level_surface_around_it_or_on_the_floor(s
     assert support_height(scene, below_the_floor, CARTON) is None
 
 
-def test_the_surface_found_is_the_cartons_and_so_is_its_mask(scene: Scene, boxes: Boxes) -> None:
+def test_the_surface_and_mask_found_are_those_of_the_carton(scene: Scene, boxes: Boxes) -> None:
     thing = find_thing(scene, ON_IT, NO_POINTS, CARTON)
     assert thing is not None
     slack = 0.02  # the fused surface has voxels of 12 mm
@@ -108,7 +108,7 @@ def test_the_surface_found_is_the_cartons_and_so_is_its_mask(scene: Scene, boxes
     assert share > 0.8
 
 
-def test_clicks_far_from_any_surface_find_no_thing(scene: Scene) -> None:
+def test_clicks_far_from_any_surface_give_no_thing(scene: Scene) -> None:
     assert find_thing(scene, np.array([[0.9, -1.6, 1.9]]), NO_POINTS, CARTON) is None
 
 
@@ -124,9 +124,7 @@ def test_noisier_depth_carves_less(scene: Scene, hull: Thing) -> None:
     assert np.ptp(loose.vertices, axis=0).prod() > 1.1 * np.ptp(fine.vertices, axis=0).prod()
 
 
-def test_the_same_error_of_poses_is_borne_by_a_wide_thing_and_not_by_a_narrow_one(
-    scene: Scene, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pose_error_is_tolerated_by_wide_but_not_by_narrow_things(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(visual_hull, "_pose_spread", lambda *given: 0.008)
     monkeypatch.setattr(visual_hull, "usual_shift", lambda *given: 0.0)
     wide, narrow = (find_small(scene, ON_IT, NO_POINTS, ThingConfig(radius_m=radius), ()) for radius in (0.12, 0.08))
