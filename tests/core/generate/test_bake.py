@@ -31,7 +31,7 @@ def seen_from(shape, atlas, picture, world_from_camera):
     return render_textured(vertices, atlas.faces, atlas.uv, picture.texture, CAMERA, world_from_camera.inverse)
 
 
-def test_a_mark_on_a_door_appears_at_its_place(front_scene):
+def test_a_mark_on_a_door_is_textured_at_its_position(front_scene):
     """The red square spans x 0.08..0.18, z -0.20..-0.10 of the front frame; found to 4 mm (a texel and a photo pixel)."""
     shape, atlas, picture = pictured(front_scene, box_shape, lambda v, f: planar_atlas(v, f, 768, 0.0012))
     image, depth = seen_from(shape, atlas, picture, FACING)
@@ -44,7 +44,7 @@ def test_a_mark_on_a_door_appears_at_its_place(front_scene):
     assert (200 - rows.max() - 1) * metres == pytest.approx(-0.20, abs=0.004)
 
 
-def test_the_door_keeps_its_colour_and_the_unseen_sides_its_tint(front_scene):
+def test_door_and_unseen_sides_have_the_colour_of_the_door(front_scene):
     shape, atlas, picture = pictured(front_scene, box_shape, lambda v, f: planar_atlas(v, f, 768, 0.0012))
     image, _ = seen_from(shape, atlas, picture, FACING)
     assert image[250, 150] == pytest.approx([210, 190, 150], abs=6)
@@ -53,7 +53,7 @@ def test_the_door_keeps_its_colour_and_the_unseen_sides_its_tint(front_scene):
     assert (np.abs(side[depth > 0].astype(int) - [210, 190, 150]).max(axis=1) < 10).mean() > 0.97
 
 
-def test_the_handle_is_dark_all_round(front_scene):
+def test_an_unseen_side_of_the_handle_has_the_handle_colour(front_scene):
     """From above, the bar shows its own colour though only its front was well seen."""
     shape, atlas, picture = pictured(front_scene, box_shape, lambda v, f: planar_atlas(v, f, 768, 0.0012))
     above = Rigid3(np.array([[1.0, 0, 0], [0, -1, 0], [0, 0, -1]]), np.array([0.0, 0.0, 2.0]))  # looks along -Z
@@ -62,7 +62,7 @@ def test_the_handle_is_dark_all_round(front_scene):
     assert bar.max() < 110
 
 
-def test_a_dark_side_that_was_seen_keeps_its_own_colour(appliance_scene):
+def test_an_observed_dark_body_keeps_its_own_colour(appliance_scene):
     shape, atlas, picture = pictured(appliance_scene, box_shape, lambda v, f: planar_atlas(v, f, 768, 0.0012))
     image, depth = seen_from(shape, atlas, picture, FACING)
     body = image[(depth > 1.97) & (depth < 2.07)]
@@ -79,7 +79,7 @@ def test_the_parts_of_a_chair_keep_their_colours(chair_scene):
     assert seat_edge.argmax() == 0
 
 
-def test_frames_in_which_a_front_stands_open_lend_it_no_colour(front_scene):
+def test_frames_with_an_open_front_are_not_used_for_texture(front_scene):
     """Pulled or swung out by too little to show in depth, too."""
     capture, track = front_scene
     opened = motion(dict.fromkeys(sorted(track.masks)[::2], 0.02))
@@ -88,7 +88,7 @@ def test_frames_in_which_a_front_stands_open_lend_it_no_colour(front_scene):
     assert not {view.frame_index for view in pool} & set(opened.states)
 
 
-def test_photos_of_an_object_are_taken_at_the_common_exposure(front_scene):
+def test_photos_are_normalised_to_the_common_exposure(front_scene):
     capture, track = front_scene
     plain = {view.frame_index: view.rgb for view in gather_evidence(capture, track, 4).pool}
     darker = replace(capture, frames=tuple(replace(f, gain=(0.5, 0.6, 0.7)) for f in capture.frames))
@@ -99,7 +99,7 @@ def test_photos_of_an_object_are_taken_at_the_common_exposure(front_scene):
 
 
 @pytest.mark.parametrize(("name", "make", "most"), [("front", box_shape, 1536), ("bottle", best_thing, 1024)])
-def test_a_picture_is_as_fine_as_the_nearest_photo_shows_it(name, make, most, request):
+def test_texture_resolution_follows_photo_resolution_up_to_a_limit(name, make, most, request):
     evidence = gather_evidence(*request.getfixturevalue(f"{name}_scene"), 6)
     shape = make(evidence, draw_variation(evidence, np.random.default_rng(0)))
 

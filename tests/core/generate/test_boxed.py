@@ -23,7 +23,7 @@ def protruding(shape, face_y):
     return shape.vertices_local[shape.vertices_local[:, 1] < face_y - 0.005]
 
 
-def test_a_front_lies_exactly_on_its_plane_and_rectangle_and_reaches_the_wall(front_scene):
+def test_a_front_box_matches_its_rectangle_and_reaches_the_wall(front_scene):
     shape = shape_of(front_scene)
     body = shape.vertices_local[shape.vertices_local[:, 1] >= -1e-9]
     assert body.min(axis=0) == pytest.approx([-0.25, 0.0, -0.30], abs=1e-6)
@@ -31,13 +31,13 @@ def test_a_front_lies_exactly_on_its_plane_and_rectangle_and_reaches_the_wall(fr
     assert body[:, 1].max() == pytest.approx(0.60, abs=0.012)  # the wall minus its gap, varied by 1 %
 
 
-def test_the_front_face_is_flat(front_scene):
+def test_faces_of_a_front_box_are_axis_aligned(front_scene):
     shape = shape_of(front_scene)
     normals = face_normals(shape.vertices_local, shape.faces)
     assert np.abs(np.abs(normals).max(axis=1) - 1).max() < 1e-6
 
 
-def test_the_handle_stands_out_where_it_was_measured(front_scene):
+def test_the_handle_protrudes_at_its_measured_position(front_scene):
     """Bounding box of the protruding part within 1.5 cm of the true bar."""
     for seed in range(4):
         handle = protruding(shape_of(front_scene, seed), 0.0)
@@ -45,7 +45,7 @@ def test_the_handle_stands_out_where_it_was_measured(front_scene):
         assert handle.max(axis=0)[[0, 2]] == pytest.approx([0.08, 0.215], abs=0.015)
 
 
-def test_an_appliance_keeps_its_handle(appliance_scene):
+def test_the_handle_of_an_appliance_is_at_its_measured_position(appliance_scene):
     handle = protruding(shape_of(appliance_scene), 0.0)
     assert handle.min(axis=0) == pytest.approx([0.08, -0.04, -0.09], abs=0.015)
     assert handle.max(axis=0)[[0, 2]] == pytest.approx([0.095, 0.09], abs=0.015)
@@ -59,7 +59,7 @@ def test_boxes_are_closed_manifold_and_outward(front_scene, appliance_scene):
         assert volume(shape.vertices_local, shape.faces) > 0
 
 
-def test_a_front_without_a_wall_gets_its_categorys_depth(front_scene):
+def test_a_front_without_a_wall_gets_the_usual_depth_of_its_category(front_scene):
     capture, track = front_scene
     open_room = replace(capture, room=replace(capture.room, walls=()))
     depths = {round(float(np.ptp(shape_of((open_room, track), k).vertices_local[:, 1])), 4) for k in range(5)}
@@ -68,7 +68,7 @@ def test_a_front_without_a_wall_gets_its_categorys_depth(front_scene):
 
 
 @pytest.mark.parametrize("seed", [0, 3])
-def test_a_card_tells_the_depth_that_its_mesh_has(front_scene, seed):
+def test_the_reported_depth_of_a_candidate_is_that_of_its_mesh(front_scene, seed):
     """c0 goes to the wall, the last two are as deep as others that are sold."""
     evidence = gather_evidence(*front_scene, 6)
     cards = [Completion().measured(evidence, f"c{k}", seed) for k in range(4)]
@@ -87,7 +87,7 @@ def test_an_appliance_has_the_measured_box(appliance_scene):
         assert np.ptp(body, axis=0) == pytest.approx([0.46, 0.34, 0.28])
 
 
-def test_only_an_observed_depth_is_a_candidate(appliance_scene):
+def test_a_measured_box_is_a_hypothesis_only_if_its_depth_was_observed(appliance_scene):
     capture, track = appliance_scene
     for seen in (True, False):
         box = replace(track.box, dimensions_m=np.array([0.46, 0.28, 0.28]), depth_seen=seen)

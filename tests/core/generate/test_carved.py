@@ -21,7 +21,7 @@ def carve(scene, seed=0):
     return evidence, best_thing(evidence, draw_variation(evidence, np.random.default_rng(seed)))
 
 
-def test_a_bottle_is_round_again_though_only_its_front_was_seen(bottle_scene):
+def test_a_bottle_seen_only_from_the_front_is_completed_round(bottle_scene):
     """Diameter 8 cm, height 28 cm; the track's box holds the visible 5.5 cm of depth only."""
     for seed in range(2):
         _, shape = carve(bottle_scene, seed)
@@ -40,7 +40,7 @@ def test_a_chair_has_its_extents_and_stands_on_the_floor(chair_scene):
     assert fit["depth_residual_m"] < 0.012
 
 
-def test_between_a_chairs_legs_there_is_air(chair_scene):
+def test_free_space_between_chair_legs_is_carved_out(chair_scene):
     """The free space that two frames saw is carved out of the prior box."""
     _, shape = carve(chair_scene)
     assert volume(shape.vertices_local, shape.faces) < 0.35 * 0.42 * 0.42 * 0.9
@@ -63,7 +63,7 @@ def test_a_thing_without_a_box_is_carved_from_its_points_alone(bottle_scene):
 
 
 @pytest.mark.parametrize("elevation_deg", [25, 40])
-def test_what_hides_behind_a_thing_seen_from_above_is_not_the_thing(elevation_deg):
+def test_a_carton_seen_from_above_is_not_extended_backwards(elevation_deg):
     """A carton 12 cm deep, filmed from the front only, in a box 26 cm deep: a deeper one would show more of its top."""
     size = np.array([0.2, 0.12, 0.18])
     scene = carton_scene(size, arc_deg=40, elevation_deg=elevation_deg, yaw_rad=0.0, wall_gap_m=0.25)
@@ -74,7 +74,7 @@ def test_what_hides_behind_a_thing_seen_from_above_is_not_the_thing(elevation_de
     assert np.ptp(shape.vertices_local, axis=0) == pytest.approx(size, abs=0.025)
 
 
-def test_blocks_outside_the_masks_are_left_out_without_a_difference(chair_scene):
+def test_block_votes_equal_per_voxel_votes(chair_scene):
     """The votes of a grid by blocks against those of every voxel, where they decide anything."""
     evidence = gather_evidence(*chair_scene, 10)
     variation = whole_pool(evidence)
@@ -91,7 +91,7 @@ def test_blocks_outside_the_masks_are_left_out_without_a_difference(chair_scene)
     )
 
 
-def test_votes_of_more_frames_than_a_byte_counts_are_all_counted(bottle_scene):
+def test_votes_of_more_than_255_frames_are_counted(bottle_scene):
     evidence = gather_evidence(*bottle_scene, 6)
     view = evidence.pool[0]
     row, column = np.argwhere(view.mask & True)[np.count_nonzero(view.mask) // 2]
@@ -104,7 +104,7 @@ def test_votes_of_more_frames_than_a_byte_counts_are_all_counted(bottle_scene):
     assert collect_votes(point, many, 0.03).surfaces[0] == 300
 
 
-def test_a_shell_answers_for_what_it_leaves_empty():
+def test_a_thin_shell_has_an_unseen_error_and_a_carved_solid_has_none():
     """Of a body 0.2 m deep and 0.2 m high only front and top are seen: a shell 4 cm thick leaves half of it out."""
     evidence = gather_evidence(*carton_scene(np.array([0.3, 0.2, 0.2]), arc_deg=30.0, elevation_deg=20.0, yaw_rad=0.0), 6)
     everything = whole_pool(evidence)

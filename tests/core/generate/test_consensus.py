@@ -39,28 +39,28 @@ FIVE = [
 ]
 
 
-def test_the_medoid_is_taken_among_planted_outliers():
+def test_the_medoid_is_chosen_among_outliers():
     chosen = choose_candidate(FIVE)
     assert chosen.chosen_id == "c1"
     assert set(chosen.ranking[-2:]) == {"c3", "c4"}
 
 
-def test_the_order_of_the_candidates_does_not_matter():
+def test_the_choice_does_not_depend_on_candidate_order():
     assert choose_candidate(FIVE[::-1]).chosen_id == "c1"
 
 
-def test_the_papers_mean_follows_the_outliers_the_medoid_does_not():
+def test_the_mean_rule_follows_outliers():
     """Mean middle side 0.67, short 0.59, filled 0.65: c2 is nearest to it."""
     assert choose_candidate(FIVE, rule="mean").chosen_id == "c2"
 
 
 @pytest.mark.parametrize(("size", "taken"), [(0.18, "c1"), (1.8, "c0")])
-def test_three_centimetres_off_are_a_lot_for_a_kettle_and_little_for_a_wardrobe(size, taken):
+def test_depth_residuals_are_judged_relative_to_object_size(size, taken):
     pair = [candidate("c0", 0.9, 0.9, 0.5, 0.86, 0.027, size=size), candidate("c1", 0.9, 0.9, 0.5, 0.80, 0.004, size=size)]
     assert choose_candidate(pair).chosen_id == taken
 
 
-def test_among_like_shapes_the_fit_to_masks_and_depth_decides():
+def test_among_similar_shapes_the_fit_to_masks_and_depth_decides():
     alike = [
         candidate(f"c{k}", 0.6, 0.5, 0.8, iou, residual)
         for k, (iou, residual) in enumerate([(0.90, 0.01), (0.95, 0.01), (0.95, 0.03)])
@@ -71,7 +71,7 @@ def test_among_like_shapes_the_fit_to_masks_and_depth_decides():
     assert "10 mm" in chosen.reason
 
 
-def test_rejected_candidates_neither_win_nor_pull():
+def test_rejected_candidates_are_ranked_last_and_counted_in_the_reason():
     chosen = choose_candidate(FIVE, rejected=("c1", "c3", "c4"))
     assert chosen.chosen_id in ("c0", "c2")
     assert len(chosen.candidates) == 5
@@ -79,42 +79,42 @@ def test_rejected_candidates_neither_win_nor_pull():
     assert "3 rejected" in chosen.reason
 
 
-def test_rejecting_everything_says_what_to_do():
+def test_rejecting_every_candidate_raises_with_advice():
     with pytest.raises(GenerationFailed, match=r"mug_1: every candidate was rejected; .*upload"):
         choose_candidate(FIVE, rejected=("c0", "c1", "c2", "c3", "c4"))
 
 
-def test_an_upload_is_judged_by_its_shape():
+def test_an_upload_without_fit_is_ranked_by_its_shape():
     good = [*FIVE, candidate("upload0", 0.62, 0.52, 0.78, iou=None, generator="upload")]
     assert "upload0" in choose_candidate(good).ranking[:2]
     odd = [*FIVE, candidate("upload0", 0.2, 0.1, 0.3, iou=None, generator="upload")]
     assert choose_candidate(odd).ranking[-1] == "upload0"
 
 
-def test_a_lone_upload_is_chosen_and_the_reason_says_why():
+def test_a_lone_upload_is_chosen_as_the_only_candidate():
     chosen = choose_candidate([candidate("upload0", 0.6, 0.5, 0.8, iou=None, generator="upload")])
     assert chosen.chosen_id == "upload0"
     assert "only candidate" in chosen.reason
 
 
-def test_a_person_overrules_the_consensus():
+def test_a_person_overrides_the_consensus():
     chosen = chosen_by_person(choose_candidate(FIVE), "c3")
     assert (chosen.chosen_id, chosen.chosen_by) == ("c3", "person")
     with pytest.raises(OverrideError, match="no candidate 'c9'"):
         chosen_by_person(chosen, "c9")
 
 
-def test_equal_candidates_give_the_first():
+def test_the_first_of_equal_candidates_is_chosen():
     assert choose_candidate([replace(FIVE[0], candidate_id=f"c{k}") for k in range(3)]).chosen_id == "c0"
 
 
-def test_the_papers_choice_stands_beside_ours():
+def test_the_reason_compares_the_choice_with_that_of_the_mean_rule():
     assert "would take c2" in choose_candidate(FIVE).reason
     assert "takes it too" in choose_candidate(FIVE[:3]).reason
     assert "paper" not in choose_candidate(FIVE[:2]).reason
 
 
-def test_an_open_or_very_heavy_mesh_has_to_fit_better_to_win():
+def test_open_and_very_large_meshes_are_penalised():
     alike = [candidate(f"c{k}", 0.6, 0.5, 0.8) for k in range(3)]
     opened = [replace(alike[0], watertight=False), *alike[1:]]
     assert choose_candidate(opened).ranking == ("c1", "c2", "c0")
@@ -124,7 +124,7 @@ def test_an_open_or_very_heavy_mesh_has_to_fit_better_to_win():
     assert choose_candidate(better).chosen_id == "c0"
 
 
-def test_being_odd_on_purpose_is_no_fault_and_is_said():
+def test_a_deviating_hypothesis_is_not_penalised_and_is_reported():
     """Two hypotheses of one depth and one of another: what the scan says of the unseen side decides."""
     guesses = [replace(candidate(f"c{k}", 0.6, 0.5, 0.8), assumes="to the wall") for k in range(3)]
     guesses[2] = replace(candidate("c2", 1.0, 0.9, 0.3), assumes="shallower")
@@ -155,39 +155,39 @@ def guesses(*changes):
         ({"faces": 80_000.0}, "c1 fits as well, but it has 80000 faces"),
     ],
 )
-def test_the_reason_says_what_decided_against_the_candidate_that_fits_as_well(other, said):
+def test_the_reason_states_why_an_equally_fitting_rival_lost(other, said):
     chosen = choose_candidate(guesses({}, other))
     assert chosen.chosen_id == "c0"
     assert said in chosen.reason
 
 
-def test_proportions_are_given_only_where_they_count():
+def test_the_reason_gives_proportions_only_where_they_decide():
     assert "proportions" in choose_candidate(FIVE).reason
     assert "proportions" not in choose_candidate(guesses({}, {"extent_middle": 0.9})).reason
     odd = replace(candidate("c3", 1.0, 0.99, 0.10, iou=0.95))
     assert "c3 fits better, but its proportions differ" in choose_candidate([*FIVE[:3], odd]).reason
 
 
-def test_where_the_fit_decided_the_reason_says_no_more():
+def test_the_reason_gives_only_the_rank_where_the_fit_decides():
     """The rank is that of the fit: what nobody saw has no part in it."""
     reason = choose_candidate(guesses({"unseen_error_m": 0.01}, {"mask_iou": 0.8})).reason
     assert "rank 1 of 2 by fit" in reason
     assert "but" not in reason
 
 
-def test_what_would_fall_over_has_to_fit_better_to_win():
+def test_unstable_shapes_are_penalised():
     alike = [candidate(f"c{k}", 0.6, 0.5, 0.8) for k in range(3)]
     assert choose_candidate([replace(alike[0], metrics={**alike[0].metrics, "stands": 0.0}), *alike[1:]]).chosen_id == "c1"
 
 
-def test_what_was_carved_along_the_masks_has_to_agree_with_them_better_than_a_clean_shape():
+def test_carved_shapes_need_a_clearly_better_fit_than_clean_shapes():
     clean, carved = (replace(candidate(f"c{k}", 0.6, 0.5, 0.8, iou), assumes="a guess") for k, iou in enumerate((0.90, 0.93)))
     carved = replace(carved, metrics={**carved.metrics, "carved": 1.0})
     assert choose_candidate([carved, clean]).chosen_id == "c0"
     assert choose_candidate([replace(carved, metrics={**carved.metrics, "mask_iou": 0.97}), clean]).chosen_id == "c1"
 
 
-def test_what_has_no_fit_yet_is_not_compared_by_it():
+def test_the_reason_does_not_compare_an_upload_by_fit():
     """The upload's shape is in the middle; nothing is said of who fits better than it."""
     upload = candidate("upload0", 0.62, 0.52, 0.78, iou=None, generator="upload")
     others = [candidate("c0", 0.60, 0.50, 0.80, iou=0.9), candidate("c1", 0.66, 0.56, 0.74, iou=0.9)]
@@ -198,7 +198,7 @@ def test_what_has_no_fit_yet_is_not_compared_by_it():
 
 
 @pytest.mark.parametrize(("gain", "chosen"), [(0.015, "c0"), (0.04, "c1")])
-def test_of_draws_that_assume_the_same_the_one_from_most_frames_is_taken_unless_another_is_clearly_better(gain, chosen):
+def test_among_equal_hypotheses_the_draw_from_most_frames_is_preferred(gain, chosen):
     """Two draws of a mug differed by 0.017 of IoU; the one from a third of the frames was the worse mesh to place."""
     whole, part = (candidate(f"c{k}", 0.6, 0.5, 0.8, 0.70 + k * gain) for k in (0, 1))
     whole = replace(whole, assumes="round and hollow", frames=tuple(range(30)))

@@ -29,7 +29,7 @@ def shape_of(scene):
         (120.0, 15.0),
     ],
 )
-def test_a_cartons_depth_is_seen_in_its_outlines(arc_deg, elevation_deg):
+def test_the_depth_of_a_carton_is_estimated_from_its_outlines(arc_deg, elevation_deg):
     """The segmenter's box is three times too deep: it took the wall's shine for the carton's back."""
     shape = shape_of(carton_scene(SIZE, arc_deg=arc_deg, elevation_deg=elevation_deg, yaw_rad=0.3))
     assert shape.parameters["boxed"] == 1.0
@@ -39,19 +39,19 @@ def test_a_cartons_depth_is_seen_in_its_outlines(arc_deg, elevation_deg):
     assert turn == pytest.approx(0.3, abs=np.radians(1.5))
 
 
-def test_a_carton_seen_from_the_front_only_says_that_its_depth_is_open():
+def test_a_carton_seen_only_from_the_front_has_an_uncertain_depth():
     """Cameras on one axis, level with its middle: any depth would look the same."""
     shape = shape_of(carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0))
     assert shape.parameters["depth_sigma_m"] > 0.1 * np.ptp(shape.vertices_local[:, 1])
     assert np.ptp(shape.vertices_local, axis=0)[[0, 2]] == pytest.approx(SIZE[[0, 2]], abs=0.008)
 
 
-def test_an_open_depth_is_not_carried_through_the_wall():
+def test_an_uncertain_depth_does_not_extend_through_the_wall():
     scene = carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0, wall_gap_m=0.0)
     assert shape_of(scene).vertices_world[:, 1].max() < SIZE[1] + 0.01
 
 
-def test_candidates_differ_in_depth_by_what_the_scan_leaves_open():
+def test_candidate_depths_vary_with_the_depth_uncertainty():
     evidence = gather_evidence(*carton_scene(SIZE, arc_deg=35.0, elevation_deg=10.0, yaw_rad=0.3), 12)
     shapes = [best_thing(evidence, draw_variation(evidence, np.random.default_rng(k))) for k in range(3)]
     depths = [np.ptp(shape.vertices_local[:, 1]) for shape in shapes]
@@ -59,7 +59,7 @@ def test_candidates_differ_in_depth_by_what_the_scan_leaves_open():
     assert all(is_watertight(s.vertices_local, s.faces) and is_manifold(s.vertices_local, s.faces) for s in shapes)
 
 
-def test_candidates_of_an_open_depth_stay_believable_and_before_the_wall():
+def test_candidates_of_uncertain_depth_stay_plausible_and_before_the_wall():
     scene = carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0)
     evidence = gather_evidence(*scene, 12)
     for draw in (-1.5, 1.5):
@@ -69,12 +69,12 @@ def test_candidates_of_an_open_depth_stay_believable_and_before_the_wall():
         assert shape.vertices_world[:, 1].max() < SIZE[1] + 0.05 + 0.01  # the wall is 5 cm behind, estimated within 1 cm
 
 
-def test_a_depth_that_only_the_wall_ends_is_not_called_seen():
+def test_a_depth_limited_only_by_the_wall_is_uncertain():
     shape = shape_of(carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0, wall_gap_m=0.01))
     assert shape.parameters["depth_sigma_m"] > 0.1 * np.ptp(shape.vertices_local[:, 1])
 
 
-def test_shallower_and_deeper_than_likely_are_that_in_every_draw():
+def test_shallower_and_deeper_hypotheses_bracket_the_likeliest_depth():
     evidence = gather_evidence(*carton_scene(SIZE, arc_deg=35.0, elevation_deg=0.0, yaw_rad=0.0), 8)
     everything = whole_pool(evidence)
     family = {h.assumes: h.shape for h in carton_family(evidence, observe_thing(evidence, everything))}

@@ -27,7 +27,7 @@ def fitted(evidence: Evidence, frame: Rigid3, size: np.ndarray) -> Cuboid | None
 
 
 @pytest.mark.parametrize(("yaw", "scale"), [(0.0, 0.8), (0.5, 1.3)])
-def test_the_carton_is_found_from_boxes_too_small_too_large_and_turned(carton: Evidence, yaw: float, scale: float) -> None:
+def test_the_box_fit_converges_from_small_large_and_rotated_boxes(carton: Evidence, yaw: float, scale: float) -> None:
     found = fitted(carton, Rigid3(rotation_about_z(yaw), MIDDLE), scale * SIZE)
     assert found is not None
     np.testing.assert_allclose(found.size_m, SIZE, atol=0.006)
@@ -37,14 +37,14 @@ def test_the_carton_is_found_from_boxes_too_small_too_large_and_turned(carton: E
     assert (found.sigma_m < 0.006).all()
 
 
-def test_the_surface_of_what_was_found_is_where_the_points_are(carton: Evidence) -> None:
+def test_observed_points_lie_on_the_fitted_surface(carton: Evidence) -> None:
     found = fitted(carton, Rigid3(np.eye(3), MIDDLE), SIZE)
     assert found is not None
     points = np.concatenate([masked_points(view) for view in carton.pool])
     assert np.median(np.abs(surface_distance(found, points))) < 0.006  # depth has 4 mm of noise
 
 
-def test_two_views_are_too_few(carton: Evidence) -> None:
+def test_two_views_give_no_box_fit(carton: Evidence) -> None:
     few = Evidence(capture=carton.capture, track=carton.track, pool=carton.pool[:2])
     assert fitted(few, Rigid3(np.eye(3), MIDDLE), SIZE) is None
 
@@ -54,13 +54,13 @@ def box(yaw: float = 0.0) -> Cuboid:
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.8])
-def test_distances_are_signed_and_turn_with_the_box(yaw: float) -> None:
+def test_surface_distances_are_signed_and_follow_the_yaw_of_the_box(yaw: float) -> None:
     local = np.array([[0.0, 0, 0], [0.2, 0, 0], [0.3, 0, 0], [0.23, 0.14, 0], [0.0, 0.09, 0.0]])
     distances = surface_distance(box(yaw), box(yaw).world_from_cuboid.apply(local))
     np.testing.assert_allclose(distances, [-0.1, 0.0, 0.1, 0.05, -0.01], atol=1e-12)
 
 
-def test_the_room_behind_ends_at_the_nearest_wall_behind() -> None:
+def test_room_behind_is_the_distance_to_the_nearest_wall_behind() -> None:
     def wall(normal: tuple[float, float, float], distance_m: float) -> Wall:
         """A wall at that distance from the box's centre."""
         n = np.array(normal)

@@ -16,7 +16,7 @@ def half_seen(shape, rng):
     return np.column_stack([0.05 * x + 0.2, 0.05 * y - 0.1, z]) + rng.normal(0, 0.002, (2000, 3))
 
 
-def test_a_lathe_is_closed_and_has_the_volume_of_its_profile():
+def test_a_lathe_mesh_is_closed_and_has_the_volume_of_its_profile():
     vertices, faces = lathe_mesh(Revolution(np.array([0.3, -0.2]), np.array([0.0, 1.0]), np.array([0.5, 0.25])))
     assert is_watertight(vertices, faces)
     assert is_manifold(vertices, faces)
@@ -24,14 +24,14 @@ def test_a_lathe_is_closed_and_has_the_volume_of_its_profile():
     assert volume(vertices, faces) == pytest.approx(cone, rel=0.01)  # 40 segments inscribe the circle
 
 
-def test_the_axis_is_found_from_the_seen_half():
+def test_axis_and_radii_are_fitted_from_the_observed_half():
     found = fit_revolution(half_seen("round", np.random.default_rng(0)))
     assert found is not None
     assert found.centre == pytest.approx([0.2, -0.1], abs=0.003)
     assert found.radii_m == pytest.approx(np.full(8, 0.05), abs=0.002)
 
 
-def test_a_carton_is_not_taken_for_a_bottle():
+def test_only_round_points_are_classified_as_round():
     rng = np.random.default_rng(0)
     for shape in ("round", "box"):
         points = half_seen(shape, rng)

@@ -36,7 +36,7 @@ def nearest_leg(post):
     return min(LEGS, key=lambda leg: np.hypot(*(post.top[:2] - leg)))
 
 
-def test_the_seat_and_the_legs_that_depth_shows_are_where_they_are(carving, everything):
+def test_seat_and_legs_seen_in_depth_are_located(carving, everything):
     """Seat 0.42 m square with its top at 0.48 m; legs 4.5 cm thick."""
     support = find_support(carving, everything.views)
     assert support.slab.high[2] + 0.45 == pytest.approx(0.48, abs=0.01)
@@ -61,14 +61,14 @@ def half_seen(carving, everything):
     return replace(everything, views=tuple(hidden))
 
 
-def test_a_leg_that_nobody_saw_is_the_mirror_image_of_one_that_was_seen(carving, half_seen):
+def test_unseen_legs_are_mirrored_from_seen_ones(carving, half_seen):
     support = find_support(carving, half_seen.views)
     assert {nearest_leg(post) for post in support.posts if not post.is_seen} == {leg for leg in LEGS if leg[0] > 0}
     for post in support.posts:
         assert post.top[:2] == pytest.approx(nearest_leg(post), abs=0.01)
 
 
-def test_the_bars_that_depth_saw_are_the_legs_and_there_is_air_between_them(carving, everything):
+def test_bars_found_in_depth_are_legs_with_free_space_between(carving, everything):
     found = find_bars(carving, everything.views)
     grid, half = carving.grid, 0.0225
 
@@ -84,7 +84,7 @@ def test_the_bars_that_depth_saw_are_the_legs_and_there_is_air_between_them(carv
             assert min(distance(side) for side in sides) < 0
 
 
-def test_legs_that_every_mask_left_out_are_there_where_depth_shows_them(carving, everything):
+def test_legs_missing_from_all_masks_are_found_in_depth(carving, everything):
     """Dark legs before a dark floor: colour cuts them off at the seat, depth does not."""
     local_from_world = carving.seen.world_from_local.inverse
 
@@ -108,7 +108,7 @@ def test_legs_that_every_mask_left_out_are_there_where_depth_shows_them(carving,
         assert np.min(away, axis=0).max() < 0.06  # and nothing between them
 
 
-def test_a_table_whose_top_alone_is_in_the_masks_stands_on_the_legs_that_depth_shows():
+def test_a_table_with_legless_masks_gets_its_legs_from_depth():
     """Thick square legs, some seen over a corner; the top alone would be a box in mid-air."""
     evidence = gather_evidence(*scenes.table_scene(), 10)
     views = tuple(legless(view, 0.67) for view in evidence.pool)
@@ -123,7 +123,7 @@ def test_a_table_whose_top_alone_is_in_the_masks_stands_on_the_legs_that_depth_s
     assert world[:, 2].min() == pytest.approx(0.0, abs=5e-3)
 
 
-def test_legs_of_which_none_was_seen_are_not_where_their_corners_were_seen_to_be_empty(carving, everything):
+def test_unseen_legs_are_not_placed_in_observed_free_space(carving, everything):
     """Free space at both right corners; further in nobody looked."""
     free = np.where(carving.grid.centres()[:, 0] > 0.15, np.float32(0.05), np.float32(-np.inf))
     local_from_world = carving.seen.world_from_local.inverse
@@ -137,7 +137,7 @@ def test_legs_of_which_none_was_seen_are_not_where_their_corners_were_seen_to_be
     assert 0.05 < min(x[2:]) <= max(x[2:]) < 0.16
 
 
-def test_where_a_corner_is_seen_to_be_empty_there_are_no_four_legs(carving, everything):
+def test_empty_corners_without_any_seen_leg_give_no_support(carving, everything):
     """No view shows any post, and free space was seen through all four corners."""
     empty = carving._replace(votes=carving.votes._replace(free_m=np.full_like(carving.votes.free_m, 0.05)))
     blind = [replace(view, depth_m=np.zeros_like(view.depth_m)) for view in everything.views]
@@ -145,7 +145,7 @@ def test_where_a_corner_is_seen_to_be_empty_there_are_no_four_legs(carving, ever
 
 
 @pytest.mark.parametrize("scene", [scenes.storage_bench_scene, scenes.desk_scene])
-def test_closed_furniture_stands_on_no_legs(scene):
+def test_closed_furniture_gets_no_legs(scene):
     """Round a corner, a closed side seen at a slant is as slender as a post; between the corners it is not."""
     evidence = gather_evidence(*scene(), 10)
     everything = whole_pool(evidence)
@@ -153,7 +153,7 @@ def test_closed_furniture_stands_on_no_legs(scene):
     assert find_support(carve(evidence, everything), everything.views) is None
 
 
-def test_a_closed_bench_is_not_thought_less_of_for_being_solid():
+def test_a_closed_bench_is_carved_solid_without_unseen_error():
     evidence = gather_evidence(*scenes.storage_bench_scene(), 10)
     everything = whole_pool(evidence)
     family = {guess.assumes: guess for guess in carved_family(evidence, everything, is_round=False)}
@@ -164,7 +164,7 @@ def test_a_closed_bench_is_not_thought_less_of_for_being_solid():
     assert volume(shape.vertices_local, shape.faces) == pytest.approx(true_m3, rel=0.1)
 
 
-def test_a_chair_on_legs_is_one_closed_solid(chair_scene, everything):
+def test_a_chair_on_legs_is_one_watertight_solid(chair_scene, everything):
     evidence = gather_evidence(*chair_scene, 10)
     first = carved_family(evidence, everything, is_round=False)[0]
     assert "legs" in first.assumes
@@ -175,7 +175,7 @@ def test_a_chair_on_legs_is_one_closed_solid(chair_scene, everything):
     assert len(shape.faces) <= 20_000
 
 
-def test_a_chair_says_how_many_of_its_legs_are_inferred(chair_scene, half_seen):
+def test_the_number_of_inferred_legs_is_reported(chair_scene, half_seen):
     evidence = gather_evidence(*chair_scene, 10)
     shape = carved_family(evidence, half_seen, is_round=False)[0].shape(half_seen)
     assert (shape.parameters["legs"], shape.parameters["legs_inferred"]) == (4.0, 2.0)
@@ -185,18 +185,18 @@ def test_a_chair_says_how_many_of_its_legs_are_inferred(chair_scene, half_seen):
 @pytest.mark.parametrize(
     "name", ["chair", "kitchen_table", "dining-table", "bar stools", "barstool", "armchair", "benches", "Desks", "chair_2"]
 )
-def test_the_last_word_of_a_name_says_what_stands_on_legs(name):
+def test_names_of_furniture_on_legs_are_recognised(name):
     assert category_of(name).on_legs
 
 
 @pytest.mark.parametrize(
     "name", ["bottle", "tablet", "cabinet", "table_lamp", "desk-lamp", "table cloth", "chair_cushion", "vegetable", ""]
 )
-def test_the_last_word_of_a_name_says_what_does_not_stand_on_legs(name):
+def test_other_names_are_not_furniture_on_legs(name):
     assert not category_of(name).on_legs
 
 
-def test_a_slab_on_one_leg_at_its_corner_falls_over():
+def test_a_slab_on_one_corner_leg_is_unstable():
     slab = box_mesh(np.array([0.0, 0.0, 0.4]), np.array([0.4, 0.4, 0.45]))
     legs = [box_mesh(np.array([x, x, 0.0]), np.array([x + 0.05, x + 0.05, 0.41])) for x in (0.0, 0.35)]
     assert not stands(*unite([slab, legs[0]]))

@@ -14,7 +14,7 @@ def views_of(depth_of, rng, noise_m, count=8):
     return found
 
 
-def test_a_framed_front_keeps_its_frame_on_the_plane_and_its_field_sunk():
+def test_a_recessed_field_of_a_framed_front_is_measured():
     """An 8 mm deep field 0.34 x 0.54 m, seen with 2 mm noise."""
     field = lambda x, z: np.where((np.abs(x) < 0.17) & (np.abs(z) < 0.27), 0.008, 0.0)  # noqa: E731
     heights = measure_heights(views_of(field, np.random.default_rng(0), 0.002), 0.5, 0.7, 0.01)
@@ -25,14 +25,14 @@ def test_a_framed_front_keeps_its_frame_on_the_plane_and_its_field_sunk():
     assert sunk[0].high[1] == pytest.approx(0.008, abs=0.002)
 
 
-def test_noise_alone_makes_no_relief():
+def test_noise_alone_gives_no_relief():
     flat = lambda x, z: np.zeros_like(x)  # noqa: E731
     for seed in range(5):
         heights = measure_heights(views_of(flat, np.random.default_rng(seed), 0.006), 0.5, 0.7, 0.01)
         assert find_steps(heights, None) == ([], [])
 
 
-def test_a_handle_is_left_to_the_measured_handle():
+def test_a_measured_handle_is_excluded_from_the_relief():
     bar = lambda x, z: np.where((np.abs(x) < 0.08) & (np.abs(z - 0.2) < 0.012), -0.03, 0.0)  # noqa: E731
     heights = measure_heights(views_of(bar, np.random.default_rng(0), 0.002), 0.5, 0.7, 0.008)
     handle = FrontHandle(left_m=-0.08, right_m=0.08, bottom_m=0.19, top_m=0.21, protrusion_m=0.03, confidence=1.0)

@@ -35,7 +35,7 @@ def nim_answer(glb, reason="SUCCESS"):
     return said(200, {"artifacts": [{"base64": base64.b64encode(glb).decode(), "finishReason": reason, "seed": 7}]})
 
 
-def test_a_nim_gets_masked_pictures_and_its_glb_becomes_a_closed_candidate(evidence):
+def test_a_nim_server_gets_masked_images_and_its_glb_becomes_a_candidate(evidence):
     with answering(lambda *request: nim_answer(box_glb())) as (address, asked):
         asset = nim(address).make(evidence, "c3", 5)
     method, path, _, body = asked[0]
@@ -59,7 +59,7 @@ def test_a_nim_gets_masked_pictures_and_its_glb_becomes_a_closed_candidate(evide
     assert asset.mesh.texture.shape == (32, 32, 3)  # kept, not baked again
 
 
-def test_every_candidate_is_another_sample_and_each_can_be_repeated(evidence):
+def test_candidates_use_distinct_and_reproducible_samples(evidence):
     with answering(lambda *request: nim_answer(box_glb())) as (address, asked):
         for candidate in ("c0", "c1", "c0"):
             nim(address).make(evidence, candidate, 0)
@@ -69,14 +69,14 @@ def test_every_candidate_is_another_sample_and_each_can_be_repeated(evidence):
     assert first["ss_cfg_scale"] != other["ss_cfg_scale"]
 
 
-def test_a_busy_server_is_asked_again(evidence):
+def test_a_busy_server_is_retried(evidence):
     answers = iter([said(503, {}, **{"Retry-After": "0"}), said(502, {}), nim_answer(box_glb())])
     with answering(lambda *request: next(answers)) as (address, asked):
         assert nim(address).make(evidence, "c0", 0).watertight
     assert len(asked) == 3
 
 
-def test_a_server_that_stays_busy_is_given_up_in_one_line(evidence):
+def test_a_permanently_busy_server_raises_a_one_line_error(evidence):
     busy = pytest.raises(BackendUnavailable, match=r"busy or down \(503\).*loading")
     with answering(lambda *request: said(503, {"detail": "loading"})) as (address, asked), busy as refusal:
         nim(address).make(evidence, "c0", 0)
@@ -84,7 +84,7 @@ def test_a_server_that_stays_busy_is_given_up_in_one_line(evidence):
     assert "\n" not in str(refusal.value)
 
 
-def test_nobody_there_is_one_line_with_the_address(evidence):
+def test_an_unreachable_server_raises_an_error_with_its_address(evidence):
     with pytest.raises(BackendUnavailable, match=r"127\.0\.0\.1:9 cannot be reached.*start it"):
         nim("http://127.0.0.1:9").make(evidence, "c0", 0)
 
@@ -105,20 +105,20 @@ def test_nobody_there_is_one_line_with_the_address(evidence):
         (nim_answer(b"glTF\x02\x00\x00\x00broken"), GenerationFailed, "not a readable GLB"),
     ],
 )
-def test_what_a_server_does_wrong_is_said_in_one_line(evidence, answer, kind, message):
+def test_server_errors_raise_a_one_line_error_without_a_retry(evidence, answer, kind, message):
     with answering(lambda *request: answer) as (address, asked), pytest.raises(kind, match=message) as refusal:
         nim(address).make(evidence, "c0", 0)
     assert len(asked) == 1  # retrying would help with none of these
     assert "\n" not in str(refusal.value)
 
 
-def test_an_endless_answer_is_cut_off(evidence, monkeypatch):
+def test_an_oversized_response_is_rejected(evidence, monkeypatch):
     monkeypatch.setattr(exchange, "MOST_BYTES", 1000)
     with answering(lambda *request: (200, {}, b" " * 5000)) as (address, _), pytest.raises(GenerationFailed, match="over"):
         nim(address).make(evidence, "c0", 0)
 
 
-def test_a_person_can_stop_a_request_that_hangs(evidence):
+def test_a_hanging_request_can_be_cancelled(evidence):
     stop, answered = threading.Event(), threading.Event()
 
     def hang(*request):
@@ -133,7 +133,7 @@ def test_a_person_can_stop_a_request_that_hangs(evidence):
         assert not answered.is_set()
 
 
-def test_a_server_that_hangs_is_asked_once(evidence):
+def test_a_response_timeout_is_not_retried(evidence):
     def hang(*request):
         released.wait(PATIENCE_S)
         return said(200, {})
@@ -146,7 +146,7 @@ def test_a_server_that_hangs_is_asked_once(evidence):
     assert len(asked) == 1
 
 
-def test_a_server_that_takes_no_connection_is_asked_again(evidence, monkeypatch):
+def test_a_connection_timeout_is_retried(evidence, monkeypatch):
     tries = []
 
     def connect(self):
@@ -159,7 +159,7 @@ def test_a_server_that_takes_no_connection_is_asked_again(evidence, monkeypatch)
     assert len(tries) == QUICK.tries
 
 
-def test_the_token_travels_in_the_header_and_never_in_the_address(evidence, monkeypatch):
+def test_the_token_is_sent_in_the_header_and_url_passwords_are_rejected(evidence, monkeypatch):
     monkeypatch.setenv("R2C2R_GENERATOR_TOKEN", "secret")
     with answering(lambda *request: nim_answer(box_glb())) as (address, asked):
         nim(address).make(evidence, "c0", 0)
@@ -169,13 +169,13 @@ def test_the_token_travels_in_the_header_and_never_in_the_address(evidence, monk
 
 
 @pytest.mark.parametrize("url", ["", "gpu-machine", "ftp://host/v1/mesh", "http://host", "http://host/generate"])
-def test_an_address_without_a_protocol_is_refused_before_any_work(url):
+def test_a_url_without_a_known_endpoint_is_rejected(url):
     with pytest.raises(BackendUnavailable, match="v1/mesh") as refusal:
         Remote(url=url)
     assert "\n" not in str(refusal.value)
 
 
-def test_without_a_server_it_is_not_offered_as_ready(monkeypatch):
+def test_the_remote_generator_is_available_only_with_a_configured_url(monkeypatch):
     monkeypatch.delenv("R2C2R_GENERATOR_URL", raising=False)
     assert GENERATORS.available("remote") == (False, "no server configured: set R2C2R_GENERATOR_URL")
     monkeypatch.setenv("R2C2R_GENERATOR_URL", "http://gpu:9000/v1/mesh")

@@ -46,7 +46,7 @@ def moved(mesh, *offset):
     return mesh
 
 
-def test_bodies_that_stand_apart_are_all_kept():
+def test_separate_bodies_are_united_and_kept():
     vertices, faces, notes = repaired(
         trimesh.creation.box((1.0, 0.5, 0.5)), moved(trimesh.creation.box((0.2, 0.5, 0.5)), 1.0, 0, 0)
     )
@@ -54,7 +54,7 @@ def test_bodies_that_stand_apart_are_all_kept():
     assert filled(vertices, faces) * 1.6**3 == pytest.approx(0.25 + 0.05, rel=1e-3)
 
 
-def test_what_lies_inside_another_body_is_gone():
+def test_inner_surfaces_are_removed():
     """TRELLIS leaves closed shells inside; volume and extents must be those of the outside (method.md row 16)."""
     shell = trimesh.creation.box((0.8, 0.6, 0.6))
     shell.invert()
@@ -75,7 +75,7 @@ def test_two_boxes_that_share_an_edge_become_a_solid():
     assert "2 bodies were united" in notes
 
 
-def test_crumbs_do_not_count_for_the_size():
+def test_small_fragments_do_not_affect_the_extents():
     vertices, _, notes = repaired(
         trimesh.creation.box((1.0, 0.5, 0.5)), moved(trimesh.creation.icosphere(radius=0.003, subdivisions=1), 3, 0, 0)
     )
@@ -84,7 +84,7 @@ def test_crumbs_do_not_count_for_the_size():
     assert extents / extents[0] == pytest.approx([1, 0.5, 0.5], rel=1e-3)
 
 
-def test_a_vertex_that_no_face_uses_does_not_count_for_the_size():
+def test_unreferenced_vertices_do_not_affect_the_extents():
     box = textured_box((1.0, 0.5, 0.5))
     loose = trimesh.Trimesh(np.vstack([box.vertices, [[9.0, 0, 0]]]), box.faces, process=False)
     loose.visual = trimesh.visual.TextureVisuals(uv=np.vstack([box.visual.uv, [[0.5, 0.5]]]), material=box.visual.material)
@@ -95,14 +95,14 @@ def test_a_vertex_that_no_face_uses_does_not_count_for_the_size():
     assert extents / extents[0] == pytest.approx([1, 0.5, 0.5], rel=1e-3)
 
 
-def test_one_inverted_body_among_others_is_turned():
+def test_an_inverted_body_among_others_is_flipped():
     lid = moved(trimesh.creation.box((1, 1, 0.1)), 0, 0, 1)
     lid.invert()
     vertices, faces, _ = repaired(trimesh.creation.box((1, 1, 1)), lid)
     assert filled(vertices, faces) * 1.55**3 == pytest.approx(1.1, rel=1e-3)
 
 
-def test_faces_given_twice_and_faces_without_area_do_no_harm():
+def test_duplicate_and_degenerate_faces_are_removed():
     box = trimesh.creation.box((1.0, 0.6, 0.4))
     faces = np.vstack([box.faces, box.faces[:3], [[0, 0, 1]]])
     vertices, faces, notes = repaired(trimesh.Trimesh(box.vertices, faces, process=False))
@@ -113,12 +113,12 @@ def test_faces_given_twice_and_faces_without_area_do_no_harm():
 
 
 @pytest.mark.parametrize("size", [1e-44, 1e200])
-def test_a_size_that_no_arithmetic_carries_is_refused(size):
+def test_extreme_mesh_sizes_are_rejected(size):
     with pytest.raises(OverrideError, match="units long, 1e-09 to 1e\\+09 expected"):
         repaired(trimesh.Trimesh(np.eye(4, 3) * size, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], process=False))
 
 
-def test_scattered_specks_are_no_body():
+def test_scattered_tiny_triangles_are_rejected():
     corners = np.eye(4, 3)[:, None] + 1e-3 * np.random.default_rng(0).random((4, 3, 3))
     with pytest.raises(OverrideError, match="the mesh cannot be repaired"):
         repaired(trimesh.Trimesh(corners.reshape(-1, 3), np.arange(12).reshape(4, 3), process=False))
@@ -135,7 +135,7 @@ def test_a_remeshed_body_keeps_its_proportions():
     assert extents / extents[0] == pytest.approx([1, 0.3, 0.3], abs=0.015), notes
 
 
-def test_colours_are_carried_over_exactly():
+def test_vertex_colours_are_kept_exactly_in_the_texture():
     red, blue = trimesh.creation.box((1, 0.5, 0.5)), moved(trimesh.creation.box((1, 0.5, 0.5)), 0.9, 0, 0)
     red.visual.vertex_colors, blue.visual.vertex_colors = [200, 20, 20, 255], [20, 20, 200, 255]
     mesh, _ = mended(parts_of([red, blue]), "mesh")
@@ -143,14 +143,14 @@ def test_colours_are_carried_over_exactly():
     assert {(200, 20, 20), (20, 20, 200)} <= seen
 
 
-def test_a_mesh_without_colours_says_so():
+def test_a_mesh_without_colours_is_reported():
     assert "no colours: shown grey" in repaired(trimesh.creation.box((1, 1, 1)))[2]
     painted = trimesh.creation.box((1, 1, 1))
     painted.visual.vertex_colors = [10, 200, 10, 255]
     assert "no colours" not in repaired(painted)[2]
 
 
-def test_a_very_large_texture_is_reduced_and_says_so():
+def test_a_very_large_texture_is_downscaled_with_a_note():
     box = textured_box()
     box.visual.material.baseColorTexture = Image.fromarray(np.zeros((2100, 4200, 3), np.uint8))
     mesh, notes = mended(parts_of([box]), "mesh")
@@ -158,7 +158,7 @@ def test_a_very_large_texture_is_reduced_and_says_so():
     assert "reduced to 2048 x 1024" in notes[0]
 
 
-def test_files_that_were_not_given_are_named(tmp_path):
+def test_missing_material_and_texture_files_are_reported(tmp_path):
     obj = tmp_path / "chair.obj"
     corners = "\n".join(f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1))
     quads = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
@@ -172,7 +172,7 @@ def test_files_that_were_not_given_are_named(tmp_path):
 
 
 @pytest.mark.parametrize("named", ["../elsewhere/wood.mtl", "{folder}/elsewhere/wood.mtl", "link.mtl", "n" * 5000])
-def test_materials_outside_the_objs_own_folder_are_named_and_not_read(tmp_path, named):
+def test_material_files_outside_the_obj_folder_are_reported_and_not_read(tmp_path, named):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "wood.mtl").write_text("newmtl wood\nKd 1 0 0\nmap_Kd secret.png\n")
     (tmp_path / "upload").mkdir()
@@ -185,7 +185,7 @@ def test_materials_outside_the_objs_own_folder_are_named_and_not_read(tmp_path, 
     assert part.is_plain
 
 
-def test_a_glb_with_its_picture_elsewhere_is_named(tmp_path):
+def test_an_external_texture_of_a_glb_is_reported_missing(tmp_path):
     document = json.dumps({"asset": {"version": "2.0"}, "images": [{"uri": "skin%201.png"}, {"uri": "data:image/png;base64,"}]})
     chunk = document.encode() + b" " * (-len(document) % 4)
     path = tmp_path / "a.glb"

@@ -115,7 +115,7 @@ def made(package, evidence, candidate="c0"):
     return sam3d.Sam3dObjects(weights=package.weights).make(one, candidate, 0)
 
 
-def test_points_go_in_and_the_pose_comes_out_in_the_model_s_frames(package, evidence):
+def test_point_maps_and_poses_use_the_coordinate_frames_of_the_model(package, evidence):
     """The fake gives the true mesh where the convention puts it; any slip in axes, order or scale shows in the masks."""
     asset = made(package, evidence)
     assert asset.metrics["mask_iou"] > 0.9
@@ -128,7 +128,7 @@ def test_points_go_in_and_the_pose_comes_out_in_the_model_s_frames(package, evid
     assert tuple(np.median(asset.mesh.texture.reshape(-1, 3), axis=0)) == (80, 80, 90)
 
 
-def test_a_pose_that_does_not_fit_its_own_photo_is_not_believed(package, evidence, monkeypatch):
+def test_a_pose_that_does_not_fit_its_photo_is_discarded(package, evidence, monkeypatch):
     monkeypatch.setattr(sam3d, "_Z_UP_FROM_Y_UP", np.diag([1.0, -1.0, -1.0]))
     asset = made(package, evidence)
     assert "mask_iou" not in asset.metrics
@@ -143,7 +143,7 @@ def test_samples_differ_in_seed_and_frame(package, evidence):
     assert len({asset.frames for asset in assets}) > 1
 
 
-def test_what_the_model_raises_costs_one_candidate(package, evidence, monkeypatch):
+def test_a_model_error_fails_only_one_candidate(package, evidence, monkeypatch):
     def out_of_memory(*args, **kwargs):
         raise RuntimeError("CUDA out of memory.\nTried")
 
@@ -152,13 +152,13 @@ def test_what_the_model_raises_costs_one_candidate(package, evidence, monkeypatc
         made(package, evidence)
 
 
-def test_a_file_that_would_run_other_code_is_refused(package):
+def test_a_pipeline_file_with_foreign_targets_is_rejected(package):
     package.targets["depth_model"] = {"nested": [{"_target_": "os.system"}]}
     with pytest.raises(BackendUnavailable, match=r"pipeline\.yaml: it would run 'os\.system'"):
         sam3d.Sam3dObjects(weights=package.weights)
 
 
-def test_an_absent_package_is_one_line(package, monkeypatch):
+def test_a_missing_package_raises_a_one_line_error(package, monkeypatch):
     monkeypatch.setitem(sys.modules, "hydra.utils", None)
     with pytest.raises(BackendUnavailable, match="package cannot be imported") as refusal:
         sam3d.Sam3dObjects(weights=Path("other"))

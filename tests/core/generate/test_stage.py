@@ -38,7 +38,7 @@ def test_every_candidate_is_closed_manifold_outward_and_textured(bottles, front_
         assert mesh.texture.std() > 0
 
 
-def test_candidates_are_unit_cubes_that_know_where_they_stand(bottles):
+def test_candidates_are_normalised_and_carry_their_world_pose(bottles):
     for asset in bottles.candidates:
         vertices = asset.mesh.vertices
         assert np.ptp(vertices, axis=0).max() == pytest.approx(1.0)
@@ -48,7 +48,7 @@ def test_candidates_are_unit_cubes_that_know_where_they_stand(bottles):
         np.testing.assert_allclose(np.ptp(stood, axis=0), (0.08, 0.08, 0.28), atol=0.02)
 
 
-def test_the_same_seed_gives_the_same_meshes_and_another_seed_others(bottles, bottle_scene):
+def test_meshes_are_reproducible_per_seed_and_differ_between_seeds(bottles, bottle_scene):
     again = generate_candidates(*bottle_scene, "completion", FEW)
     other = generate_candidates(*bottle_scene, "completion", replace(FEW, count=1), seed=1)
     for a, b in zip(bottles.candidates, again.candidates, strict=True):
@@ -62,7 +62,7 @@ def test_the_same_seed_gives_the_same_meshes_and_another_seed_others(bottles, bo
         assert a.parameters != b.parameters
 
 
-def test_a_candidate_tells_what_was_varied_and_how_it_fits(bottles):
+def test_candidates_report_their_parameters_and_fit_metrics(bottles):
     for asset in bottles.candidates:
         assert {"frames", "erosion_px", "bbox_percentile", "carve_votes", "voxel_m", "depth_scale"} <= set(asset.parameters)
         assert {"extent_middle", "extent_short", "volume_ratio", "faces", "seen_fraction", "mask_iou"} <= set(asset.metrics)
@@ -72,7 +72,7 @@ def test_a_candidate_tells_what_was_varied_and_how_it_fits(bottles):
     assert len({asset.assumes for asset in bottles.candidates}) > 1
 
 
-def test_the_choice_has_a_reason_in_one_sentence_and_ranks_all(bottles):
+def test_the_choice_has_a_one_sentence_reason_and_a_full_ranking(bottles):
     assert bottles.chosen_by == "consensus"
     assert bottles.ranking[0] == bottles.chosen_id
     assert sorted(bottles.ranking) == ["c0", "c1", "c2"]
@@ -80,7 +80,7 @@ def test_the_choice_has_a_reason_in_one_sentence_and_ranks_all(bottles):
     assert bottles.reason.count(". ") == 0
 
 
-def test_rejected_candidates_are_passed_over(bottles):
+def test_a_rejected_candidate_is_ranked_last(bottles):
     other = select_candidate(bottles, ObjectOverride(rejected=(bottles.chosen_id,)), FEW.rule)
     assert other.chosen_id != bottles.chosen_id
     assert other.ranking[-1] == bottles.chosen_id
@@ -99,7 +99,7 @@ def test_a_failing_candidate_does_not_fail_the_object(bottle_scene, monkeypatch)
     assert [c.candidate_id for c in found.candidates] == ["c0", "c2"]
 
 
-def test_when_all_fail_the_error_names_the_cause_and_the_next_step(bottle_scene, monkeypatch):
+def test_failure_of_all_candidates_raises_with_cause_and_advice(bottle_scene, monkeypatch):
     def never(self, evidence, candidate_id, seed):
         raise ValueError("planted")
 
@@ -108,23 +108,23 @@ def test_when_all_fail_the_error_names_the_cause_and_the_next_step(bottle_scene,
         generate_candidates(*bottle_scene, "completion", FEW)
 
 
-def test_a_track_without_masks_is_an_object_nobody_sees(bottle_scene):
+def test_a_track_without_masks_raises(bottle_scene):
     capture, track = bottle_scene
     with pytest.raises(ObjectNotSeen, match="bottle_1"):
         generate_candidates(capture, replace(track, masks={}), "completion", FEW)
 
 
-def test_cancelling_stops_between_candidates(bottle_scene):
+def test_generation_can_be_cancelled(bottle_scene):
     with pytest.raises(Cancelled):
         generate_candidates(*bottle_scene, "completion", FEW, progress=Progress(is_cancelled=lambda: True))
 
 
 @pytest.mark.parametrize("count", [0, 11])
-def test_the_count_is_one_to_ten(count):
+def test_a_candidate_count_outside_1_to_10_is_rejected(count):
     with pytest.raises(InputError, match="1 to 10"):
         config_from({"generate": {"count": count}}, "config.json")
 
 
-def test_the_default_generator_needs_no_extra():
+def test_the_default_generator_is_available_without_extras():
     assert GENERATORS.default == "completion"
     assert GENERATORS.available("completion") == (True, "ready")

@@ -27,7 +27,7 @@ def evidence(bottle_scene):
 
 
 @pytest.mark.parametrize("usable", ["round", "box"])
-def test_what_can_be_made_comes_first_where_carving_fails(evidence, monkeypatch, usable):
+def test_a_usable_hypothesis_precedes_a_failing_carved_one(evidence, monkeypatch, usable):
     made = {name: (Hypothesis(name, cube),) if name == usable else () for name in ("round", "box")}
     monkeypatch.setattr(things, "round_family", lambda *_: (made["round"], False))
     monkeypatch.setattr(things, "carton_family", lambda *_: made["box"])
@@ -35,7 +35,7 @@ def test_what_can_be_made_comes_first_where_carving_fails(evidence, monkeypatch,
     assert [h.assumes for h in things.thing_hypotheses(evidence, whole_pool(evidence))] == [usable, "carved"]
 
 
-def test_why_there_are_no_hypotheses_is_found_once_for_all_candidates(evidence, monkeypatch):
+def test_failing_hypotheses_are_computed_once_for_all_candidates(evidence, monkeypatch):
     asked = []
     monkeypatch.setattr(completion, "thing_hypotheses", lambda *_: asked.append(1) or fails(None))
     generator = completion.Completion()

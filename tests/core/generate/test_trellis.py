@@ -102,7 +102,7 @@ def evidence(bottle_scene):
     return gather_evidence(*bottle_scene, 8)
 
 
-def test_samples_differ_in_pictures_and_settings_and_come_out_closed(package, evidence):
+def test_samples_vary_in_images_and_settings_and_are_watertight(package, evidence):
     backend = trellis.Trellis(weights=WEIGHTS)
     assets = [backend.make(evidence, f"c{k}", 0) for k in range(10)]
     calls = backend._pipeline.calls
@@ -121,7 +121,7 @@ def test_samples_differ_in_pictures_and_settings_and_come_out_closed(package, ev
     assert np.array_equal(again.mesh.vertices, assets[4].mesh.vertices)
 
 
-def test_one_picture_goes_the_single_image_way(package, evidence):
+def test_a_single_view_uses_the_single_image_pipeline(package, evidence):
     backend = trellis.Trellis(weights=WEIGHTS)
     backend.make(replace(evidence, pool=evidence.pool[:1]), "c0", 0)
     assert backend._pipeline.calls[-1]["call"] == "run"
@@ -131,7 +131,7 @@ def test_the_model_is_loaded_once_for_all_objects(package):
     assert trellis.Trellis(weights=WEIGHTS)._pipeline is trellis.Trellis(weights=WEIGHTS)._pipeline
 
 
-def test_masks_too_small_for_a_picture_fail_before_the_model_is_asked(package, evidence):
+def test_too_small_masks_raise_before_the_model_is_called(package, evidence):
     backend = trellis.Trellis(weights=WEIGHTS)
     empty = tuple(replace(view, mask=np.zeros_like(view.mask)) for view in evidence.pool)
     with pytest.raises(GenerationFailed, match="bottle_1: its masks are too small"):
@@ -139,13 +139,13 @@ def test_masks_too_small_for_a_picture_fail_before_the_model_is_asked(package, e
     assert not backend._pipeline.calls
 
 
-def test_a_mask_that_fills_the_crop_still_has_transparency(package, evidence):
+def test_a_mask_that_fills_the_image_gives_a_watertight_mesh(package, evidence):
     backend = trellis.Trellis(weights=WEIGHTS)
     full = replace(evidence.pool[0], mask=np.ones_like(evidence.pool[0].mask))
     assert backend.make(replace(evidence, pool=(full,)), "c0", 0).watertight
 
 
-def test_what_the_model_raises_costs_one_candidate(package, evidence, monkeypatch):
+def test_a_model_error_fails_only_one_candidate(package, evidence, monkeypatch):
     def out_of_memory(*args, **kwargs):
         raise MemoryError("CUDA out of memory.\nTried to allocate 2 GiB")
 
@@ -155,7 +155,7 @@ def test_what_the_model_raises_costs_one_candidate(package, evidence, monkeypatc
     assert "\n" not in str(refusal.value)
 
 
-def test_absent_package_and_absent_weights_are_one_line_each(package, monkeypatch):
+def test_a_missing_package_and_missing_weights_raise_one_line_errors(package, monkeypatch):
     with pytest.raises(BackendUnavailable, match="absent-folder cannot be loaded") as refusal:
         trellis.Trellis(weights=Path("absent-folder"))
     assert "\n" not in str(refusal.value)
@@ -164,7 +164,7 @@ def test_absent_package_and_absent_weights_are_one_line_each(package, monkeypatc
         trellis.Trellis(weights=Path("other"))
 
 
-def test_a_folder_is_recognised_as_trellis_s_weights_by_what_it_holds(tmp_path):
+def test_a_trellis_weights_folder_is_recognised_by_its_files(tmp_path):
     wanted = GENERATORS.get("trellis").weights
     assert find_weights(str(tmp_path), wanted.holds) is None
     (tmp_path / "pipeline.json").write_text("{}")

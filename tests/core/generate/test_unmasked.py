@@ -13,7 +13,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 BODY = Revolution(np.zeros(2), np.array([0.9, 1.09, 1.13, 1.15]), np.array([0.04, 0.04, 0.015, 0.015]))  # up to the cap's base
 
 
-def test_a_cap_is_found_where_depth_stands_before_the_wall(bottle_scene):
+def test_a_cap_missing_from_the_masks_is_found_in_depth(bottle_scene):
     """The bottle ends at 1.18 m; the masks, and so the profile, at 1.15 m."""
     evidence = gather_evidence(*bottle_scene, 10)
     found = with_unmasked_top(BODY, evidence.pool, Rigid3())
@@ -22,13 +22,13 @@ def test_a_cap_is_found_where_depth_stands_before_the_wall(bottle_scene):
     assert found.heights_m[:4] == pytest.approx(BODY.heights_m)
 
 
-def test_nothing_grows_where_the_wall_shows_above_the_bottle(bottle_scene):
+def test_a_complete_profile_is_not_extended_where_the_wall_shows_above(bottle_scene):
     evidence = gather_evidence(*bottle_scene, 10)
     whole = Revolution(np.zeros(2), np.array([0.9, 1.09, 1.13, 1.18]), BODY.radii_m)
     assert with_unmasked_top(whole, evidence.pool, Rigid3()) is whole
 
 
-def test_nothing_grows_without_an_end(bottle_scene):
+def test_a_profile_is_not_extended_when_depth_above_never_ends(bottle_scene):
     """Depth as near as the axis all the way up belongs to something else."""
     evidence = gather_evidence(*bottle_scene, 10)
     above = np.array([[0.0, 0.0, 1.16]])
@@ -39,7 +39,7 @@ def test_nothing_grows_without_an_end(bottle_scene):
     assert with_unmasked_top(BODY, near, Rigid3()) is BODY
 
 
-def test_a_shadow_at_the_foot_is_cut_but_a_real_flare_stays():
+def test_a_shadow_at_the_base_is_removed_and_a_real_flare_is_kept():
     heights = np.linspace(0.0, 0.3, 41)
     flared = Revolution(np.zeros(2), heights, np.where(heights < 0.02, 0.06, 0.04))
     angle = np.linspace(-np.pi, 0.0, 60)

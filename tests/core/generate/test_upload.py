@@ -47,7 +47,7 @@ def textured_box(tmp_path, name="box.glb", flip=False):
     return tmp_path / name
 
 
-def test_a_closed_textured_mesh_keeps_its_texture_in_any_unit(tmp_path):
+def test_a_watertight_textured_upload_keeps_its_texture_and_proportions(tmp_path):
     asset = read(textured_box(tmp_path))
     assert_usable(asset)
     assert asset.warnings == ()
@@ -57,14 +57,14 @@ def test_a_closed_textured_mesh_keeps_its_texture_in_any_unit(tmp_path):
     assert asset.mesh.texture.shape == (64, 64, 3)
 
 
-def test_an_inside_out_mesh_is_turned_and_the_warning_says_so(tmp_path):
+def test_an_inside_out_mesh_is_flipped_with_a_warning(tmp_path):
     asset = read(textured_box(tmp_path, flip=True))
     assert_usable(asset)
     assert any("inwards" in warning for warning in asset.warnings)
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "glb"])
-def test_every_format_is_read(tmp_path, suffix):
+def test_every_mesh_format_is_read(tmp_path, suffix):
     path = tmp_path / f"capsule.{suffix}"
     trimesh.creation.capsule(height=0.2, radius=0.05, count=[16, 16]).export(path)
     asset = read(path)
@@ -97,7 +97,7 @@ def test_an_open_shell_is_remeshed_with_a_warning_and_keeps_its_colours(tmp_path
     assert proportions(asset.mesh.vertices) == pytest.approx([1, 1, 1], rel=0.06)
 
 
-def test_too_many_triangles_are_reduced_with_a_warning(tmp_path):
+def test_large_meshes_are_simplified_with_a_warning(tmp_path):
     trimesh.creation.icosphere(subdivisions=5).export(tmp_path / "ball.stl")  # 20 480
     asset = read(tmp_path / "ball.stl")
     assert_usable(asset)
@@ -105,7 +105,7 @@ def test_too_many_triangles_are_reduced_with_a_warning(tmp_path):
     assert any("simplified from 20480" in warning for warning in asset.warnings)
 
 
-def test_the_frame_of_an_upload_is_arbitrary_but_the_same_each_time(tmp_path):
+def test_the_frame_of_an_upload_is_reproducible_and_differs_by_object(tmp_path):
     path = textured_box(tmp_path)
     first, again = read(path), read(path)
     assert np.array_equal(first.mesh.vertices, again.mesh.vertices)
@@ -123,7 +123,7 @@ def test_the_frame_of_an_upload_is_arbitrary_but_the_same_each_time(tmp_path):
         ("two.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 0\nf 1 2 3\nf 1 3 4\n", "2 triangles"),
     ],
 )
-def test_what_no_repair_can_save_is_refused_in_one_line(tmp_path, name, content, message):
+def test_unrepairable_files_are_rejected_with_a_one_line_message(tmp_path, name, content, message):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(OverrideError, match=message) as refusal:
         read(tmp_path / name)
@@ -131,7 +131,7 @@ def test_what_no_repair_can_save_is_refused_in_one_line(tmp_path, name, content,
     assert "\n" not in str(refusal.value)
 
 
-def test_a_missing_file_is_refused(tmp_path):
+def test_a_missing_upload_is_rejected(tmp_path):
     with pytest.raises(OverrideError, match="no such file"):
         read(tmp_path / "nowhere.glb")
 
@@ -149,7 +149,7 @@ def test_a_real_generated_mesh_and_a_real_scan_are_read(name):
     assert_usable(read(MESHES / name))
 
 
-def test_vertices_of_two_numbers_are_refused(tmp_path):
+def test_vertices_with_two_coordinates_are_rejected(tmp_path):
     (tmp_path / "flat.obj").write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n")
     with pytest.raises(OverrideError, match=r"flat\.obj"):
         read(tmp_path / "flat.obj")

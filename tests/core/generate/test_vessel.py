@@ -13,7 +13,7 @@ from tests.core.generate.scenes import best_thing, mug_scene
 
 
 @pytest.mark.parametrize("azimuth", [0.4, 3.6])
-def test_a_mug_is_hollow_and_has_its_handle_where_it_was_seen(azimuth):
+def test_a_mug_is_hollow_with_its_handle_at_the_observed_azimuth(azimuth):
     evidence = gather_evidence(*mug_scene(azimuth), 10)
     shape = best_thing(evidence)
     assert (shape.parameters["hollow"], shape.parameters["handles"]) == (1.0, 1.0)
@@ -25,7 +25,7 @@ def test_a_mug_is_hollow_and_has_its_handle_where_it_was_seen(azimuth):
     assert find_hollow(world, shape.faces) is not None
 
 
-def test_a_cup_without_a_handle_gets_none():
+def test_a_cup_without_a_handle_gets_no_handle():
     evidence = gather_evidence(*mug_scene(None), 10)
     shape = best_thing(evidence)
     assert (shape.parameters["hollow"], shape.parameters["handles"]) == (1.0, 0.0)
@@ -41,13 +41,13 @@ def test_vessels_are_closed_manifold_and_outward(handle):
     assert 0.1 * solid < volume(vertices, faces) < 0.4 * solid
 
 
-def test_names_say_what_opens_upwards():
+def test_names_of_open_vessels_are_recognised():
     assert all(category_of(name).open_vessel for name in ("mug", "coffee_mug", "bowls", "plant pot"))
     assert not any(category_of(name).open_vessel for name in ("bottle", "cupboard", "teapot", "panel", "potato", "jar"))
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 2.0])
-def test_the_handle_of_a_tall_jug_stays_on_its_side(azimuth):
+def test_the_handle_of_a_tall_jug_protrudes_only_on_its_side(azimuth):
     jug = Revolution(np.zeros(2), np.array([0.0, 0.15, 0.3]), np.full(3, 0.05))
     vertices, faces = vessel_mesh(jug, VesselHandle(azimuth, 0.05))
     out = np.array([np.cos(azimuth), np.sin(azimuth)])
@@ -57,7 +57,7 @@ def test_the_handle_of_a_tall_jug_stays_on_its_side(azimuth):
 
 
 @pytest.mark.parametrize("height", [0.008, 0.02, 0.03])
-def test_a_flat_pan_has_its_handle_too(height):
+def test_a_flat_pan_keeps_its_handle(height):
     pan = Revolution(np.zeros(2), np.array([0.0, height]), np.full(2, 0.1))
     vertices, faces = vessel_mesh(pan, VesselHandle(0.0, 0.05))
     assert vertices[:, 0].max() == pytest.approx(0.15, abs=0.001)

@@ -30,7 +30,7 @@ def remote(address, **options):
     return Remote(url=f"{address}/v1/mesh", patience=QUICK, **options)
 
 
-def test_a_candidate_made_far_away_is_the_one_made_here(evidence):
+def test_a_remote_candidate_equals_the_local_one(evidence):
     here = Completion().make(evidence, "c0", 4)
     with worker(lambda wish, progress: Completion().make(*wish)) as address:
         there = remote(address).make(evidence, "c0", 4)
@@ -47,7 +47,7 @@ def test_a_candidate_made_far_away_is_the_one_made_here(evidence):
     assert {name: there.parameters[name] for name in here.parameters} == here.parameters
 
 
-def test_a_request_says_the_same_after_the_journey(evidence):
+def test_a_request_survives_encoding_and_decoding(evidence):
     wish = decode_wish(*encode_wish(Wish(evidence, "c0", 3)))
     assert (wish.candidate_id, wish.seed, wish.evidence.track.name) == ("c0", 3, "bottle_1")
     for sent, received in zip(evidence.pool, wish.evidence.pool, strict=True):
@@ -62,12 +62,12 @@ def test_a_request_says_the_same_after_the_journey(evidence):
         )
 
 
-def test_binary_parts_survive_the_form():
+def test_binary_parts_survive_multipart_encoding():
     parts = [("a", "x/y", bytes(range(256)) * 3), ("b", "x/y", b"\r\n--\r\n"), ("a", "x/y", b"")]
     assert decode_form(*encode_form(parts)) == {"a": [parts[0][2], b""], "b": [parts[1][2]]}
 
 
-def test_another_client_s_form_is_read():
+def test_a_multipart_form_of_httpx_is_decoded():
     httpx = pytest.importorskip("httpx")
     request = httpx.Request(
         "POST", "http://h/", files=[("image", ("a.png", b"\x89P\r\n")), ("image", ("b.png", b"2"))], data={"params": "{}"}
@@ -76,7 +76,7 @@ def test_another_client_s_form_is_read():
     assert form == {"params": [b"{}"], "image": [b"\x89P\r\n", b"2"]}
 
 
-def test_a_generator_that_breaks_fails_this_candidate_in_one_line(evidence):
+def test_a_generator_error_on_the_worker_raises_a_one_line_error(evidence):
     def broken(wish, progress):
         raise RuntimeError("CUDA out of memory\nTried to allocate")
 
@@ -85,7 +85,7 @@ def test_a_generator_that_breaks_fails_this_candidate_in_one_line(evidence):
     assert "\n" not in str(refusal.value)
 
 
-def test_a_wrong_token_is_refused_and_the_right_one_served(evidence, monkeypatch):
+def test_a_wrong_token_is_rejected_and_the_right_one_accepted(evidence, monkeypatch):
     made = []
     with worker(lambda wish, progress: made.append(wish) or Completion().make(*wish), token="good") as address:
         monkeypatch.setenv("R2C2R_GENERATOR_TOKEN", "bad")
@@ -96,7 +96,7 @@ def test_a_wrong_token_is_refused_and_the_right_one_served(evidence, monkeypatch
         assert remote(address).make(evidence, "c0", 0).watertight
 
 
-def test_stopping_tells_the_worker(evidence):
+def test_cancelling_stops_the_worker(evidence):
     began, told = threading.Event(), threading.Event()
 
     def slow(wish, progress):
@@ -113,7 +113,7 @@ def test_stopping_tells_the_worker(evidence):
         assert told.wait(PATIENCE_S)
 
 
-def test_a_mesh_damaged_on_its_way_is_not_used(evidence):
+def test_a_mesh_with_a_wrong_checksum_is_rejected(evidence):
     def answer(method, path, headers, body):
         if method == "POST":
             return said(202, {"job": "1"})
@@ -137,7 +137,7 @@ def test_a_mesh_damaged_on_its_way_is_not_used(evidence):
         ("POST", "/v1/mesh", {}, 411),
     ],
 )
-def test_the_worker_answers_what_it_cannot_serve(method, path, headers, status):
+def test_the_worker_answers_each_request_with_the_proper_status(method, path, headers, status):
     with worker(lambda wish, progress: None) as address:
         connection = http.client.HTTPConnection(address.removeprefix("http://"), timeout=PATIENCE_S)
         connection.putrequest(method, path)
@@ -148,7 +148,7 @@ def test_the_worker_answers_what_it_cannot_serve(method, path, headers, status):
         connection.close()
 
 
-def test_an_open_address_needs_a_token_and_a_taken_one_is_named():
+def test_a_public_address_needs_a_token_and_a_used_port_is_reported():
     with pytest.raises(InputError, match="R2C2R_WORKER_TOKEN"):
         open_server(lambda wish, progress: None, name="completion", address=("0.0.0.0", 0), token="")
     with worker(lambda wish, progress: None) as address:
