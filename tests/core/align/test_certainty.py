@@ -36,7 +36,7 @@ def box(bench: Any) -> tuple[Shape, Observation]:
     return seen(*bench.free_box(textured=False))
 
 
-def test_a_box_seen_from_around_is_held(box: tuple[Shape, Observation]) -> None:
+def test_a_box_seen_from_all_around_is_well_constrained(box: tuple[Shape, Observation]) -> None:
     spread = spread_of(IN_PLACE, *box, NOTHING, [])
     assert spread.turn_deg < 0.75
     assert spread.shift_m < 0.0075
@@ -44,7 +44,7 @@ def test_a_box_seen_from_around_is_held(box: tuple[Shape, Observation]) -> None:
     assert loose_ends(spread, None) == ()
 
 
-def test_frames_that_disagree_loosen_a_pose(box: tuple[Shape, Observation]) -> None:
+def test_inconsistent_frames_increase_the_pose_uncertainty(box: tuple[Shape, Observation]) -> None:
     shape, observation = box
     first = observation.frame_index == observation.frame_index[0]
     apart = observation.points_world + np.where(first, 0.02, 0.0)[:, None] * observation.towards_camera
@@ -52,7 +52,7 @@ def test_frames_that_disagree_loosen_a_pose(box: tuple[Shape, Observation]) -> N
     assert torn.shift_m > 1.5 * spread_of(IN_PLACE, shape, observation, NOTHING, []).shift_m
 
 
-def test_two_frames_that_agree_say_less_than_six(box: tuple[Shape, Observation]) -> None:
+def test_two_frames_constrain_a_pose_less_than_six(box: tuple[Shape, Observation]) -> None:
     shape, observation = box
     few = observation.views[:2]
     own = np.isin(observation.frame_index, [view.frame_index for view in few])
@@ -69,7 +69,7 @@ def test_two_frames_that_agree_say_less_than_six(box: tuple[Shape, Observation])
     assert pair.turn_deg > 1.9 * whole.turn_deg
 
 
-def test_a_side_alone_holds_less_than_the_whole(box: tuple[Shape, Observation]) -> None:
+def test_a_single_view_constrains_scale_and_rotation_less_than_all_views(box: tuple[Shape, Observation]) -> None:
     shape, observation = box
     view = observation.views[0]
     own = observation.frame_index == view.frame_index
@@ -86,7 +86,7 @@ def test_a_side_alone_holds_less_than_the_whole(box: tuple[Shape, Observation]) 
     assert alone.turn_deg > whole.turn_deg
 
 
-def test_the_yaw_of_a_bottle_counts_for_nothing(bench: Any) -> None:
+def test_the_yaw_of_a_bottle_is_excluded_from_its_uncertainty(bench: Any) -> None:
     shape, observation = seen(*bench.bottle())
     assert spins_alike(shape, np.array([0.0, 0.0, 2.0]))
     assert not spins_alike(shape, np.array([1.0, 0.0, 0.0]))
@@ -103,13 +103,13 @@ def test_the_yaw_of_a_bottle_counts_for_nothing(bench: Any) -> None:
         ({"scale": 0.03}, "its size is .* 6 %"),
     ],
 )
-def test_what_is_loose_is_named(change: dict[str, Any], words: str) -> None:
+def test_poorly_constrained_motions_are_reported(change: dict[str, Any], words: str) -> None:
     assert loose_ends(SURE, None) == ()
     (line,) = loose_ends(replace(SURE, **change), None)
     assert re.search(words, line)
 
 
-def test_a_front_tells_along_the_wall_from_into_it() -> None:
+def test_shifts_of_a_front_are_reported_along_or_from_the_wall() -> None:
     facing_x = Rigid3(rotation_about_z(np.pi / 2), np.zeros(3))  # its width is along world y
     front = FrontPanel(world_from_front=facing_x, width_m=0.6, height_m=0.7, handle=None, confidence=1.0)
     (slides,) = loose_ends(replace(SURE, shift_m=0.02, shift_axis_world=np.array([0.0, 1.0, 0.0])), front)

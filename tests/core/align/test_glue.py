@@ -73,7 +73,7 @@ def pictures():
 
 
 @pytest.mark.parametrize("name", MATCHERS)
-def test_keypoints_lie_on_the_object_are_capped_and_keep_their_place(folders, pictures, name):
+def test_keypoints_lie_in_the_mask_are_limited_and_follow_a_shift(folders, pictures, name):
     matcher = MATCHERS[name](weights=folders[name])
     (first, second), masks = pictures
     features = matcher.describe(first, masks[0])
@@ -87,7 +87,7 @@ def test_keypoints_lie_on_the_object_are_capped_and_keep_their_place(folders, pi
 
 
 @pytest.mark.parametrize("name", MATCHERS)
-def test_kept_keypoints_match_as_the_model_s_own_call_does(folders, name):
+def test_stored_keypoints_match_like_the_forward_call_of_the_model(folders, name):
     """Whole canvas, one image each: what `forward` finds with its own detection is what we find with kept keypoints."""
     matcher = MATCHERS[name](weights=folders[name])
     rng = np.random.default_rng(3)
@@ -115,7 +115,7 @@ def place(share, side):
 
 
 @pytest.mark.parametrize("name", MATCHERS)
-def test_pairs_are_one_to_one_and_nothing_matches_nothing(folders, pictures, name):
+def test_pairs_are_one_to_one_and_empty_features_have_no_matches(folders, pictures, name):
     matcher = MATCHERS[name](weights=folders[name])
     images, masks = pictures
     first, second = (matcher.describe(image, mask) for image, mask in zip(images, masks, strict=True))
@@ -127,7 +127,7 @@ def test_pairs_are_one_to_one_and_nothing_matches_nothing(folders, pictures, nam
     assert len(matcher.match(nothing, nothing).first) == 0
 
 
-def test_superglue_keeps_only_pairs_it_is_sure_of(folders, pictures, monkeypatch):
+def test_superglue_drops_low_confidence_pairs(folders, pictures, monkeypatch):
     images, masks = pictures
     lenient = SuperGlueMatcher(weights=folders["superglue"])
     first, second = (lenient.describe(image, mask) for image, mask in zip(images, masks, strict=True))
@@ -136,7 +136,7 @@ def test_superglue_keeps_only_pairs_it_is_sure_of(folders, pictures, monkeypatch
     assert len(lenient.match(first, second).first) > len(strict.match(first, second).first)
 
 
-def test_of_many_views_only_the_most_alike_go_through_the_network(folders, pictures, monkeypatch):
+def test_only_the_most_similar_views_are_matched_by_the_network(folders, pictures, monkeypatch):
     matcher = SuperGlueMatcher(weights=folders["superglue"])
     images, masks = pictures
     first, same = (matcher.describe(image, mask) for image, mask in zip(images, masks, strict=True))
@@ -153,7 +153,7 @@ def test_of_many_views_only_the_most_alike_go_through_the_network(folders, pictu
 
 
 @pytest.mark.parametrize("name", MATCHERS)
-def test_a_folder_without_such_weights_is_one_line(tmp_path, name):
+def test_a_folder_without_the_weights_raises_a_one_line_error(tmp_path, name):
     (tmp_path / "config.json").write_text("{}")
     with pytest.raises(BackendUnavailable, match=str(tmp_path)) as refusal:
         MATCHERS[name](weights=tmp_path)

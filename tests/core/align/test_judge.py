@@ -21,7 +21,7 @@ def unit(bench: type[Bench], recess_m: float) -> Any:
     return thing.__class__(vertices=vertices, faces=thing.faces, uv=thing.uv, texture=thing.texture)
 
 
-def test_a_sunk_panel_is_a_part_of_the_face_and_the_sides_are_not(bench: type[Bench]) -> None:
+def test_a_recessed_panel_counts_as_part_of_the_front_face(bench: type[Bench]) -> None:
     thing = unit(bench, 0.025)
     front = FrontPanel(
         world_from_front=Rigid3(np.eye(3), np.array([0, 0, 0.45])), width_m=0.6, height_m=0.7, handle=None, confidence=0.9

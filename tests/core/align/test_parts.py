@@ -20,7 +20,7 @@ from r2c2r_core.geometry.transforms import Similarity3
 from tests.core.motions import motion
 
 
-def test_there_are_24_turns_of_a_box_and_no_reflection() -> None:
+def test_signed_permutations_are_the_24_proper_rotations() -> None:
     turns = signed_permutations()
     assert len(turns) == 24
     assert len({t.tobytes() for t in turns}) == 24
@@ -28,7 +28,7 @@ def test_there_are_24_turns_of_a_box_and_no_reflection() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_manhattan_axes_follow_the_mesh(seed: int) -> None:
+def test_manhattan_axes_follow_the_rotation_of_the_normals(seed: int) -> None:
     rng = np.random.default_rng(seed)
     normals = np.eye(3)[rng.integers(0, 3, 900)] * rng.choice([-1.0, 1.0], (900, 1))
     normals = normals + rng.normal(0, 0.1, normals.shape)
@@ -50,7 +50,7 @@ def test_the_size_of_a_mesh_does_not_depend_on_its_frame(bench: Any) -> None:
     np.testing.assert_allclose(sizes, np.linalg.norm([0.4, 0.3, 0.25]), rtol=0.02)
 
 
-def test_a_view_shows_the_object_at_its_place(bench: Any) -> None:
+def test_view_masks_and_points_match_the_true_object(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=True)
     observation = observe(capture, track, view_count=5, size_px=128, point_count=800)
     assert len(observation.views) == 5
@@ -67,14 +67,14 @@ def test_a_view_shows_the_object_at_its_place(bench: Any) -> None:
     assert inside.mean() > 0.98
 
 
-def test_frames_are_spread_over_the_directions(bench: Any) -> None:
+def test_chosen_frames_are_ordered_and_spread_over_directions(bench: Any) -> None:
     _, capture, track = bench.free_box(textured=False)
     chosen = choose_frames(capture, track, 3)
     assert [f.index for f in chosen] == sorted(f.index for f in chosen)
     assert chosen[-1].index - chosen[0].index >= 5
 
 
-def test_frames_in_which_a_drawer_stands_open_are_left_out(bench: Any) -> None:
+def test_frames_with_an_open_drawer_are_excluded_unless_all_show_it(bench: Any) -> None:
     _, capture, track = bench.free_box(textured=False)
     opened = dict.fromkeys(sorted(track.masks)[::2], 0.2)
     chosen = {f.index for f in choose_frames(capture, replace(track, motions=(motion(opened),)), 8)}
@@ -83,7 +83,7 @@ def test_frames_in_which_a_drawer_stands_open_are_left_out(bench: Any) -> None:
     assert {f.index for f in choose_frames(capture, always, 8)} == set(track.masks)
 
 
-def test_a_hundred_views_look_from_all_around_with_colour_and_depth(bench: Any) -> None:
+def test_rendered_views_surround_the_mesh_with_colour_and_depth(bench: Any) -> None:
     asset, _ = bench.as_candidate(bench.free_box(textured=True)[0], 0)
     views, _, _ = render_views(asset.mesh, count=100, size_px=64)
     assert len(views) == 100
@@ -92,7 +92,7 @@ def test_a_hundred_views_look_from_all_around_with_colour_and_depth(bench: Any) 
     assert np.linalg.norm(fibonacci_sphere(100).mean(axis=0)) < 0.01
 
 
-def test_sift_finds_the_same_spots_after_a_turn(bench: Any) -> None:
+def test_sift_matches_the_same_points_after_a_rotation(bench: Any) -> None:
     image = bench.blotches(np.random.default_rng(3), 200, 200)
     matcher = MATCHERS.load("sift")
     everything = np.ones((200, 200), dtype=bool)
@@ -104,7 +104,7 @@ def test_sift_finds_the_same_spots_after_a_turn(bench: Any) -> None:
     assert np.median(np.linalg.norm(turned - second.uv_px[pairs.second], axis=1)) < 0.7
 
 
-def test_keypoints_beside_the_mask_take_no_ones_place(bench: Any) -> None:
+def test_keypoints_outside_the_mask_do_not_use_up_the_limit(bench: Any) -> None:
     image = bench.blotches(np.random.default_rng(4), 200, 200)
     mask = np.zeros((200, 200), dtype=bool)
     mask[60:140, 60:140] = True
@@ -114,7 +114,7 @@ def test_keypoints_beside_the_mask_take_no_ones_place(bench: Any) -> None:
     assert mask[found.uv_px[:, 1].astype(int), found.uv_px[:, 0].astype(int)].all()
 
 
-def test_matches_of_few_and_no_keypoints_are_empty() -> None:
+def test_matching_without_keypoints_is_empty() -> None:
     matcher = MATCHERS.load("sift")
     plain = matcher.describe(np.full((64, 64, 3), 128, np.uint8), np.ones((64, 64), dtype=bool))
     assert len(plain.uv_px) == 0
@@ -135,7 +135,7 @@ def make_lifted(truth: Similarity3, frame: int, good: int, bad: int, seed: int) 
     return lifted_from(frame, mesh, world)
 
 
-def test_frames_vote_for_one_pose_and_a_misled_frame_is_outvoted() -> None:
+def test_a_frame_with_wrong_matches_is_outvoted() -> None:
     truth = Similarity3(0.7, Rotation.random(random_state=1).as_matrix(), np.array([1.0, 2.0, 0.5]))
     misled = Similarity3(0.7, Rotation.random(random_state=2).as_matrix(), np.array([1.0, 2.0, 0.5]))
     lifted = [make_lifted(truth, f, 15, 30, f) for f in (3, 8, 12)] + [make_lifted(misled, 20, 25, 5, 9)]
@@ -146,7 +146,7 @@ def test_frames_vote_for_one_pose_and_a_misled_frame_is_outvoted() -> None:
     assert max(votes.by_frame[f] for f in (3, 8, 12)) > votes.by_frame[20]
 
 
-def test_frames_with_three_right_matches_each_agree_only_together() -> None:
+def test_frames_with_three_inliers_each_give_the_pose_together() -> None:
     truth = Similarity3(0.7, Rotation.random(random_state=3).as_matrix(), np.array([1.0, 2.0, 0.5]))
     lifted = [make_lifted(truth, f, 3, 12, f) for f in range(8)]
     best = vote(lifted, 1.7, (0.3, 2.0), np.random.default_rng(0)).hypotheses[0]

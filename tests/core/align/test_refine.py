@@ -50,7 +50,7 @@ def keypoints(shape: Any, observation: Any, *, wrong: int) -> list[Lifted]:
     return found
 
 
-def test_a_round_surface_leaves_the_turn_about_its_axis_open(bottle: Any) -> None:
+def test_a_round_surface_leaves_yaw_unconstrained_until_keypoints_fix_it(bottle: Any) -> None:
     shape, observation = bottle
     motion, spread_m = loosest_motion(UPRIGHT, shape, observation, NOTHING, [])
     turn = motion[:3] / np.linalg.norm(motion[:3])
@@ -59,7 +59,7 @@ def test_a_round_surface_leaves_the_turn_about_its_axis_open(bottle: Any) -> Non
     assert held_m < 0.3 * spread_m
 
 
-def test_keypoints_turn_a_bottle_that_its_surface_lets_turn(bottle: Any) -> None:
+def test_keypoints_correct_the_yaw_of_a_bottle(bottle: Any) -> None:
     shape, observation = bottle
     settings = {"free_scale": True, "iterations": 10, "loose": 0.06}
     alone = refine(turned(6.0), shape, observation, NOTHING, [], **settings)
@@ -69,13 +69,13 @@ def test_keypoints_turn_a_bottle_that_its_surface_lets_turn(bottle: Any) -> None
 
 
 @pytest.mark.parametrize("angle_deg", [-7.0, 5.0])
-def test_colours_find_the_yaw_of_a_labelled_bottle(bottle: Any, angle_deg: float) -> None:
+def test_colours_determine_the_yaw_of_a_labelled_bottle(bottle: Any, angle_deg: float) -> None:
     shape, observation = bottle
     found = sweep_loosest(turned(angle_deg), shape, observation, NOTHING, [])
     assert abs(yaw_deg(found)) < 2.0  # 1.2 mm at a radius of 35 mm, in views of 3 mm per pixel
 
 
-def test_what_is_held_is_not_swept(bench: Any) -> None:
+def test_a_well_constrained_pose_is_not_swept(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=True)
     shape = prepare_shape(thing, point_count=4000, face_limit=6000, rng=np.random.default_rng(0))
     observation = observe(capture, track, view_count=6, size_px=128, point_count=800)

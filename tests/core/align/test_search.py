@@ -31,17 +31,17 @@ def trial(case: Case, *, lean: float = 0.0, scale: float = 1.0) -> Trial:
     )
 
 
-def test_lean_is_told_from_the_nearest_side_it_can_stand_on(bottle: Case) -> None:
+def test_lean_is_measured_from_the_nearest_stable_pose(bottle: Case) -> None:
     assert lean_deg(trial(bottle).pose, bottle) == 0.0
     assert lean_deg(trial(bottle, lean=12.0).pose, bottle) == pytest.approx(12.0, abs=1.0)
 
 
-def test_a_leaning_bottle_is_stood_upright(bottle: Case) -> None:
+def test_a_leaning_bottle_is_set_upright(bottle: Case) -> None:
     best = finish_contenders([trial(bottle, lean=25.0)], bottle)[0]
     assert lean_deg(best.pose, bottle) == 0.0
 
 
-def test_size_and_turn_tell_rivals_apart(bottle: Case) -> None:
+def test_rival_poses_are_distinguished_by_size_and_rotation(bottle: Case) -> None:
     best = trial(bottle)
     assert resized(trial(bottle, scale=1.1), best)
     assert not resized(trial(bottle, scale=1.02), best)
@@ -52,7 +52,7 @@ def test_size_and_turn_tell_rivals_apart(bottle: Case) -> None:
     )
 
 
-def test_a_rival_is_finished_before_it_is_compared(bottle: Case) -> None:
+def test_rival_poses_are_refined_before_comparison(bottle: Case) -> None:
     rough = trial(bottle, scale=1.08)
     finished = finish_contenders([trial(bottle), rough], bottle)
     assert len(finished) == 2

@@ -39,7 +39,7 @@ def assert_placed(placement: Any, truth: Similarity3, asset: Any) -> None:
 @pytest.mark.parametrize(
     ("seed", "config"), [(0, replace(LIGHT, match_photos=6)), pytest.param(1, AlignConfig(), marks=pytest.mark.slow)]
 )
-def test_a_textured_box_returns_from_any_frame(bench: Any, seed: int, config: AlignConfig) -> None:
+def test_a_textured_box_is_placed_from_any_initial_frame(bench: Any, seed: int, config: AlignConfig) -> None:
     thing, capture, track = bench.free_box(textured=True)
     asset, truth = bench.as_candidate(thing, seed)
     placement = Placer("sift", config, seed=seed)(capture, track, asset)
@@ -57,7 +57,7 @@ def nudged(truth: Similarity3, shift_m: float, turn_deg: float) -> Similarity3:
     return Similarity3(1.01 * truth.scale, turn @ truth.rotation, truth.translation + shift_m * np.array([0.6, -0.5, 0.6]))
 
 
-def test_a_front_stays_where_it_was_measured(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_front_keeps_the_pose_of_its_generator(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     thing, capture, track = bench.blank_cabinet()
     asset, truth = bench.as_candidate(thing, 2)
     monkeypatch.setattr(stage_module, "box_hypotheses", None)  # a call would end in a TypeError
@@ -69,7 +69,7 @@ def test_a_front_stays_where_it_was_measured(bench: Any, monkeypatch: pytest.Mon
     assert placement.runner_up is None
 
 
-def test_a_thing_whose_generator_knows_its_pose_is_refined(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_thing_with_a_generator_pose_is_refined_without_a_search(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     thing, capture, track = bench.free_box(textured=True)
     asset, truth = bench.as_candidate(thing, 2)
     monkeypatch.setattr(stage_module, "box_hypotheses", None)
@@ -78,7 +78,7 @@ def test_a_thing_whose_generator_knows_its_pose_is_refined(bench: Any, monkeypat
     assert placement.runner_up is None
 
 
-def test_what_stands_elsewhere_than_its_masks_is_not_placed(bench: Any) -> None:
+def test_a_pose_far_from_its_masks_raises(bench: Any) -> None:
     thing, capture, track = bench.blank_cabinet()
     asset, truth = bench.as_candidate(thing, 2)
     with pytest.raises(PlacementFailed, match="covers the mask with IoU"):
@@ -93,7 +93,7 @@ def test_a_blank_cabinet_is_placed_by_geometry_alone(bench: Any) -> None:
     assert_placed(placement, truth, asset)
 
 
-def test_a_cabinet_without_a_handle_is_flat_and_its_orientation_unsure(bench: Any) -> None:
+def test_a_cabinet_without_a_handle_is_reported_flat_and_unsure(bench: Any) -> None:
     thing, capture, track = bench.blank_cabinet(handle=False)
     asset, _ = bench.as_candidate(thing, 3)
     placement = Placer("sift", LIGHT)(capture, track, asset)
@@ -102,7 +102,7 @@ def test_a_cabinet_without_a_handle_is_flat_and_its_orientation_unsure(bench: An
     assert any("flat" in w for w in placement.warnings)
 
 
-def test_a_blank_box_is_reported_unsure_but_stands_right(bench: Any) -> None:
+def test_an_untextured_box_is_placed_but_its_orientation_is_unsure(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=False)
     asset, _ = bench.as_candidate(thing, 4)
     placement = Placer("sift", LIGHT)(capture, track, asset)
@@ -117,7 +117,7 @@ def test_a_blank_box_is_reported_unsure_but_stands_right(bench: Any) -> None:
     np.testing.assert_allclose(placed, np.sort(np.ptp(thing.vertices, axis=0)), atol=0.008)
 
 
-def test_a_bottle_stands_upright_and_its_yaw_is_no_doubt(bench: Any) -> None:
+def test_a_bottle_is_placed_upright_and_is_not_unsure(bench: Any) -> None:
     thing, capture, track = bench.bottle()
     asset, truth = bench.as_candidate(thing, 5)
     placement = Placer("sift", LIGHT)(capture, track, asset)
@@ -137,13 +137,13 @@ def test_a_chair_is_placed(bench: Any) -> None:
 
 
 @pytest.mark.skipif(not MUG.exists(), reason="the YCB mug is not on this machine")
-def test_a_mug_finds_its_handle(bench: Any) -> None:
+def test_a_mug_is_placed_by_its_handle(bench: Any) -> None:
     thing, capture, track = bench.film_mug(MUG)
     asset, truth = bench.as_candidate(thing, 7)
     assert_placed(Placer("sift", LIGHT)(capture, track, asset), truth, asset)
 
 
-def test_a_wrong_mesh_shows_in_its_evidence(bench: Any) -> None:
+def test_a_wrong_mesh_fails_or_has_bad_metrics_and_warnings(bench: Any) -> None:
     _, capture, track = bench.chair()
     wrong, _ = bench.as_candidate(bench.free_box(textured=True)[0], 8)
     try:
@@ -154,7 +154,7 @@ def test_a_wrong_mesh_shows_in_its_evidence(bench: Any) -> None:
     assert placement.warnings
 
 
-def test_one_frame_alone_is_never_trusted(bench: Any) -> None:
+def test_a_placement_from_one_frame_is_unsure(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=True)
     asset, _ = bench.as_candidate(thing, 9)
     alone = replace(track, masks={3: track.masks[3]})
@@ -171,7 +171,7 @@ def test_the_same_seed_gives_the_same_placement(bench: Any) -> None:
     assert first.votes == second.votes
 
 
-def test_parameters_of_the_generator_are_not_looked_at(bench: Any) -> None:
+def test_generator_parameters_do_not_affect_the_placement(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=True)
     asset, _ = bench.as_candidate(thing, 9)
     told = replace(asset, parameters={"yaw": 1.0, "scale": 3.0}, metrics={"mask_iou": 0.1}, frames=(1,))
@@ -179,7 +179,7 @@ def test_parameters_of_the_generator_are_not_looked_at(bench: Any) -> None:
     np.testing.assert_array_equal(first.world_from_mesh.matrix, second.world_from_mesh.matrix)
 
 
-def test_failures_say_what_to_do(bench: Any) -> None:
+def test_missing_masks_empty_meshes_and_unknown_matchers_raise(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=False)
     asset, _ = bench.as_candidate(thing, 0)
     with pytest.raises(PlacementFailed, match="no frame"):
@@ -192,7 +192,7 @@ def test_failures_say_what_to_do(bench: Any) -> None:
         Placer("nonesuch", LIGHT)(capture, track, asset)
 
 
-def test_an_object_without_depth_fails_with_a_hint(bench: Any) -> None:
+def test_an_object_without_depth_raises(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=False)
     asset, _ = bench.as_candidate(thing, 0)
     images = capture.images
@@ -201,7 +201,7 @@ def test_an_object_without_depth_fails_with_a_hint(bench: Any) -> None:
         Placer("sift", LIGHT)(replace(capture, images=blind), track, asset)
 
 
-def test_it_stops_when_asked(bench: Any) -> None:
+def test_placement_can_be_cancelled(bench: Any) -> None:
     thing, capture, track = bench.free_box(textured=False)
     asset, _ = bench.as_candidate(thing, 0)
     with pytest.raises(Cancelled):

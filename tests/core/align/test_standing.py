@@ -27,7 +27,7 @@ def off_deg(direction: np.ndarray, wanted: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_cup_stands_square_to_its_base_whatever_its_box_axes_say(seed: int) -> None:
+def test_a_cup_stands_perpendicular_to_its_base_despite_tilted_box_axes(seed: int) -> None:
     turn = Rotation.random(random_state=seed).as_matrix()
     box_axes = turn @ Rotation.from_euler("y", 7, degrees=True).as_matrix()
     points = cup() @ turn.T
@@ -37,7 +37,7 @@ def test_a_cup_stands_square_to_its_base_whatever_its_box_axes_say(seed: int) ->
     assert all(off_deg(a, b) > 10 for k, a in enumerate(ups) for b in ups[:k])
 
 
-def test_a_boxs_own_axes_count_for_more_than_its_base() -> None:
+def test_reliable_box_axes_take_precedence_over_the_base() -> None:
     points = cup(handle=False)
     axes = Rotation.from_euler("y", 2, degrees=True).as_matrix()
     _, bases = standing_directions(points, (axes,), 0.9, hull_directions(points, 8))
@@ -45,16 +45,16 @@ def test_a_boxs_own_axes_count_for_more_than_its_base() -> None:
 
 
 @pytest.mark.parametrize("lean_deg", [25.0, 40.0])
-def test_what_would_topple_does_not_stand(lean_deg: float) -> None:
+def test_a_toppling_pose_is_not_settled(lean_deg: float) -> None:
     leaning = Rotation.from_euler("x", lean_deg, degrees=True).as_matrix() @ UP
     assert settled_on_base(cup(handle=False), leaning) is None
 
 
-def test_a_cup_on_its_round_side_rocks() -> None:
+def test_a_cup_on_its_round_side_is_not_settled() -> None:
     assert settled_on_base(cup(handle=False), np.array([1.0, 0.0, 0.0])) is None
 
 
-def test_four_legs_carry_and_three_on_one_side_do_not() -> None:
+def test_four_legs_are_stable_and_two_on_one_side_are_not() -> None:
     rng = np.random.default_rng(1)
     seat = rng.uniform([-0.2, -0.2, 0.44], [0.2, 0.2, 0.47], (4000, 3))
     legs = {
