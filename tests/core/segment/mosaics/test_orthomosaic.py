@@ -32,7 +32,7 @@ def _shares(film: Film, surface: Film) -> np.ndarray:
     return np.array([opened_cells(GRID, scan, frame).mean() for frame in film.frames])
 
 
-def test_frames_that_look_into_an_open_unit_are_excluded() -> None:
+def test_an_open_leaf_is_detected_only_in_frames_that_show_it_open() -> None:
     found = _shares(filmed("left", OPEN), CLOSED)
     assert (found[OPEN == 0] == 0).all()
     assert (found[OPEN > 0] > 0.5).all()  # the leaf itself occludes the rest
