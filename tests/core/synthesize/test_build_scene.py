@@ -50,7 +50,7 @@ def the(scene: ArticulatedScene, name: str) -> SceneObject:
     return next(o for o in scene.objects if o.name == name)
 
 
-def test_an_object_whose_measuring_fails_is_left_out_and_the_others_stand(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_object_whose_measurement_fails_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     measure = stage.measure_object
 
     def measured(capture: Capture, track: MaskTrack, *further: Any, **settings: Any) -> Any:
@@ -68,7 +68,7 @@ def test_an_object_whose_measuring_fails_is_left_out_and_the_others_stand(monkey
         built(*[unit for unit in units if unit.name == "bottle"])
 
 
-def test_an_object_whose_building_fails_is_left_out_and_the_others_stand(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_object_whose_construction_fails_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     find = stage.fixture_of
 
     def found(spec: Any) -> Any:
@@ -90,17 +90,17 @@ def test_an_object_whose_building_fails_is_left_out_and_the_others_stand(monkeyp
         built(*[unit for unit in units if unit.name == "bottle"])
 
 
-def test_nothing_touches_at_rest(kitchen: ArticulatedScene) -> None:
+def test_no_contacts_at_rest(kitchen: ArticulatedScene) -> None:
     assert deepest_contact(compile_scene(kitchen)) < 5e-4
 
 
-def test_no_free_sweep_passes_through_anything(kitchen: ArticulatedScene) -> None:
+def test_free_joint_sweeps_have_no_penetration(kitchen: ArticulatedScene) -> None:
     depths = sweep(kitchen, compile_scene(kitchen))
     assert len(depths) == 11
     assert max(depths.values()) < 1e-3
 
 
-def test_every_joint_opens_under_a_hands_force(kitchen: ArticulatedScene) -> None:
+def test_every_joint_opens_under_the_force_of_a_hand(kitchen: ArticulatedScene) -> None:
     shares = reached(kitchen, compile_scene(kitchen))
     assert min(shares.values()) >= 0.98, shares
 
@@ -116,20 +116,20 @@ def test_every_inertia_is_physical(kitchen: ArticulatedScene) -> None:
             assert 0.01 <= link.inertial.mass_kg < 120
 
 
-def test_masses_are_those_of_furniture(kitchen: ArticulatedScene) -> None:
+def test_masses_are_in_the_range_of_real_furniture(kitchen: ArticulatedScene) -> None:
     fridge = sum(link.inertial.mass_kg for link in the(kitchen, "fridge").links)
     assert 45 < fridge < 100
     assert 3 < the(kitchen, "cab_l").links[1].inertial.mass_kg < 8
 
 
-def test_joints_are_of_the_categorys_type(kitchen: ArticulatedScene) -> None:
+def test_joint_types_follow_the_category(kitchen: ArticulatedScene) -> None:
     types = {o.name: {j.type for j in o.joints} for o in kitchen.objects}
     assert types["drawer_1"] == {"prismatic"}
     assert types["pair"] == types["micro"] == types["dish"] == {"revolute"}
     assert types["top"] == types["bottle"] == set()
 
 
-def test_positive_opens_outwards(kitchen: ArticulatedScene) -> None:
+def test_positive_joint_values_open_outwards(kitchen: ArticulatedScene) -> None:
     """The middle of each moving part goes to -y of the object when its joint goes positive."""
     for item in kitchen.objects:
         for joint in item.joints:
@@ -151,13 +151,13 @@ def test_a_drawer_has_a_floor_and_sides(kitchen: ArticulatedScene) -> None:
     assert sum(box.name.startswith("tray") for box in the(kitchen, "drawer_1").links[1].boxes) == 4
 
 
-def test_a_handle_can_be_held(kitchen: ArticulatedScene) -> None:
+def test_a_handle_is_at_least_8_mm_thick(kitchen: ArticulatedScene) -> None:
     grip = next(box for box in the(kitchen, "cab_l").links[1].boxes if box.name == "handle")
     assert grip.size_m.min() >= 0.008
     assert grip.size_m.max() == pytest.approx(0.16)
 
 
-def test_limits_given_by_a_person_are_kept() -> None:
+def test_limits_and_hinge_set_by_a_person_are_kept() -> None:
     asked = Overrides(objects={"cab_l": ObjectOverride(joint_upper=1.0, hinge="right")})
     joint = built(KITCHEN[0], overrides=asked).objects[0].joints[0]
     assert joint.upper == 1.0
@@ -165,7 +165,7 @@ def test_limits_given_by_a_person_are_kept() -> None:
     assert (joint.sources["limits"], joint.sources["axis"]) == ("person", "person")
 
 
-def test_limits_of_one_of_several_joints_name_it() -> None:
+def test_limits_apply_to_the_named_joint_and_unknown_names_are_reported() -> None:
     pair = next(unit for unit in KITCHEN if unit.name == "pair")
     asked = {"left_door": JointLimits(None, 1.0), "pair_right_door_joint": JointLimits(0.1, None), "lid": JointLimits(0.0, 1.0)}
     item = built(pair, overrides=Overrides(objects={"pair": ObjectOverride(joints=asked)})).objects[0]
@@ -177,14 +177,14 @@ def test_limits_of_one_of_several_joints_name_it() -> None:
     assert any("corrections of a joint lid were not used: its joints are left_door, right_door" in w for w in item.warnings)
 
 
-def test_limits_that_name_no_joint_move_none_of_several() -> None:
+def test_unnamed_limits_are_ignored_with_several_joints() -> None:
     pair = next(unit for unit in KITCHEN if unit.name == "pair")
     item = built(pair, overrides=Overrides(objects={"pair": ObjectOverride(joint_lower=0.0, joint_upper=0.3)})).objects[0]
     assert all(joint.upper > 0.3 and joint.sources["limits"] != "person" for joint in item.joints)
     assert any("joint_limits is for an object of one joint and was not used" in w for w in item.warnings)
 
 
-def test_a_lower_limit_by_a_person_keeps_the_measured_upper_one() -> None:
+def test_a_lower_limit_set_by_a_person_keeps_the_measured_upper_limit() -> None:
     track, placement, asset = placed_unit(Unit("a", "drawer", (0, 0, 0.5), (0.5, 0.58, 0.3)), np.random.default_rng(0))
     track = replace(track, motions=(motion({5: 0.43}, stop_seen=True),))
     asked = Overrides(objects={"a": ObjectOverride(joint_lower=0.05)})
@@ -213,9 +213,7 @@ def test_a_wall_beside_the_hinge_limits_the_door() -> None:
         (None, False, "default"),
     ],
 )
-def test_a_drawer_that_was_pulled_out_while_filming_tells_its_travel(
-    seen_m: float | None, stop_seen: bool, source: str
-) -> None:
+def test_drawer_travel_comes_from_the_filmed_opening(seen_m: float | None, stop_seen: bool, source: str) -> None:
     """Where it was seen to stop; else it opens at least so far; more than its depth is an error."""
     track, placement, asset = placed_unit(Unit("a", "drawer", (0, 0, 0.5), (0.5, 0.58, 0.3)), np.random.default_rng(0))
     if seen_m is not None:
@@ -230,7 +228,7 @@ def test_a_drawer_that_was_pulled_out_while_filming_tells_its_travel(
 
 
 @pytest.mark.parametrize(("way", "stop_seen"), [("right", True), ("right", False), ("top", True), ("bottom", True)])
-def test_a_door_that_was_filmed_open_tells_its_hinge_and_where_it_stops(way: str, stop_seen: bool) -> None:
+def test_hinge_and_limit_come_from_the_filmed_opening_of_a_door(way: str, stop_seen: bool) -> None:
     """Whatever its handle says."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
@@ -248,7 +246,7 @@ def test_a_door_that_was_filmed_open_tells_its_hinge_and_where_it_stops(way: str
 
 
 @pytest.mark.parametrize(("way", "opens_by_itself"), [("top", True), ("bottom", False), ("right", False)])
-def test_no_door_swings_open_by_its_own_weight(way: str, opens_by_itself: bool) -> None:
+def test_friction_keeps_doors_closed_against_gravity(way: str, opens_by_itself: bool) -> None:
     """A leaf hung on its upper outer edge has its weight behind the hinge."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
@@ -263,7 +261,7 @@ def test_no_door_swings_open_by_its_own_weight(way: str, opens_by_itself: bool) 
     assert model.dof_frictionloss[0] > max(pull, 0.0)
 
 
-def test_a_hinge_filmed_off_its_fronts_edge_is_where_it_was_filmed() -> None:
+def test_a_hinge_filmed_far_from_the_edge_keeps_its_filmed_position() -> None:
     """Within what both are known to, the edge is taken: doors then clear their neighbours."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
@@ -278,7 +276,7 @@ def test_a_hinge_filmed_off_its_fronts_edge_is_where_it_was_filmed() -> None:
     np.testing.assert_allclose(origins, [-0.25, -0.22], atol=0.003)
 
 
-def test_a_hinge_filmed_near_its_fronts_edge_is_between_them_and_its_leaf_swings_clear() -> None:
+def test_a_hinge_filmed_near_the_edge_is_placed_so_that_the_leaf_clears() -> None:
     """Concealed hinges turn inside the edge; a rigid leaf about a line behind its face would swing into its neighbour."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
@@ -294,7 +292,7 @@ def test_a_hinge_filmed_near_its_fronts_edge_is_between_them_and_its_leaf_swings
     assert np.hypot(inwards, behind) - inwards < 0.0011
 
 
-def test_what_was_seen_behind_an_open_front_is_built_there() -> None:
+def test_inner_depth_and_shelves_observed_behind_a_front_are_built() -> None:
     """What was not stays the category's, and says so."""
     made = {}
     for category, way, inside in (
@@ -346,7 +344,7 @@ def _span(item: SceneObject, board: str, axis: int) -> tuple[float, float]:
         ("oven", "left", "oven"),
     ],
 )
-def test_a_front_is_built_as_it_was_filmed_to_open(category: str, way: str, fixture: str) -> None:
+def test_the_fixture_follows_the_filmed_motion(category: str, way: str, fixture: str) -> None:
     track, placement, asset = placed_unit(Unit("a", category, (0, 0, 0.5), (0.5, 0.58, 0.4)), np.random.default_rng(0))
     assert track.front is not None
     track = replace(track, motions=(motion({5: 0.3}, way, world_from_front=track.front.world_from_front),))
@@ -356,7 +354,7 @@ def test_a_front_is_built_as_it_was_filmed_to_open(category: str, way: str, fixt
     assert any(f"called a {category}" in w for w in item.warnings) == (fixture != category)
 
 
-def test_each_door_of_a_pair_has_the_motion_of_its_own() -> None:
+def test_each_door_of_a_pair_gets_only_its_own_motion() -> None:
     unit = Unit("a", "double-door cabinet", (0, 0, 0.5), (0.8, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
@@ -374,7 +372,7 @@ def test_each_door_of_a_pair_has_the_motion_of_its_own() -> None:
     ("category", "width_m", "doors"),
     [("refrigerator", 0.7, {"door"}), ("french_door_refrigerator", 0.9, {"left_door", "right_door"})],
 )
-def test_a_drawer_filmed_below_a_refrigerators_doors_is_built_there(category: str, width_m: float, doors: set[str]) -> None:
+def test_a_drawer_filmed_below_refrigerator_doors_is_built(category: str, width_m: float, doors: set[str]) -> None:
     track, placement, asset = placed_unit(
         Unit("a", category, (0, 0, 0.88), (width_m, 0.65, 1.75), kind="appliance"), np.random.default_rng(0)
     )
@@ -398,7 +396,7 @@ def test_a_drawer_filmed_below_a_refrigerators_doors_is_built_there(category: st
     assert max(sweep(scene, model).values()) < 5e-4
 
 
-def test_how_far_a_door_was_seen_open_says_nothing_of_the_other_edge() -> None:
+def test_a_filmed_opening_is_ignored_when_a_person_moves_the_hinge() -> None:
     """A person hung it on the left: the angle that the scan shows was about the right edge."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
@@ -409,7 +407,7 @@ def test_how_far_a_door_was_seen_open_says_nothing_of_the_other_edge() -> None:
     assert (joint.sources["axis"], joint.sources["limits"]) == ("person", "default")
 
 
-def test_confidence_in_a_hinge_is_higher_with_a_handle_at_the_edge() -> None:
+def test_hinge_confidence_is_higher_with_a_handle_near_the_edge() -> None:
     at_edge, off_centre, without = (
         built(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=handle)).objects[0].joints[0].confidence or 0.0
         for handle in (Handle(0.25, 0.2), Handle(0.09, 0.2), None)
@@ -417,7 +415,7 @@ def test_confidence_in_a_hinge_is_higher_with_a_handle_at_the_edge() -> None:
     assert 1.0 > at_edge > off_centre > 0.9 > without == 0.5
 
 
-def test_a_handle_tells_the_hinge_even_where_a_neighbour_is_in_the_way() -> None:
+def test_a_handle_determines_the_hinge_despite_a_blocking_neighbour() -> None:
     """Without a handle the door is hung so that it opens; a handle is seen, and a neighbour may be measured wrong."""
     block = Unit("block", "counter", (0.25, -0.43, 0.5), (0.06, 0.15, 0.7), kind="thing")
     sides = []
@@ -427,7 +425,7 @@ def test_a_handle_tells_the_hinge_even_where_a_neighbour_is_in_the_way() -> None
     assert sides == ["right", "left"]
 
 
-def test_a_wall_that_only_just_touches_an_edge_is_not_in_the_way() -> None:
+def test_a_wall_that_barely_touches_the_door_edge_does_not_block_it() -> None:
     """The free edge of a thick door passes 2 mm beyond its closed place: less than a wall is known to."""
     wall = Wall(normal=np.array([1.0, 0.0, 0.0]), offset_m=-0.3, area_m2=6.0)
     fridge = Unit("f", "fridge", (0, 0, 0.9), (0.6, 0.6, 1.8), handle=Handle(-0.24, 0.2), kind="appliance")
@@ -436,7 +434,7 @@ def test_a_wall_that_only_just_touches_an_edge_is_not_in_the_way() -> None:
     assert joint.upper > np.deg2rad(90)
 
 
-def test_an_unknown_category_is_a_rigid_object_with_advice() -> None:
+def test_an_unknown_category_gives_a_rigid_object_with_a_suggestion() -> None:
     scene = built(Unit("m", "Mircowave", (0, 0, 0.05), (0.09, 0.09, 0.1), kind="thing"))
     assert scene.objects[0].category == "Mircowave"
     assert scene.objects[0].fixture == "object"

@@ -46,7 +46,7 @@ def apart_m(a: Box, b: Box) -> float:
 
 
 @every_plan
-def test_boards_fill_the_outer_size_and_meet_without_overlapping(plan: CarcassPlan) -> None:
+def test_boards_fill_the_outer_size_without_overlap(plan: CarcassPlan) -> None:
     panels = Boards().panels(plan)
     everything = [*panels.base, *(box for leaf in panels.movers for box in leaf)]
     np.testing.assert_allclose(np.min([corners(b)[0] for b in everything], axis=0), -plan.dimensions_m / 2, atol=1e-12)
@@ -58,7 +58,7 @@ def test_boards_fill_the_outer_size_and_meet_without_overlapping(plan: CarcassPl
 
 @pytest.mark.parametrize("provider", PROVIDERS)
 @every_plan
-def test_what_moves_is_clear_of_the_body_and_of_its_neighbours(plan: CarcassPlan, provider: str) -> None:
+def test_moving_parts_keep_gaps_to_the_body_and_to_other_fronts(plan: CarcassPlan, provider: str) -> None:
     carcass_params = tuned(CarcassParams)
     panels = CARCASSES.load(provider).panels(plan)
     for leaf in panels.movers:
@@ -71,7 +71,7 @@ def test_what_moves_is_clear_of_the_body_and_of_its_neighbours(plan: CarcassPlan
 
 @pytest.mark.parametrize("provider", PROVIDERS)
 @every_plan
-def test_fronts_come_in_the_plans_order_and_meet_at_its_seams(plan: CarcassPlan, provider: str) -> None:
+def test_fronts_follow_the_order_and_seams_of_the_plan(plan: CarcassPlan, provider: str) -> None:
     carcass_params = tuned(CarcassParams)
     panels = CARCASSES.load(provider).panels(plan)
     moving = [span for kind, span in zip(plan.fronts, plan.spans_m, strict=True) if kind != "fixed"]
@@ -84,7 +84,7 @@ def test_fronts_come_in_the_plans_order_and_meet_at_its_seams(plan: CarcassPlan,
     assert [travel > 0 for travel in panels.travel_m] == [kind == "drawer" for kind in plan.fronts if kind != "fixed"]
 
 
-def test_a_drawer_that_is_out_still_has_a_tenth_of_its_tray_inside() -> None:
+def test_a_drawer_keeps_part_of_its_tray_inside_at_full_travel() -> None:
     panels = Boards().panels(PLANS["drawer"])
     _, high = corners(next(box for box in panels.movers[0] if box.name == "tray_back"))
     inside = float(high[1]) - PLANS["drawer"].seat_y_m
@@ -93,7 +93,7 @@ def test_a_drawer_that_is_out_still_has_a_tenth_of_its_tray_inside() -> None:
 
 @needs_scene_synthesizer
 @every_plan
-def test_ours_are_scene_synthesizers_boards(plan: CarcassPlan) -> None:
+def test_own_boards_match_those_of_scene_synthesizer(plan: CarcassPlan) -> None:
     """The same outer boards, fronts and travel; its pair has its bottom in two halves, its trays' boards overlap."""
     ours, theirs = Boards().panels(plan), CARCASSES.load("scene-synthesizer").panels(plan)
     for role in ("carcass", "inner", "front"):
@@ -118,12 +118,12 @@ def together(boxes: tuple[Box, ...]) -> tuple[np.ndarray, np.ndarray]:
     return np.min([corners(b)[0] for b in boxes], axis=0), np.max([corners(b)[1] for b in boxes], axis=0)
 
 
-def test_every_kind_of_front_is_planned_here() -> None:
+def test_the_test_plans_cover_every_kind_of_front() -> None:
     kinds: set[FrontKind] = {kind for plan in PLANS.values() for kind in plan.fronts}
     assert kinds == {"door", "drawer", "fixed"}
 
 
-def test_a_plain_install_brings_neither_scene_synthesizer_nor_triangle() -> None:
+def test_a_plain_install_excludes_scene_synthesizer_and_triangle() -> None:
     project = tomllib.loads((Path(__file__).resolve().parents[3] / "pyproject.toml").read_text())["project"]
     brought = closure(project["dependencies"])
     assert {"trimesh", "networkx", "yourdfpy"} <= brought  # the requirements were resolved
@@ -150,7 +150,7 @@ def closure(requirements: list[str]) -> set[str]:
     return {name for name, _ in brought}
 
 
-def test_a_depth_seen_inside_thins_the_front_and_one_that_does_not_fit_is_not_built() -> None:
+def test_an_observed_inner_depth_thins_the_front_unless_it_does_not_fit() -> None:
     """A machine's door is no thicker than what its clear depth leaves."""
     machine = CarcassPlan(dimensions_m=np.array([0.6, 0.62, 1.8]), fronts=("door",), front_m=0.05)
     seen, too_deep = replace(machine, inner_depth_m=0.59), replace(machine, inner_depth_m=0.7)

@@ -45,7 +45,7 @@ def travel(item: SceneObject, *others: SceneObject, walls: tuple[Wall, ...] = ()
 
 
 @pytest.mark.parametrize("category", ["drawer", "cabinet"])
-def test_motions_of_a_joint_add_up_and_go_back(category: str) -> None:
+def test_joint_motions_compose_additively_and_invert(category: str) -> None:
     item = unit(category, room=ROOM)
     joint = item.joints[0]
     np.testing.assert_allclose(motion_at(item, joint, 0.0).matrix, np.eye(4), atol=1e-12)
@@ -55,7 +55,7 @@ def test_motions_of_a_joint_add_up_and_go_back(category: str) -> None:
         np.testing.assert_allclose(motion_at(item, joint, -a).matrix, motion_at(item, joint, a).inverse.matrix, atol=1e-12)
 
 
-def test_a_door_turns_about_points_that_stay_and_a_drawer_slides_out_of_its_front() -> None:
+def test_a_door_rotates_about_its_hinge_and_a_drawer_slides_outwards() -> None:
     door = unit("cabinet", room=ROOM)
     pivot = door.world_from_object.apply(door.joints[0].origin_object[None])
     on_axis = np.concatenate([pivot, pivot + np.array([0, 0, 0.4])])
@@ -66,7 +66,7 @@ def test_a_door_turns_about_points_that_stay_and_a_drawer_slides_out_of_its_fron
 
 
 @pytest.mark.parametrize("axis", [np.array([0, 0, 1.0]), np.array([0.6, 0.0, 0.8]), np.array([0, -1.0, 0])])
-def test_a_turn_keeps_its_axis_and_follows_the_right_hand(axis: np.ndarray) -> None:
+def test_a_rotation_keeps_its_axis_and_is_right_handed(axis: np.ndarray) -> None:
     across = np.cross(axis, [0.3, 0.5, -0.7])
     across /= np.linalg.norm(across)
     for angle in (1e-9, 0.4, np.pi):
@@ -77,7 +77,7 @@ def test_a_turn_keeps_its_axis_and_follows_the_right_hand(axis: np.ndarray) -> N
 
 
 @pytest.mark.parametrize("distance_m", [0.05, 0.2, 0.4])
-def test_a_drawer_stops_short_of_what_stands_before_it(distance_m: float) -> None:
+def test_a_drawer_stops_before_an_obstacle(distance_m: float) -> None:
     face = -0.58 / 2
     wall_before = block((-1.0, face - distance_m - 0.3, 0.0), (1.0, face - distance_m, 1.0))
     free, blocker = travel(unit("drawer"), wall_before)
@@ -85,7 +85,7 @@ def test_a_drawer_stops_short_of_what_stands_before_it(distance_m: float) -> Non
     assert free == pytest.approx(distance_m - SPARE_M, abs=1.5e-3)  # half a millimetre of contact is allowed; a 64th of a step
 
 
-def test_nothing_in_the_way_is_the_whole_travel_and_what_can_be_pushed_is_nothing() -> None:
+def test_travel_is_full_without_obstacles_or_with_movable_ones() -> None:
     drawer = unit("drawer")
     far = block((-1.0, -3.0, 0.0), (1.0, -2.5, 1.0))
     assert travel(drawer, far) == (drawer.joints[0].upper, None)
@@ -93,7 +93,7 @@ def test_nothing_in_the_way_is_the_whole_travel_and_what_can_be_pushed_is_nothin
     assert travel(drawer, chair) == (drawer.joints[0].upper, None)
 
 
-def test_a_door_opens_until_it_meets_a_wall_beside_its_hinge() -> None:
+def test_a_wall_beside_the_hinge_limits_the_opening_angle() -> None:
     """Hinged left with a wall a little way out: the door's far edge passes it at the angle that plane geometry says."""
     door = unit("cabinet")
     hinge_x = float(door.joints[0].origin_object[0])
@@ -105,7 +105,7 @@ def test_a_door_opens_until_it_meets_a_wall_beside_its_hinge() -> None:
     assert np.pi / 2 < free < np.pi / 2 + np.arcsin(reach / 0.6)
 
 
-def test_a_flap_stops_where_its_handle_meets_the_floor_and_opens_wholly_above_a_plinth() -> None:
+def test_a_flap_is_limited_by_the_floor_unless_it_is_on_a_plinth() -> None:
     def oven(bottom_m: float) -> SceneObject:
         handle = Handle(0.0, 0.3, vertical=False)
         made = placed_unit(Unit("a", "oven", (0.0, 0.0, bottom_m + 0.35), (0.6, 0.58, 0.7), handle=handle), rng)
@@ -123,7 +123,7 @@ def test_a_flap_stops_where_its_handle_meets_the_floor_and_opens_wholly_above_a_
 
 
 @pytest.mark.parametrize("category", ["drawer", "cabinet"])
-def test_how_far_it_opens_does_not_depend_on_where_the_kitchen_is(category: str) -> None:
+def test_free_travel_does_not_depend_on_the_world_frame(category: str) -> None:
     def obstacles(motion: Rigid3) -> SceneObject:
         return moved(block((-0.5, -0.8, 0.2), (-0.1, -0.5, 0.9)), motion)
 
@@ -132,7 +132,7 @@ def test_how_far_it_opens_does_not_depend_on_where_the_kitchen_is(category: str)
     assert here[0] == pytest.approx(there[0], abs=1e-6)
 
 
-def test_a_blocked_limit_is_lowered_and_says_so_and_a_persons_stays() -> None:
+def test_a_blocked_limit_is_lowered_unless_a_person_set_it() -> None:
     drawer, before = unit("drawer"), block((-1.0, -0.8, 0.0), (1.0, -0.4, 1.0))
     opened, _ = open_freely([drawer, before], (), frozenset())
     assert opened.joints[0].upper < drawer.joints[0].upper

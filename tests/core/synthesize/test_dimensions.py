@@ -31,14 +31,14 @@ def test_a_yawed_box_is_measured_within_one_percent_without_its_handle(yaw: floa
     np.testing.assert_allclose(found.world_from_object.translation, unit.centre, atol=0.004)
 
 
-def test_the_mesh_alone_tells_where_its_handle_is() -> None:
+def test_the_handle_is_measured_from_the_mesh_alone() -> None:
     found = measure(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=Handle(0.24, 0.2), with_track_front=False))
     assert found.handle is not None
     np.testing.assert_allclose(found.handle.centre, (0.24, 0.2), atol=0.01)
     assert found.handle.protrusion_m == pytest.approx(0.035, abs=0.004)
 
 
-def test_what_the_frames_measured_replaces_the_meshs_width_and_height() -> None:
+def test_the_front_measured_in_frames_overrides_mesh_width_and_height() -> None:
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0), stretch=(1.06, 1.0, 0.95))
     found = measure_object(capture(), track, placement, asset, category_of("cabinet"), ObjectOverride())
@@ -46,20 +46,20 @@ def test_what_the_frames_measured_replaces_the_meshs_width_and_height() -> None:
     assert found.sources == ("measured", "inferred", "measured")
 
 
-def test_a_depth_that_passes_through_the_wall_ends_at_the_wall() -> None:
+def test_a_depth_that_crosses_the_wall_is_cut_at_the_wall() -> None:
     wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=-0.2, area_m2=4.0)  # the plane y = 0.2, seen from y < 0.2
     found = measure(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7)), walls=(wall,))
     assert found.dimensions_m[1] == pytest.approx(0.49, abs=0.004)
     assert found.sources[1] == "inferred"
 
 
-def test_an_unbelievable_depth_becomes_the_categorys() -> None:
+def test_an_implausible_depth_is_replaced_by_the_category_default() -> None:
     found = measure(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.05, 0.7)))
     assert found.sources[1] == "default"
     assert found.dimensions_m[1] == pytest.approx(0.58)
 
 
-def test_a_persons_size_and_pose_win() -> None:
+def test_a_size_and_pose_set_by_a_person_override_measurements() -> None:
     pose = np.eye(4)
     pose[:3, 3] = (1.0, 2.0, 0.4)
     override = ObjectOverride(dimensions_m=np.array([0.5, 0.5, 0.6]), pose=pose)
@@ -69,7 +69,7 @@ def test_a_persons_size_and_pose_win() -> None:
     assert found.sources == ("person", "person", "person")
 
 
-def test_a_persons_size_leaves_the_front_face_where_it_was() -> None:
+def test_a_size_set_by_a_person_keeps_the_front_face_in_place() -> None:
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7))
     found = measure(unit, override=ObjectOverride(dimensions_m=np.array([0.5, 0.4, 0.6])))
     np.testing.assert_allclose(found.front_centre, [0.0, -0.29, 0.5], atol=1e-6)
@@ -95,7 +95,7 @@ def face(axis: int, at: float) -> np.ndarray:
     return np.asarray(points + np.random.default_rng(1).normal(scale=0.003, size=points.shape))
 
 
-def test_a_cartons_depth_is_measured_only_where_a_face_shows_it() -> None:
+def test_the_depth_of_a_carton_is_measured_only_if_a_face_shows_it() -> None:
     front, top, left = face(1, -0.04), face(2, 0.145), face(0, -0.095)
     alone = carton_seen(front)
     assert alone.sources == ("measured", "inferred", "measured")
@@ -106,20 +106,20 @@ def test_a_cartons_depth_is_measured_only_where_a_face_shows_it() -> None:
         assert not seen.warnings
 
 
-def test_outlines_may_tell_a_depth_that_no_face_shows() -> None:
+def test_an_outline_depth_with_low_sigma_counts_as_measured() -> None:
     front = face(1, -0.04)
     assert carton_seen(front, {"boxed": 1.0, "depth_sigma_m": 0.003}).sources[1] == "measured"
     assert carton_seen(front, {"boxed": 1.0, "depth_sigma_m": 0.03}).sources[1] == "inferred"
 
 
-def test_a_round_things_depth_follows_from_its_width() -> None:
+def test_the_depth_of_a_round_thing_is_inferred_without_a_warning() -> None:
     found = carton_seen(face(1, -0.04), {"revolved": 1.0})
     assert found.sources[1] == "inferred"
     assert not found.warnings
 
 
 @pytest.mark.parametrize("turn_deg", [12.0, 40.0])
-def test_a_round_thing_faces_as_its_box_does_however_it_was_placed(turn_deg: float) -> None:
+def test_a_round_thing_takes_the_yaw_of_its_box_and_a_carton_keeps_its_own(turn_deg: float) -> None:
     """A turned carton keeps its own axes."""
     track, placement, asset = placed_unit(CARTON, np.random.default_rng(0))
     at = placement.world_from_mesh

@@ -45,7 +45,7 @@ def corner(width: float) -> list[MeasuredObject]:
     return [a, b]
 
 
-def test_a_door_does_not_reach_behind_the_run_it_meets() -> None:
+def test_a_door_in_a_corner_is_narrowed_by_a_filler() -> None:
     a, b = leave_fillers(corner(0.63))
     assert right_edge(a)[0] == pytest.approx(0.60 - Params().width_m, abs=1e-9)
     assert a.front_centre[1] == pytest.approx(0.0, abs=1e-9)  # the plane is unchanged
@@ -54,14 +54,14 @@ def test_a_door_does_not_reach_behind_the_run_it_meets() -> None:
     assert b.dimensions_m[0] < 0.5  # its own edge extended into the plane of `a` as well
 
 
-def test_a_diagonal_unit_leaves_its_neighbour_as_wide_as_it_is() -> None:
+def test_a_diagonal_unit_does_not_narrow_its_neighbour() -> None:
     half = np.sqrt(0.5)
     straight = door("a", (0.0, -1.0), (0.3, 0.0), 0.6)
     diagonal = door("b", (-half, -half), (0.6 + 0.2 * half, -0.2 * half), 0.4)
     assert [item.dimensions_m[0] for item in leave_fillers([straight, diagonal])] == [0.6, 0.4]
 
 
-def test_the_handle_stays_where_it_was_in_the_world() -> None:
+def test_narrowing_a_door_keeps_its_handle_in_place() -> None:
     before, after = corner(0.63)[0], leave_fillers(corner(0.63))[0]
     assert before.handle is not None
     assert after.handle is not None
@@ -70,7 +70,7 @@ def test_the_handle_stays_where_it_was_in_the_world() -> None:
         assert world[0] == pytest.approx(0.315 + 0.1, abs=1e-9), item.name
 
 
-def test_a_handle_on_the_filler_is_the_shadow_in_the_corner() -> None:
+def test_a_handle_on_the_filler_is_dropped_as_a_shadow() -> None:
     a, b = corner(0.63)
     shadow = FrontHandle(left_m=0.29, right_m=0.31, bottom_m=-0.2, top_m=0.2, protrusion_m=0.03, confidence=0.9)
     narrowed = leave_fillers([replace(a, handle=shadow), b])[0]
@@ -80,14 +80,14 @@ def test_a_handle_on_the_filler_is_the_shadow_in_the_corner() -> None:
     assert leave_fillers([replace(beside[0], handle=shadow), beside[1]])[0].handle == shadow
 
 
-def test_doors_side_by_side_or_face_to_face_keep_their_width() -> None:
+def test_adjacent_and_facing_doors_keep_their_width() -> None:
     beside = [door("a", (0.0, -1.0), (0.0, 0.0), 0.6), door("b", (0.0, -1.0), (0.602, 0.0), 0.6)]
     across = [door("a", (0.0, -1.0), (0.0, 0.0), 0.6), door("b", (0.0, 1.0), (0.0, -1.2), 0.6)]
     for pair in (beside, across):
         assert [item.dimensions_m[0] for item in leave_fillers(pair)] == [0.6, 0.6]
 
 
-def test_a_large_overlap_is_another_mistake_and_is_left_alone() -> None:
+def test_a_large_overlap_in_a_corner_does_not_narrow_the_door() -> None:
     a = door("a", (0.0, -1.0), (0.3, 0.0), 0.9)  # its edge at 0.75 is 15 cm behind the plane of b
     b = door("b", (-1.0, 0.0), (0.60, -0.22), 0.5)
     assert leave_fillers([a, b])[0].dimensions_m[0] == 0.9

@@ -50,7 +50,7 @@ def folder(every_fixture: ArticulatedScene, tmp_path_factory: pytest.TempPathFac
     return write_folder(every_fixture, tmp_path_factory.mktemp("fixtures") / "bundle")
 
 
-def test_every_fixture_moves_what_its_name_says(every_fixture: ArticulatedScene) -> None:
+def test_every_fixture_has_the_moving_parts_of_its_name(every_fixture: ArticulatedScene) -> None:
     for item in every_fixture.objects:
         assert item.fixture == item.category
         moving = {joint.child.removeprefix(f"{item.name}_") for joint in item.joints}
@@ -65,18 +65,18 @@ def test_every_fixture_opens_in_the_written_mjcf(folder: Path, every_fixture: Ar
     assert min(shares.values()) >= 0.98, shares
 
 
-def test_what_opens_opens_onto_room(folder: Path) -> None:
+def test_opening_parts_give_access_to_their_cavity(folder: Path) -> None:
     model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
     shares = {model.joint(k).name: cavity_open(model, model.joint(k).name) for k in range(model.njnt)}
     assert min(share for share in shares.values() if share is not None) >= 0.9, shares
 
 
-def test_every_fixture_is_written_without_a_finding(folder: Path) -> None:
+def test_exported_fixtures_have_no_lint_findings_except_unsure_hinges(folder: Path) -> None:
     found = [f for f in lint(folder) if "preview" not in f.message]
     assert {f.rule for f in found} == {"hinge-unsure"}  # none of the doors here has a handle
 
 
-def test_nothing_of_a_fixture_touches_at_rest_or_on_its_way(every_fixture: ArticulatedScene) -> None:
+def test_fixtures_have_no_contacts_at_rest_or_during_sweeps(every_fixture: ArticulatedScene) -> None:
     model = compile_scene(every_fixture)
     assert deepest_contact(model) < 5e-4
     assert max(sweep(every_fixture, model).values()) < 1e-3
@@ -89,7 +89,7 @@ def the(scene: ArticulatedScene, name: str) -> SceneObject:
 @pytest.mark.parametrize(
     "name", ["cabinet", "wall_cabinet", "double_door_cabinet", "refrigerator", "freezer", "fridge_freezer", "open_shelf"]
 )
-def test_what_one_puts_things_into_has_shelves(every_fixture: ArticulatedScene, name: str) -> None:
+def test_storage_fixtures_have_shelves_inside(every_fixture: ArticulatedScene, name: str) -> None:
     base = the(every_fixture, name).links[0]
     shelves = [box for box in base.boxes if box.name.startswith("shelf")]
     assert shelves
@@ -99,7 +99,7 @@ def test_what_one_puts_things_into_has_shelves(every_fixture: ArticulatedScene, 
         assert box.size_m[2] >= 0.008
 
 
-def test_a_drawers_boards_are_as_thick_as_boards(every_fixture: ArticulatedScene) -> None:
+def test_drawer_tray_boards_are_at_least_8_mm_thick(every_fixture: ArticulatedScene) -> None:
     tray = [box for box in the(every_fixture, "drawer").links[1].boxes if box.name.startswith("tray")]
     assert min(box.size_m.min() for box in tray) >= 0.008 - 1e-9
 
@@ -128,7 +128,7 @@ def test_a_wide_unit_gets_two_doors(category: str, width: float, fixture: str, d
     assert (item.fixture, len(item.joints)) == (fixture, doors)
 
 
-def test_a_wide_fridge_with_its_handle_at_one_edge_has_one_door() -> None:
+def test_a_wide_fridge_with_an_edge_handle_has_one_door() -> None:
     unit = Unit("a", "fridge", (0, 0, 0.9), (0.85, 0.6, 1.8), kind="appliance", handle=Handle(0.36, 0.1))
     assert len(built(unit).objects[0].joints) == 1
 
@@ -152,18 +152,18 @@ def build_with(name: str, *handles: FrontHandle, hinge: HingeSide = "left") -> B
 
 
 @pytest.mark.parametrize("heights", [(0.24, 0.24, 0.24), (0.14, 0.29, 0.29), (0.13, 0.19, 0.19, 0.21)])
-def test_seams_are_told_by_handles_in_the_middle_of_each_front(heights: tuple[float, ...]) -> None:
+def test_seams_are_found_from_handles_in_the_middle_of_each_front(heights: tuple[float, ...]) -> None:
     tops = 0.36 - np.cumsum([0, *heights])
     middles = (tops[1:] + tops[:-1]) / 2
     np.testing.assert_allclose(seams_between(list(middles), 0.72) or [], tops[1:-1], atol=1e-9)
 
 
-def test_seams_are_told_by_handles_near_the_upper_edges() -> None:
+def test_seams_are_found_from_handles_near_the_upper_edges() -> None:
     tops = 0.36 - np.cumsum([0, 0.14, 0.29, 0.29])
     np.testing.assert_allclose(seams_between(list(tops[:-1] - 0.04), 0.72) or [], tops[1:-1], atol=1e-9)
 
 
-def test_a_stack_has_a_drawer_for_each_row_of_handles() -> None:
+def test_a_drawer_stack_has_one_drawer_per_row_of_handles() -> None:
     rows = (handle_at(z, x=x) for z in (0.075, -0.215) for x in (-0.1, 0.1))
     build = build_with("chest of drawers", handle_at(0.29), *rows)
     fronts = [part.boxes[0] for part in build.parts[1:]]
@@ -173,26 +173,26 @@ def test_a_stack_has_a_drawer_for_each_row_of_handles() -> None:
     assert build.notes == ()
 
 
-def test_a_stack_whose_handles_were_missed_is_not_one_huge_drawer() -> None:
+def test_a_drawer_stack_with_missed_handles_gets_three_drawers_by_default() -> None:
     build = build_with("drawer_stack", handle_at(0.0))
     assert len(build.motions) == 3
     assert "by default" in build.notes[0]
 
 
-def test_the_doors_of_a_fridge_freezer_meet_between_their_handles() -> None:
+def test_fridge_freezer_doors_meet_between_their_handles() -> None:
     build = build_with("fridge_freezer", handle_at(0.4), handle_at(0.2))
     upper, lower = (part.boxes[0] for part in build.parts[1:])
     assert upper.link_from_box.translation[2] - upper.size_m[2] / 2 == pytest.approx(0.3, abs=0.005)
     assert lower.link_from_box.translation[2] + lower.size_m[2] / 2 == pytest.approx(0.3, abs=0.005)
 
 
-def test_a_flap_or_a_door_opens_about_the_side_that_is_asked_for() -> None:
+def test_cabinets_open_about_the_requested_hinge_side() -> None:
     for side, axis in (("left", (0, 0, -1)), ("right", (0, 0, 1)), ("top", (-1, 0, 0)), ("bottom", (1, 0, 0))):
         for name in ("cabinet", "wall_cabinet", "sink_cabinet"):
             assert tuple(build_with(name, hinge=side).motions[0].axis_object) == axis
 
 
-def test_each_bar_that_stands_out_of_a_mesh_is_a_handle() -> None:
+def test_each_protruding_bar_of_a_mesh_is_found_as_a_handle() -> None:
     boxes = [box_mesh(np.array([-0.3, -0.29, -0.36]), np.array([0.3, 0.29, 0.36]))]
     boxes += [box_mesh(np.array([-0.1, -0.325, z - 0.01]), np.array([0.1, -0.29, z + 0.01])) for z in (0.29, 0.07, -0.21)]
     vertices = np.concatenate([v for v, _ in boxes])

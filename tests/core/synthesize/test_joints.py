@@ -31,21 +31,19 @@ def test_the_hinge_is_opposite_the_handle(x: float, side: str, from_track: bool,
 @pytest.mark.parametrize(
     ("category", "trusted", "side"), [("microwave", 0.3, "left"), ("microwave", 0.99, "right"), ("cabinet", 0.3, "right")]
 )
-def test_what_may_be_a_handle_tells_no_side_of_a_kind_that_is_hinged_on_the_other(
-    category: str, trusted: float, side: str
-) -> None:
+def test_an_uncertain_handle_does_not_override_the_usual_hinge_side(category: str, trusted: float, side: str) -> None:
     (item,) = measured(door("a", 0, Handle(-0.2, 0.1), category))
     assert item.handle is not None
     item = replace(item, handle=replace(item.handle, confidence=trusted))
     assert choose_hinges([item], Overrides(objects={}))["a"].side == side
 
 
-def test_a_person_overrules_the_handle() -> None:
+def test_a_hinge_set_by_a_person_overrides_the_handle() -> None:
     hinge = choose_hinges(measured(door("a", 0, Handle(0.2, 0.1))), Overrides(objects={"a": ObjectOverride(hinge="right")}))
     assert (hinge["a"].side, hinge["a"].source) == ("right", "person")
 
 
-def test_two_undecided_neighbours_open_outwards() -> None:
+def test_two_undecided_neighbours_open_away_from_each_other() -> None:
     hinges = choose_hinges(measured(door("l", 0, None), door("r", 0.503, None)), Overrides(objects={}))
     assert (hinges["l"].side, hinges["r"].side) == ("left", "right")
 
@@ -57,16 +55,16 @@ def test_an_undecided_door_pairs_with_a_decided_neighbour() -> None:
     assert right_known["l"].side == "left"
 
 
-def test_a_lone_door_without_a_handle_says_that_its_side_is_a_default() -> None:
+def test_a_lone_door_without_a_handle_has_a_default_hinge_source() -> None:
     assert choose_hinges(measured(door("a", 0, None)), Overrides(objects={}))["a"].source == "default"
 
 
-def test_a_wide_wall_flap_with_its_handle_below_is_hinged_at_the_top() -> None:
+def test_a_wide_wall_flap_with_a_low_handle_is_hinged_at_the_top() -> None:
     flap = Unit("f", "wall_cabinet", (0, 0, 1.7), (0.8, 0.35, 0.4), handle=Handle(0, -0.15, vertical=False))
     assert choose_hinges(measured(flap), Overrides(objects={}))["f"].side == "top"
 
 
-def test_an_oven_drops_forward() -> None:
+def test_an_oven_door_is_hinged_at_the_bottom() -> None:
     assert (
         choose_hinges(measured(door("o", 0, Handle(0, 0.3, vertical=False), "oven")), Overrides(objects={}))["o"].side
         == "bottom"

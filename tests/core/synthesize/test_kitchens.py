@@ -67,13 +67,13 @@ def fronts(layout: Layout, run_name: str) -> list[MeasuredObject]:
     return [item for item in layout.objects if item.name.startswith(f"{run_name}_")]
 
 
-def test_nothing_stands_in_anything(kitchen: tuple[list[Unit], Layout]) -> None:
+def test_layouts_have_no_overlaps_or_warnings(kitchen: tuple[list[Unit], Layout]) -> None:
     _, layout = kitchen
     assert overlapping_pairs(layout.objects) == []
     assert layout.warnings == ()
 
 
-def test_every_run_is_one_plane_with_one_gap(kitchen: tuple[list[Unit], Layout]) -> None:
+def test_runs_are_coplanar_and_level_with_uniform_gaps(kitchen: tuple[list[Unit], Layout]) -> None:
     true, layout = kitchen
     for name in {unit.name.split("_")[0] for unit in true}:
         items = fronts(layout, name)
@@ -85,7 +85,7 @@ def test_every_run_is_one_plane_with_one_gap(kitchen: tuple[list[Unit], Layout])
             assert b - width_b / 2 - (a + width_a / 2) == pytest.approx(GAP, abs=1e-4)
 
 
-def test_fronts_stay_where_the_scan_saw_them(kitchen: tuple[list[Unit], Layout]) -> None:
+def test_fronts_stay_within_1_cm_of_their_true_position(kitchen: tuple[list[Unit], Layout]) -> None:
     true, layout = kitchen
     for unit, item in zip(true, layout.objects, strict=True):
         half = np.array([0.0, -unit.size[1] / 2, 0.0])
@@ -95,14 +95,14 @@ def test_fronts_stay_where_the_scan_saw_them(kitchen: tuple[list[Unit], Layout])
     assert max(layout.moves_m.values()) < 0.01
 
 
-def test_units_back_to_back_give_up_depth_not_place() -> None:
+def test_units_back_to_back_lose_depth_instead_of_moving() -> None:
     """An island of two rows: the backs were measured 2 cm too deep each and would run into each other."""
     layout = arranged(*measured(BACK_TO_BACK, np.random.default_rng(1), noise_m=0.0), manhattan=0.0)
     assert max(layout.moves_m.values()) < 0.008
     assert overlapping_pairs(layout.objects) == []
 
 
-def test_a_worktop_closes_on_the_run_and_a_plinth_under_it() -> None:
+def test_a_worktop_and_a_plinth_are_fitted_to_the_run() -> None:
     """Measured 9 mm above the units and 7 mm into them; a shelf half a metre higher is left alone."""
     worktop = Unit("top", "worktop", (1.6, 0.29, 0.85 + 0.009 + 0.02), (2.02, 0.62, 0.04), kind="thing")
     plinth = Unit("plinth", "plinth", (1.6, 0.05, 0.15 + 0.007 - 0.05), (2.0, 0.018, 0.1), kind="thing")

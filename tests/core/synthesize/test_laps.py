@@ -46,7 +46,7 @@ def face_y(item: SceneObject) -> float:
     return float(item.world_from_object.apply(np.array([[0.0, -item.dimensions_m[1] / 2, 0.0]]))[0, 1])
 
 
-def test_each_leaf_slides_along_the_front_over_the_other_until_it_covers_it(scene: ArticulatedScene) -> None:
+def test_each_leaf_slides_until_it_covers_the_other(scene: ArticulatedScene) -> None:
     for name, towards in (("front", 1.0), ("rear", -1.0)):
         (joint,) = door(scene, name).joints
         np.testing.assert_allclose(joint.axis_object, [towards, 0.0, 0.0])
@@ -55,7 +55,7 @@ def test_each_leaf_slides_along_the_front_over_the_other_until_it_covers_it(scen
         assert joint.sources["limits"] == "default"  # no obstacle in its way
 
 
-def test_the_edge_that_nobody_saw_lies_where_a_leaf_as_wide_as_the_other_ends(scene: ArticulatedScene) -> None:
+def test_the_hidden_edge_makes_both_leaves_equally_wide(scene: ArticulatedScene) -> None:
     item = door(scene, "rear")
     assert item.dimensions_m[0] == pytest.approx(WIDTH_M, abs=0.003)
     assert item.dimension_sources[0] == "inferred"
@@ -64,19 +64,19 @@ def test_the_edge_that_nobody_saw_lies_where_a_leaf_as_wide_as_the_other_ends(sc
     assert left == pytest.approx(WIDTH_M / 2 - OVERLAP_M, abs=0.003)
 
 
-def test_the_layout_leaves_them_on_their_tracks(scene: ArticulatedScene) -> None:
+def test_the_layout_keeps_the_track_distance_of_sliding_leaves(scene: ArticulatedScene) -> None:
     assert face_y(door(scene, "rear")) - face_y(door(scene, "front")) == pytest.approx(TRACK_M, abs=0.002)
 
 
 @pytest.mark.parametrize("track_m", [0.010, 0.014, 0.04])
-def test_near_tracks_are_two_all_the_same(track_m: float) -> None:
+def test_closely_spaced_tracks_are_kept_separate(track_m: float) -> None:
     scene = built(FRONT, rear(track_m), *BESIDE)
     assert face_y(the(scene, "rear")) - face_y(the(scene, "front")) == pytest.approx(track_m, abs=0.002)
     assert min(joint.upper for joint in (*the(scene, "rear").joints, *the(scene, "front").joints)) > 0.5
     assert deepest_contact(compile_scene(scene)) < 1e-6
 
 
-def test_they_pass_each_other_wherever_each_stands(scene: ArticulatedScene) -> None:
+def test_leaves_pass_each_other_without_contact(scene: ArticulatedScene) -> None:
     model = compile_scene(scene)
     (first,), (second,) = (door(scene, name).joints for name in ("front", "rear"))
     for a, b in product(np.linspace(0, 1, 9), repeat=2):
@@ -86,13 +86,13 @@ def test_they_pass_each_other_wherever_each_stands(scene: ArticulatedScene) -> N
     assert min(shares.values()) >= 0.98, shares
 
 
-def test_two_leaves_of_one_unit_are_level() -> None:
+def test_two_leaves_of_one_unit_are_aligned_in_height() -> None:
     scene = built(FRONT, replace(REAR, centre=(REAR.centre[0], REAR.centre[1], 0.506)))
     tops = [item.world_from_object.translation[2] + item.dimensions_m[2] / 2 for item in scene.objects[:2]]
     assert tops[0] == pytest.approx(tops[1], abs=1e-4)
 
 
-def test_a_rear_leaf_that_was_cut_to_its_panel_is_as_high_as_the_front_one_and_reaches_behind_it() -> None:
+def test_a_rear_leaf_cut_to_its_panel_is_extended_to_full_size() -> None:
     """Its stile of 6 cm and its upper rail of 8 cm left out: the door in front shows both."""
     x, y, z = REAR.centre
     width, depth, height = REAR.size
@@ -109,7 +109,7 @@ def test_a_rear_leaf_that_was_cut_to_its_panel_is_as_high_as_the_front_one_and_r
     assert min(joint.upper for each in scene.objects[:2] for joint in each.joints) > 0.5
 
 
-def test_a_front_leaf_cut_too_wide_widens_the_rear_one_by_an_overlap_at_most() -> None:
+def test_a_front_leaf_cut_too_wide_widens_the_rear_leaf_by_at_most_5_cm() -> None:
     """7 cm of the unit beside it taken in at its free edge: no two leaves cover each other by 11 cm."""
     x, y, z = FRONT.centre
     wide = replace(FRONT, centre=(x - 0.035, y, z), size=(WIDTH_M + 0.07, *FRONT.size[1:]))
@@ -117,7 +117,7 @@ def test_a_front_leaf_cut_too_wide_widens_the_rear_one_by_an_overlap_at_most() -
     assert door(scene, "rear").dimensions_m[0] == pytest.approx(WIDTH_M - OVERLAP_M + 0.05, abs=0.004)
 
 
-def test_each_has_its_own_half_of_what_is_behind_both(scene: ArticulatedScene) -> None:
+def test_bodies_of_the_two_leaves_do_not_overlap(scene: ArticulatedScene) -> None:
     (ours, theirs) = (link_boxes(item, item.links[0]) for item in (door(scene, "front"), door(scene, "rear")))
     repeated = Boxes(*(np.repeat(part, len(theirs.centres), axis=0) for part in ours))
     tiled = Boxes(*(np.concatenate([part] * len(ours.centres)) for part in theirs))
@@ -125,25 +125,25 @@ def test_each_has_its_own_half_of_what_is_behind_both(scene: ArticulatedScene) -
 
 
 @pytest.mark.parametrize(("handle", "towards"), [(Handle(-0.24, 0.1), 1.0), (Handle(0.24, 0.1), -1.0)])
-def test_a_leaf_alone_slides_away_from_its_pull(handle: Handle, towards: float) -> None:
+def test_a_single_leaf_slides_away_from_its_pull(handle: Handle, towards: float) -> None:
     item = built(replace(FRONT, handle=handle)).objects[0]
     np.testing.assert_allclose(item.joints[0].axis_object, [towards, 0.0, 0.0])
     assert item.joints[0].upper == pytest.approx(WIDTH_M)
 
 
-def test_a_leaf_alone_without_a_pull_says_that_its_side_is_a_default() -> None:
+def test_a_single_leaf_without_a_pull_slides_by_default_with_a_warning() -> None:
     item = built(replace(FRONT, handle=None)).objects[0]
     assert item.joints[0].sources["axis"] == "default"
     assert "slides to the right by default: nothing in the scan tells the side" in item.warnings
 
 
-def test_a_person_says_where_it_slides_to() -> None:
+def test_a_person_overrides_the_sliding_direction() -> None:
     scene = built(FRONT, overrides=Overrides(objects={"front": ObjectOverride(hinge="left")}))
     np.testing.assert_allclose(scene.objects[0].joints[0].axis_object, [-1.0, 0.0, 0.0])
     assert scene.objects[0].joints[0].sources["axis"] == "person"
 
 
-def test_a_rear_leaf_that_was_drawn_with_its_hidden_edge_stays_as_it_was_drawn() -> None:
+def test_a_rear_leaf_drawn_with_its_hidden_edge_keeps_its_width() -> None:
     x, y, z = REAR.centre
     width, depth, height = REAR.size
     scene = built(FRONT, replace(REAR, centre=(x - 0.02, y, z), size=(width + 0.04, depth, height - 0.03), handle=None))
@@ -152,13 +152,13 @@ def test_a_rear_leaf_that_was_drawn_with_its_hidden_edge_stays_as_it_was_drawn()
     assert item.dimension_sources[0] == "measured"
 
 
-def test_a_size_that_a_person_gave_a_leaf_stays() -> None:
+def test_a_leaf_size_set_by_a_person_is_kept() -> None:
     given = (0.58, 0.55, 0.74)
     scene = built(FRONT, REAR, overrides=Overrides(objects={"rear": ObjectOverride(dimensions_m=np.array(given))}))
     np.testing.assert_allclose(the(scene, "rear").dimensions_m, given)
 
 
-def test_of_three_leaves_the_middle_one_goes_where_its_pull_says() -> None:
+def test_the_middle_of_three_leaves_slides_away_from_its_pull() -> None:
     """Front, rear, front: each outer one has one way, and the rear one is as wide as they are."""
     step = WIDTH_M - OVERLAP_M
     seen = WIDTH_M - 2 * OVERLAP_M

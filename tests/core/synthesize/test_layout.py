@@ -47,12 +47,12 @@ def test_a_run_becomes_coplanar_and_parallel() -> None:
     assert max(layout.moves_m.values()) < 0.015
 
 
-def test_the_rooms_right_angle_wins_when_a_run_is_within_a_degree_of_it() -> None:
+def test_a_run_almost_parallel_to_the_room_is_aligned_with_it() -> None:
     layout = arranged(*run_of_doors(0.002, 0.004), manhattan=0.0)
     np.testing.assert_allclose([o.outward for o in layout.objects], [[0, -1, 0]] * 5, atol=1e-9)
 
 
-def test_a_free_standing_appliance_keeps_the_way_it_was_put() -> None:
+def test_a_free_standing_appliance_keeps_its_yaw_unless_nearly_aligned() -> None:
     """A degree off the run it was put that way; half a degree is what measuring its front can be wrong by."""
     for turned_deg, expected_deg in ((4.0, 4.0), (0.9, 0.9), (0.5, 0.0)):
         yaw = float(np.deg2rad(turned_deg))
@@ -65,7 +65,7 @@ def test_a_free_standing_appliance_keeps_the_way_it_was_put() -> None:
         assert abs(np.rad2deg(found) - expected_deg) < 0.05, turned_deg
 
 
-def test_a_front_that_stands_out_by_five_centimetres_stays_out() -> None:
+def test_a_front_that_protrudes_5_cm_stays_protruding() -> None:
     units = [*run_of_doors(0.0, 0.0), Unit("tall", "cabinet", (2.52, -0.05, 0.5), (0.5, 0.58, 0.7))]
     layout = arranged(*units)
     assert abs(layout.objects[-1].front_centre[1] - (-0.34)) < 1e-3
@@ -82,7 +82,7 @@ def test_small_overlaps_are_trimmed_and_leave_a_gap() -> None:
     assert max(layout.moves_m.values()) < 0.005
 
 
-def test_large_overlaps_are_moved_apart_and_the_moves_are_reported() -> None:
+def test_large_overlaps_are_separated_and_the_moves_are_reported() -> None:
     layout = arranged(
         Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)), Unit("b", "cabinet", (0.44, 0, 0.5), (0.5, 0.58, 0.7))
     )
@@ -91,7 +91,7 @@ def test_large_overlaps_are_moved_apart_and_the_moves_are_reported() -> None:
     assert 0.02 < layout.moves_m["b"] < 0.04
 
 
-def test_a_move_larger_than_measuring_explains_is_told() -> None:
+def test_an_unusually_large_move_gives_a_warning() -> None:
     layout = arranged(
         Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)), Unit("b", "refrigerator", (0.5, 0, 0.9), (0.65, 0.62, 1.8))
     )
@@ -99,7 +99,7 @@ def test_a_move_larger_than_measuring_explains_is_told() -> None:
     assert ["b was moved by" in warning for warning in layout.warnings] == [True]
 
 
-def test_what_cannot_be_there_moves_nothing_and_is_named() -> None:
+def test_an_implausible_object_is_an_outlier_and_moves_nothing() -> None:
     """Three fronts that each took in a part of the run, over two cabinets and a refrigerator that are right."""
     right = [
         Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)),
@@ -115,7 +115,7 @@ def test_what_cannot_be_there_moves_nothing_and_is_named() -> None:
     assert with_outliers(layout, [placed(wrong)]).objects[-1].name == "wide"
 
 
-def test_what_a_person_placed_is_no_outlier() -> None:
+def test_an_object_placed_by_a_person_is_not_an_outlier() -> None:
     pose = np.eye(4)
     pose[:3, 3] = (0.0, 0.0, 0.5)
     units = [
@@ -125,7 +125,7 @@ def test_what_a_person_placed_is_no_outlier() -> None:
     assert list(arranged(*units, overrides={"a": ObjectOverride(pose=pose)}).outliers) == ["b"]
 
 
-def test_what_a_person_placed_stays_and_the_other_gives_way() -> None:
+def test_an_object_placed_by_a_person_is_fixed_and_its_neighbour_moves() -> None:
     pose = np.eye(4)
     pose[:3, 3] = (0.0, 0.0, 0.5)
     layout = arranged(
@@ -137,7 +137,7 @@ def test_what_a_person_placed_stays_and_the_other_gives_way() -> None:
     assert overlapping_pairs(layout.objects) == []
 
 
-def test_a_depth_nobody_saw_gives_way_before_a_measured_front_moves() -> None:
+def test_an_inferred_depth_is_shortened_before_a_measured_front_moves() -> None:
     """Two runs meet in a corner: one cabinet's inferred depth runs into the other run."""
     layout = arranged(
         Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.7, 0.7)),
@@ -148,7 +148,7 @@ def test_a_depth_nobody_saw_gives_way_before_a_measured_front_moves() -> None:
     assert max(layout.moves_m.values()) < 1e-4  # of the fronts
 
 
-def test_things_come_to_rest_on_what_is_below_them() -> None:
+def test_things_are_placed_on_the_support_below_them() -> None:
     layout_params = tuned(LayoutParams)
     layout = arranged(
         Unit("top", "counter", (0, 0, 0.9), (1.2, 0.62, 0.04), kind="thing"),
@@ -164,18 +164,18 @@ def test_things_come_to_rest_on_what_is_below_them() -> None:
 
 
 @pytest.mark.parametrize("below_m", [0.004, 0.045])
-def test_what_reaches_below_the_floor_is_put_onto_it(below_m: float) -> None:
+def test_objects_below_the_floor_are_raised_onto_it(below_m: float) -> None:
     (chair,) = arranged(Unit("chair", "chair", (0, 0, 0.41 - below_m), (0.45, 0.55, 0.82), kind="thing")).objects
     underside_m = chair.world_from_object.translation[2] - chair.dimensions_m[2] / 2
     assert 0.0 < underside_m < 0.001
 
 
-def test_a_wall_cabinet_hangs_where_it_was_measured() -> None:
+def test_a_wall_cabinet_stays_at_its_measured_height() -> None:
     layout = arranged(Unit("w", "wall_cabinet", (0, 0, 1.71), (0.6, 0.35, 0.7)), manhattan=0.0)
     assert layout.moves_m["w"] < 1e-6
 
 
-def test_noisy_edges_of_a_run_end_on_shared_lines_and_seams() -> None:
+def test_noisy_edges_of_a_run_snap_to_shared_lines_and_seams() -> None:
     """Edges off by 3 mm each: tops and bottoms become level, gaps 3 mm, and widths no worse than they were measured."""
     rng = np.random.default_rng(5)
     noisy = []
@@ -209,7 +209,7 @@ def test_a_shorter_neighbour_keeps_its_own_height() -> None:
     np.testing.assert_allclose([o.dimensions_m[2] for o in layout.objects], [0.7, 0.6], atol=1e-9)
 
 
-def test_a_thing_beside_a_step_does_not_sink_into_it() -> None:
+def test_a_thing_beside_a_step_does_not_overlap_the_step() -> None:
     """Its support lies lower than the box it partly stands over, which carries too little of it to be its support."""
     layout = arranged(
         Unit("step", "counter", (0.0, 0, 0.9), (0.6, 0.6, 0.04), kind="thing"),
@@ -219,7 +219,7 @@ def test_a_thing_beside_a_step_does_not_sink_into_it() -> None:
     assert overlapping_pairs(layout.objects) == []
 
 
-def test_furniture_does_not_give_way_to_what_stands_on_it() -> None:
+def test_furniture_is_not_moved_by_objects_on_top() -> None:
     layout = arranged(
         Unit("d", "drawer", (0, 0, 0.8), (0.6, 0.58, 0.2)),
         Unit("m", "microwave", (0, 0, 0.9 - 0.02 + 0.14), (0.5, 0.38, 0.28), kind="appliance"),
@@ -229,7 +229,7 @@ def test_furniture_does_not_give_way_to_what_stands_on_it() -> None:
     assert overlapping_pairs(layout.objects) == []
 
 
-def test_a_layout_that_cannot_be_solved_stands_as_measured_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unsolvable_layout_keeps_all_objects_with_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     def singular(*_: object) -> None:
         raise np.linalg.LinAlgError("Singular matrix")
 

@@ -33,13 +33,13 @@ def values(motion: JointMotion | None) -> dict[int, float | None]:
     return {frame: state.value for frame, state in motion.states.items()}
 
 
-def test_nothing_marked_changes_nothing() -> None:
+def test_motions_without_marks_are_unchanged() -> None:
     found = measured({0: 0.1, 5: 1.0})
     assert as_marked(found, {}, HINGE, Rigid3()) is found
     assert as_marked(None, {}, HINGE, Rigid3()) is None
 
 
-def test_closed_here_moves_the_zero_of_every_frame() -> None:
+def test_a_closed_mark_shifts_the_zero_of_every_frame() -> None:
     moved = as_marked(measured({0: 0.1, 5: 1.0, 9: None}), {0: 0.0}, HINGE, Rigid3())
     assert values(moved) == {0: 0.0, 5: pytest.approx(0.9, abs=0.005), 9: None}
     assert moved is not None
@@ -48,12 +48,12 @@ def test_closed_here_moves_the_zero_of_every_frame() -> None:
     assert moved.stop_seen  # it was held still at that position
 
 
-def test_two_marks_give_the_scale_too() -> None:
+def test_two_marks_rescale_the_measured_states() -> None:
     moved = as_marked(measured({0: 0.1, 5: 1.0, 8: 0.55}), {0: 0.0, 5: 0.95}, HINGE, Rigid3())
     assert values(moved) == {0: 0.0, 5: 0.95, 8: pytest.approx(0.475, abs=0.015)}
 
 
-def test_a_mark_that_contradicts_the_closed_frames_is_of_its_own_frame() -> None:
+def test_a_contradicting_mark_changes_only_its_own_frame() -> None:
     """One frame was misread: the others are as they were measured."""
     found = measured({0: 0.0, 3: 0.0, 5: 1.4, 8: 0.9})
     assert values(as_marked(found, {5: 0.0}, HINGE, Rigid3())) == {0: 0.0, 3: 0.0, 5: 0.0, 8: 0.9}
@@ -61,19 +61,19 @@ def test_a_mark_that_contradicts_the_closed_frames_is_of_its_own_frame() -> None
     assert values(odd) == {0: 0.0, 5: 0.9, 8: 0.0}
 
 
-def test_open_where_it_was_taken_for_closed_opens_the_others_too() -> None:
+def test_an_open_mark_on_a_closed_frame_shifts_all_states() -> None:
     """It stood open from the start: what was taken for its closed state was not."""
     found = measured({0: 0.0, 3: 0.0, 5: 0.7})
     moved = as_marked(found, {0: 0.5}, HINGE, Rigid3())
     assert values(moved) == {0: 0.5, 3: pytest.approx(0.5, abs=0.005), 5: pytest.approx(1.2, abs=0.005)}
 
 
-def test_nothing_is_further_shut_than_closed() -> None:
+def test_shifted_states_are_clamped_at_closed() -> None:
     moved = as_marked(measured({0: 0.1, 4: 0.2, 5: 1.0}), {4: 0.0}, HINGE, Rigid3())
     assert values(moved) == {0: 0.0, 4: 0.0, 5: pytest.approx(0.8, abs=0.005)}
 
 
-def test_marks_on_a_finished_object_say_what_a_run_with_them_does() -> None:
+def test_marks_on_a_built_object_give_the_same_result_as_a_run() -> None:
     marks = {"door": {7: 0.0, 30: 2.0}}
     unit = Unit("a", "cabinet", (0, 0, 0.45), (0.6, 0.58, 0.72))
     plain = built(unit).objects[0]
@@ -88,7 +88,7 @@ def test_marks_on_a_finished_object_say_what_a_run_with_them_does() -> None:
     assert values(named.joints[0].motion) == values(run.joints[0].motion)
 
 
-def test_of_what_was_not_measured_the_marks_are_all_that_is_known() -> None:
+def test_marks_alone_define_the_motion_of_an_unmeasured_joint() -> None:
     item = built(
         Unit("a", "cabinet", (0, 0, 0.45), (0.6, 0.58, 0.72)),
         overrides=Overrides(objects={"a": ObjectOverride(states={"door": {7: 0.0, 30: 2.0}, "lid": {1: 0.0}})}),

@@ -33,7 +33,7 @@ def test_every_value_names_its_source(name: str) -> None:
 
 
 @pytest.mark.parametrize("category", BUILT, ids=lambda category: category.name)
-def test_every_fixture_is_built_of_what_the_table_says(category: Category) -> None:
+def test_fixtures_use_the_feel_material_and_weight_of_the_table(category: Category) -> None:
     fixture = fixture_of(category)
     assert fixture is not None
     assert fixture.feel in FEELS.values()
@@ -45,7 +45,7 @@ def test_every_fixture_is_built_of_what_the_table_says(category: Category) -> No
 
 
 @pytest.mark.parametrize("name", FEELS)
-def test_one_hand_opens_a_joint_slowly_and_a_released_one_is_slowed(name: str) -> None:
+def test_joint_friction_and_damping_allow_opening_with_one_hand(name: str) -> None:
     feel = FEELS[name]
     slide = name.startswith("SLIDE")
     lever, speed = (1.0, 0.3) if slide else (LEVER_M, 0.5)  # m/s, rad/s: a drawer in 1.5 s, a door in 3 s
@@ -56,7 +56,7 @@ def test_one_hand_opens_a_joint_slowly_and_a_released_one_is_slowed(name: str) -
 
 
 @pytest.mark.parametrize("edge_m", [0.01, 0.09, 0.5])
-def test_a_thing_weighs_what_its_kind_can(edge_m: float) -> None:
+def test_the_mass_of_a_thing_is_scaled_into_its_usual_range(edge_m: float) -> None:
     """A mug whose colliders are a lump, a sliver or right: scaled into the range, inertia with it."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * edge_m
     raw = inertial_of_pieces([ConvexPiece(name="lump", vertices_link=corners)], materials.MUG.density_kg_m3)

@@ -38,22 +38,22 @@ def named(scene: ArticulatedScene, what: str) -> set[str]:
     return {name for name, found in lines.items() if found}
 
 
-def test_a_run_that_cannot_be_straightened_leaves_the_others_straight(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_fails_to_straighten_is_the_only_one_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, runs, "_run_yaw", lambda items, line, *_: items[line.members[0]].name == "far")
     assert named(built(*RUN, ALONE), "its run was not straightened") == {"far"}
 
 
-def test_an_object_whose_fillers_cannot_be_told_keeps_its_width(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_filler_search_is_reported_only_for_its_object(monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, fillers, "_excess", lambda item, *_: item.name == "cab_r")
     assert named(built(*RUN), "the search for a filler beside it failed") == {"cab_r"}
 
 
-def test_a_thing_whose_support_cannot_be_told_stays_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_support_search_is_reported_only_for_its_thing(monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, layout, "_carries", lambda _, item: item.name == "mug")
     assert named(built(*RUN, MUG), "it was not put on its support") == {"mug"}
 
 
-def test_neighbours_that_cannot_be_fitted_stay_as_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_neighbour_fit_is_reported_only_for_its_objects(monkeypatch: pytest.MonkeyPatch) -> None:
     pair = [
         Unit("other_l", "cabinet", (0, 3, 0.5), (0.6, 0.58, 0.7)),
         Unit("other_r", "cabinet", (0.602, 3, 0.5), (0.6, 0.58, 0.7)),
@@ -63,7 +63,7 @@ def test_neighbours_that_cannot_be_fitted_stay_as_measured(monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("step", ["outliers_of", "overlapping_pairs"])
-def test_overlaps_that_cannot_be_found_are_said(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_overlap_search_is_reported_and_keeps_all_objects(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, layout, step, lambda *_: True)
     scene = built(*RUN)
     assert {"cab_l", "cab_r"} <= {item.name for item in scene.objects}
@@ -71,7 +71,7 @@ def test_overlaps_that_cannot_be_found_are_said(step: str, monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("step", ["handle_hinge", "_from_neighbours"])
-def test_a_door_whose_side_cannot_be_told_is_hung_as_its_category(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_hinge_search_uses_the_category_default(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, joints, step, lambda item, *_: item.name == "bare")
     bare = Unit("bare", "cabinet", (0, 3, 0.5), (0.6, 0.58, 0.7))
     scene = built(*RUN, bare)
@@ -79,19 +79,19 @@ def test_a_door_whose_side_cannot_be_told_is_hung_as_its_category(step: str, mon
     assert len(the(scene, "cab_l").joints) == 1
 
 
-def test_a_joint_whose_way_cannot_be_told_opens_as_its_category(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_travel_check_is_reported_only_for_its_joint(monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, clearance, "free_travel", lambda item, *_: item.name == "cab_r")
     scene = built(*RUN)
     assert named(scene, "how far cab_r_door_joint opens was not checked") == {"cab_r"}
 
 
-def test_boxes_that_cannot_be_made_are_in_nobodys_way(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_collision_box_keeps_all_objects(monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, clearance, "link_boxes", lambda item, _: item.name == "counter")
     scene = built(*RUN, Unit("counter", "counter", (0.3, 0, 0.915), (1.3, 0.62, 0.04), kind="thing"))
     assert {"cab_l", "cab_r", "counter"} <= {item.name for item in scene.objects}
 
 
-def test_a_door_that_cannot_be_hung_otherwise_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_hinge_flip_is_reported_only_for_its_door(monkeypatch: pytest.MonkeyPatch) -> None:
     build = stage._fixture
     monkeypatch.setattr(opening, "_travel", lambda _: 0.0)  # as if nothing opened
     turned: list[str] = []
@@ -116,7 +116,7 @@ def test_a_door_that_cannot_be_hung_otherwise_stays_as_it_is(monkeypatch: pytest
         ("plinths", "no plinth was made below cab_l, cab_r"),
     ],
 )
-def test_a_worktop_or_plinth_that_cannot_be_made_is_left_out(step: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_worktop_or_plinth_is_left_out_with_a_warning(step: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, surroundings, step, lambda *_: True)
     scene = built(*RUN)
     assert {"cab_l", "cab_r"} <= {item.name for item in scene.objects}
@@ -124,7 +124,7 @@ def test_a_worktop_or_plinth_that_cannot_be_made_is_left_out(step: str, said: st
 
 
 @pytest.mark.parametrize("step", ["_painted", "_clear"])
-def test_a_plinth_that_cannot_be_built_is_left_out(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plinth_that_fails_to_build_is_left_out_with_a_warning(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, stage if step == "_painted" else surroundings, step, lambda *_: True)
     scene = built(*RUN)
     assert {item.name for item in scene.objects} == {"cab_l", "cab_r"}

@@ -43,7 +43,7 @@ def high(item: MeasuredObject, axis: int) -> float:
     return low(item, axis) + float(item.dimensions_m[axis])
 
 
-def test_where_nothing_must_change_nothing_does() -> None:
+def test_satisfied_constraints_change_nothing() -> None:
     items = [item("a", (0, 0, 0.5)), item("b", (0.603, 0, 0.5))]
     for before, after in zip(items, solved(items, [], [], GAP_M), strict=True):
         assert after is before
@@ -54,7 +54,7 @@ def test_where_nothing_must_change_nothing_does() -> None:
 
 
 @pytest.mark.parametrize("off_m", [-0.006, 0.006])
-def test_tied_faces_become_one_line_and_equals_share_the_change(off_m: float) -> None:
+def test_tied_faces_are_aligned_and_equal_objects_share_the_change(off_m: float) -> None:
     first, second = solved(
         [item("a", (0, 0, 0.5)), item("b", (0.603, off_m, 0.5))],
         [Tie(first=Face(0, 1, -1.0), second=Face(1, 1, -1.0))],
@@ -65,14 +65,14 @@ def test_tied_faces_become_one_line_and_equals_share_the_change(off_m: float) ->
     assert low(first, 1) == pytest.approx(-0.29 + off_m / 2, abs=1e-4)
 
 
-def test_what_overlaps_is_parted_along_the_cheapest_axis_and_keeps_the_gap() -> None:
+def test_overlaps_are_separated_along_the_cheapest_axis_with_the_gap() -> None:
     first, second = solved([item("a", (0, 0, 0.5)), item("b", (0.590, 0, 0.5))], [], [(0, 1)], GAP_M)
     assert low(second, 0) - high(first, 0) >= GAP_M - ATOL
     assert low(second, 0) - high(first, 0) < GAP_M + 1e-3
     assert [first.world_from_object.translation[k] for k in (1, 2)] == pytest.approx([0, 0.5], abs=ATOL)
 
 
-def test_an_appliance_gives_way_to_what_is_built_in_and_a_person_is_right() -> None:
+def test_appliances_move_before_built_in_units_and_fixed_objects_stay() -> None:
     built_in, put_there = solved(
         [item("a", (0, 0, 0.5)), item("m", (0.590, 0, 0.5), category="microwave")], [], [(0, 1)], GAP_M
     )
@@ -83,7 +83,7 @@ def test_an_appliance_gives_way_to_what_is_built_in_and_a_person_is_right() -> N
     assert low(moved, 0) >= 0.3 + GAP_M - ATOL
 
 
-def test_nothing_is_pushed_below_the_floor_and_what_was_measured_there_no_further() -> None:
+def test_objects_are_not_pushed_below_the_floor_or_further_below() -> None:
     for measured_m in (0.0, -0.004):
         below = item("a", (0, 0, 0.36 + measured_m), category="box")
         first, second = solved([below, item("b", (0, 0, 1.04), category="box")], [], [(0, 1)], GAP_M)
@@ -91,7 +91,7 @@ def test_nothing_is_pushed_below_the_floor_and_what_was_measured_there_no_furthe
         assert low(second, 2) - high(first, 2) >= GAP_M - ATOL
 
 
-def test_sizes_change_no_more_than_measuring_can_be_wrong() -> None:
+def test_sizes_change_by_no_more_than_the_measurement_error() -> None:
     """Three units in the room of two and nine tenths: they are pushed apart, not crushed."""
     items = [item(name, (x, 0, 0.5)) for name, x in (("a", 0.0), ("b", 0.56), ("c", 1.12))]
     found = solved(items, [], [(0, 1), (1, 2)], GAP_M)
@@ -101,7 +101,7 @@ def test_sizes_change_no_more_than_measuring_can_be_wrong() -> None:
 
 
 @pytest.mark.parametrize("yaw", [0.4, np.pi / 2, 2.5])
-def test_the_whole_kitchen_turned_is_solved_the_same(yaw: float) -> None:
+def test_the_solution_does_not_depend_on_the_world_frame(yaw: float) -> None:
     motion = Rigid3(rotation_about_z(yaw), np.array([1.0, -2.0, 0.1]))
 
     def moved(one: MeasuredObject) -> MeasuredObject:
@@ -116,7 +116,7 @@ def test_the_whole_kitchen_turned_is_solved_the_same(yaw: float) -> None:
         np.testing.assert_allclose(other.dimensions_m, one.dimensions_m, atol=1e-4)
 
 
-def test_the_order_of_the_objects_does_not_matter() -> None:
+def test_the_solution_does_not_depend_on_object_order() -> None:
     items = [item("a", (0, 0, 0.5)), item("b", (0.590, 0, 0.5)), item("c", (1.185, 0, 0.5))]
     here = solved(items, [], [(0, 1), (1, 2)], GAP_M)
     there = solved(items[::-1], [], [(2, 1), (1, 0)], GAP_M)[::-1]

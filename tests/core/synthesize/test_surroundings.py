@@ -70,7 +70,7 @@ def bounds(item: SceneObject) -> tuple[np.ndarray, np.ndarray]:
     return centre - reach, centre + reach
 
 
-def test_a_worktop_that_nobody_clicked_lies_on_the_units_at_the_scanned_height() -> None:
+def test_an_unclicked_worktop_is_built_at_the_scanned_height() -> None:
     (counter,) = of(kitchen(), "counter")
     low, high = bounds(counter)
     np.testing.assert_allclose(high[2], 0.892, atol=1e-3)
@@ -83,7 +83,7 @@ def test_a_worktop_that_nobody_clicked_lies_on_the_units_at_the_scanned_height()
     assert counter.name == "counter_1"
 
 
-def test_a_plinth_closes_the_run_where_the_scan_shows_it() -> None:
+def test_a_plinth_is_built_where_the_scan_shows_it() -> None:
     (plinth,) = of(kitchen(), "plinth")
     low, high = bounds(plinth)
     np.testing.assert_allclose(low[1], -0.22, atol=0.003)
@@ -92,7 +92,7 @@ def test_a_plinth_closes_the_run_where_the_scan_shows_it() -> None:
     assert plinth.fixture == "fixed_panel"
 
 
-def test_neither_touches_anything_nor_shortens_a_joint() -> None:
+def test_worktop_and_plinth_have_no_contacts_and_keep_joint_limits() -> None:
     model = compile_scene(kitchen())
     assert deepest_contact(model) < 5e-4
     assert max(sweep(kitchen(), model).values()) < 1e-3
@@ -100,17 +100,17 @@ def test_neither_touches_anything_nor_shortens_a_joint() -> None:
     assert {j.name: j.upper for o in kitchen().objects for j in o.joints} == without
 
 
-def test_the_layout_is_what_it_is_without_them() -> None:
+def test_worktop_and_plinth_do_not_change_the_layout() -> None:
     alone = built((*RUN, BOTTLE), scanned(WORKTOP, PLINTH), on=False)
     assert kitchen().layout_moves_m == alone.layout_moves_m
     assert [o.name for o in kitchen().objects][: len(alone.objects)] == [o.name for o in alone.objects]
 
 
-def test_a_bottle_stands_on_the_counter_and_needs_no_plate() -> None:
+def test_a_bottle_on_the_counter_gets_no_support_plate() -> None:
     assert not any(body.is_support for body in supported(plan_bundle(kitchen())).bodies)
 
 
-def test_the_fit_leaves_them_as_they_are() -> None:
+def test_mesh_fitting_leaves_the_inferred_counter_unchanged() -> None:
     rng = np.random.default_rng(0)
     tracks, placements, assets = zip(*[placed_unit(u, rng) for u in (*RUN, BOTTLE)], strict=True)
     fitted = fit_meshes(kitchen(), tracks, placements, assets, WarpConfig())
@@ -125,17 +125,17 @@ def test_the_fit_leaves_them_as_they_are() -> None:
         (((-0.3, -0.28, 1.1), (1.5, 0.28, 1.12)),),  # a shelf
     ],
 )
-def test_without_evidence_there_is_no_counter(solids: tuple[tuple[Corner, Corner], ...]) -> None:
+def test_no_counter_is_built_without_evidence(solids: tuple[tuple[Corner, Corner], ...]) -> None:
     assert not of(built(RUN, scanned(*solids)), "counter")
 
 
-def test_a_plinth_that_no_camera_saw_is_set_back_as_usual() -> None:
+def test_an_unseen_plinth_gets_the_usual_setback() -> None:
     (plinth,) = of(built(RUN, scanned(WORKTOP)), "plinth")
     np.testing.assert_allclose(bounds(plinth)[0][1], -0.28 + 0.05, atol=2e-3)
     assert any("inferred" in line for line in plinth.warnings)
 
 
-def test_a_clicked_counter_is_the_only_one_and_names_stay_unique() -> None:
+def test_a_clicked_counter_is_not_duplicated_and_names_stay_unique() -> None:
     clicked = Unit("worktop", "counter", (0.603, 0.0, 0.876), (1.806, 0.59, 0.032), kind="thing")
     assert [o.name for o in of(built((*RUN, clicked), scanned(WORKTOP, PLINTH)), "counter")] == ["worktop"]
     bottle = replace(BOTTLE, name="counter_1")
@@ -143,7 +143,7 @@ def test_a_clicked_counter_is_the_only_one_and_names_stay_unique() -> None:
     assert [o.name for o in of(scene, "counter")] == ["counter_2"]
 
 
-def test_a_cooker_in_the_run_parts_the_counter() -> None:
+def test_a_cooker_in_the_run_splits_the_counter() -> None:
     cooker = Unit("cooker", "oven", (0.603, 0.0, 0.448), (0.6, 0.6, 0.895), handle=Handle(0, 0.3, length=0.4, vertical=False))
     scene = built((CAB_L, cooker, UPPER, LOWER), scanned(WORKTOP, PLINTH))
     ends = sorted(tuple(float(edge[0]) for edge in bounds(o)) for o in of(scene, "counter"))

@@ -23,7 +23,7 @@ def test_a_dense_hull_is_simplified_without_leaving_the_shape() -> None:
     assert (np.linalg.norm(piece.vertices_link, axis=1) <= 0.0501 + 0.006).all()
 
 
-def test_a_cup_stays_open() -> None:
+def test_colliders_of_a_tube_keep_its_bore_open() -> None:
     """A tube's hull would fill its bore; its pieces must not."""
     mesh = annulus(r_min=0.04, r_max=0.05, height=0.1, sections=24)
     pieces = convex_pieces(solid(mesh), mesh.extents)
@@ -34,7 +34,7 @@ def test_a_cup_stays_open() -> None:
     assert all((Delaunay(p.vertices_link).find_simplex(axis_points) < 0).all() for p in pieces)
 
 
-def test_uneven_feet_become_one_flat_underside() -> None:
+def test_uneven_feet_are_flattened_into_one_underside() -> None:
     mesh = cylinder(radius=0.04, height=0.2, sections=40)
     vertices = np.asarray(mesh.vertices).copy()
     low = vertices[:, 2] < 0

@@ -31,7 +31,7 @@ def share_filled(points: np.ndarray, pieces: list[np.ndarray]) -> float:
 
 
 @pytest.mark.parametrize(("height_m", "radius_m"), [(0.09, 0.04), (0.06, 0.09)])
-def test_a_mug_and_a_bowl_keep_their_opening(height_m: float, radius_m: float) -> None:
+def test_colliders_of_a_mug_and_a_bowl_keep_the_cavity_open(height_m: float, radius_m: float) -> None:
     vertices, faces = mug(height_m, radius_m)
     hollow = find_hollow(vertices, faces)
     assert hollow is not None
@@ -40,7 +40,7 @@ def test_a_mug_and_a_bowl_keep_their_opening(height_m: float, radius_m: float) -
     assert share_filled(hollow.points, [piece.vertices_link for piece in pieces]) < 0.05
 
 
-def test_the_hole_of_a_handle_stays_open_for_a_finger() -> None:
+def test_the_hole_of_a_mug_handle_stays_open() -> None:
     vertices, faces = mug()
     pieces = staves(vertices, faces)
     assert pieces is not None
@@ -48,7 +48,7 @@ def test_the_hole_of_a_handle_stays_open_for_a_finger() -> None:
     assert share_filled(finger, pieces) == 0.0
 
 
-def test_what_has_no_hollow_is_no_vessel() -> None:
+def test_solids_without_an_upward_hollow_are_not_vessels() -> None:
     block = manifold3d.Manifold.cube((0.1, 0.1, 0.1)).to_mesh64()
     assert staves(np.array(block.vert_properties), np.array(block.tri_verts, dtype=np.int64)) is None
     vertices, faces = mug()
