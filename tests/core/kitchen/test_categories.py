@@ -100,7 +100,7 @@ def parts_of(category: Category) -> tuple[Part, ...]:
 
 
 @pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
-def test_every_line_is_whole(category: Category) -> None:
+def test_every_category_is_complete_and_consistent(category: Category) -> None:
     for size in (category.width, category.depth, category.height):
         assert 0 < size.low <= size.usual <= size.high
         assert len(size.source) > 20
@@ -113,7 +113,7 @@ def test_every_line_is_whole(category: Category) -> None:
 
 
 @pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
-def test_every_name_is_built_fitted_and_exported_as_the_first(category: Category) -> None:
+def test_all_names_of_a_category_are_built_and_exported_the_same(category: Category) -> None:
     """The object goes through the stages as text: what they make of it must not depend on the word."""
     first, entry = exported_as(category.name, category)
     for name in category.names[1:]:
@@ -124,7 +124,9 @@ def test_every_name_is_built_fitted_and_exported_as_the_first(category: Category
 
 
 @pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
-def test_every_name_is_looked_for_and_measured_the_same(category: Category, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_names_of_a_category_are_segmented_and_measured_the_same(
+    category: Category, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked: dict[str, Any] = {}
     monkeypatch.setattr(finders, "regions_at", lambda planes, point, **_: [object()])
     monkeypatch.setattr(finders, "find_front", lambda run, on, off, **how: asked.update(how))
@@ -166,7 +168,7 @@ def test_every_name_is_looked_for_and_measured_the_same(category: Category, monk
         ("hood", "appliance", "fixed", 0.45),
     ],
 )
-def test_what_six_tables_told_apart(typed: str, kind: str, opens: str, depth_m: float) -> None:
+def test_names_resolve_to_one_category_kind_opening_and_depth(typed: str, kind: str, opens: str, depth_m: float) -> None:
     """Names that were cut as a blob of 0.2 m, as one drawer or one door, or given an oven's depth, by one table or another."""
     category = category_of(typed)
     assert (category.kind, category.opens, category.depth.usual) == (kind, opens, depth_m)
@@ -174,7 +176,7 @@ def test_what_six_tables_told_apart(typed: str, kind: str, opens: str, depth_m: 
     assert len(joints) == {"fixed": 0, "pair": 2}.get(opens, 3 if category.several_fronts else 1)
 
 
-def test_a_bottle_is_known_and_weighs_what_bottles_do() -> None:
+def test_a_bottle_is_recognised_and_has_a_realistic_mass() -> None:
     item = built_as("wine bottle", category_of("bottle"))
     assert item.movable
     assert item.warnings == () or "category" not in item.warnings[0]

@@ -50,11 +50,11 @@ def two_drawers() -> Surface:
         pytest.param(block((-0.3, FRONT_Y, -0.35), (0.3, DEPTH / 2, 0.35)), id="slab"),
     ],
 )
-def test_every_stage_means_the_same_front(mesh: Surface) -> None:
+def test_all_stages_use_the_same_front_plane_of_a_mesh(mesh: Surface) -> None:
     np.testing.assert_allclose(shared_by_stages(*mesh), FRONT_Y, atol=1e-3)
 
 
-def test_the_front_of_a_leaning_mesh_is_a_plane_that_leans() -> None:
+def test_the_front_plane_of_a_leaning_mesh_leans_with_it() -> None:
     vertices, faces = shaker(0.012)
     samples = sampled(turned(vertices, 3.0), faces, 12000, 0)
     plane = front_plane(samples.points, samples.normals)
@@ -63,7 +63,7 @@ def test_the_front_of_a_leaning_mesh_is_a_plane_that_leans() -> None:
     assert abs(float(plane.outward @ turned(np.array([[0.1, FRONT_Y, 0.1]]), 3.0)[0]) - plane.offset_m) < 1e-3
 
 
-def test_what_looks_nowhere_forwards_begins_at_its_foremost_points() -> None:
+def test_a_mesh_without_forward_facing_surface_starts_at_its_foremost_points() -> None:
     wedge = np.random.default_rng(0).uniform([-0.1, 0.3, -0.1], [0.1, 0.5, 0.1], (1000, 3))
     sideways = np.tile([1.0, 0.0, 0.0], (1000, 1))
     assert front_plane(wedge, sideways) is None

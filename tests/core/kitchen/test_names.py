@@ -9,19 +9,19 @@ NAMES = [(name, category.name) for category in CATEGORIES for name in category.n
 
 
 @pytest.mark.parametrize(("name", "meant"), NAMES)
-def test_a_name_is_known_however_it_is_written(name: str, meant: str) -> None:
+def test_names_are_recognised_in_any_case_and_spacing(name: str, meant: str) -> None:
     for typed in (name, name.upper(), f" {name.replace('_', ' ')} ", name.replace("_", "-").title(), f"{name}_12"):
         assert category_of(typed).name == meant, typed
         assert named(typed).notice is None
 
 
 @pytest.mark.parametrize(("name", "meant"), [pair for pair in NAMES if pair[0] != "drawer"])
-def test_a_plural_means_the_same(name: str, meant: str) -> None:
+def test_plural_names_are_recognised(name: str, meant: str) -> None:
     ending = "es" if name.endswith(("s", "x", "ch", "sh")) else "s"
     assert category_of(name + ending).name == meant
 
 
-def test_no_name_means_two_things() -> None:
+def test_names_are_unique_without_separators() -> None:
     squeezed = [name.replace("_", "") for name, _ in NAMES]
     assert sorted(squeezed) == sorted(set(squeezed))
 
@@ -50,7 +50,7 @@ def test_no_name_means_two_things() -> None:
         ("dining-table", "table"),
     ],
 )
-def test_a_compound_is_known_by_its_head_and_the_words_before_it(typed: str, meant: str) -> None:
+def test_compound_names_are_recognised_by_head_and_modifiers(typed: str, meant: str) -> None:
     assert category_of(typed).name == meant
 
 
@@ -62,7 +62,7 @@ def test_a_compound_is_known_by_its_head_and_the_words_before_it(typed: str, mea
         *("vegetable", "tablet", "potato", "microwave cart", "drawer knob"),
     ],
 )
-def test_what_the_table_does_not_know_is_a_rigid_thing_and_no_wrong_guess(typed: str) -> None:
+def test_unknown_names_become_rigid_things_with_a_notice(typed: str) -> None:
     category, notice = named(typed)
     assert (category.name, category.opens, category.kind) == ("object", "rigid", "thing")
     assert notice is not None
@@ -70,7 +70,7 @@ def test_what_the_table_does_not_know_is_a_rigid_thing_and_no_wrong_guess(typed:
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("mircowave", "microwave"), ("drawr", "drawer")])
-def test_close_names_are_suggested(typed: str, meant: str) -> None:
+def test_misspelled_names_get_a_suggestion(typed: str, meant: str) -> None:
     notice = named(typed).notice
     assert notice is not None
     assert meant in notice.partition("did you mean")[2]

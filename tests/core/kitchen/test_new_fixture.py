@@ -55,7 +55,7 @@ def plate_warmer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("plate_warmer")
 @pytest.mark.parametrize("typed", ["plate warmer", "Warming drawers"])
-def test_a_new_unit_is_one_file_and_one_line(typed: str) -> None:
+def test_a_new_unit_needs_only_one_file_and_one_table_line(typed: str) -> None:
     category = category_of(typed)
     assert category is LINE
     assert sized_as(category).radius_m == 0.45

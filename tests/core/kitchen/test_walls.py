@@ -45,7 +45,7 @@ def asked(walls: tuple[Wall, ...], category: str) -> list[float | None]:
 @pytest.mark.parametrize("category", ["cabinet", "wall_cabinet", "refrigerator", "microwave"])
 @pytest.mark.parametrize("share", [0.8, 1.0, 1.1])
 @pytest.mark.parametrize("off_deg", [0.0, 9.0, -9.0])
-def test_every_stage_means_the_same_wall(category: str, share: float, off_deg: float) -> None:
+def test_all_stages_use_the_same_wall_behind_a_front(category: str, share: float, off_deg: float) -> None:
     distance = share * category_of(category).depth.usual
     wall = wall_at(distance, off_deg=off_deg)
     assert asked((wall, wall_at(3.0)), category) == [pytest.approx(distance, abs=1e-9)] * 3
@@ -54,23 +54,23 @@ def test_every_stage_means_the_same_wall(category: str, share: float, off_deg: f
 @pytest.mark.parametrize(
     "wall", [wall_at(0.58, off_deg=11.0), wall_at(0.58, off_deg=90.0), wall_at(-0.5), wall_at(2.5), wall_at(0.1)]
 )
-def test_no_stage_means_a_wall_beside_before_or_far_behind(wall: Wall) -> None:
+def test_no_stage_uses_an_unsuitable_wall(wall: Wall) -> None:
     assert asked((wall,), "cabinet") == [None] * 3
 
 
-def test_the_nearest_wall_that_is_possible_is_meant() -> None:
+def test_the_nearest_plausible_wall_is_used() -> None:
     walls = (wall_at(0.7), wall_at(0.1), wall_at(0.55))
     assert front_depth(walls, MIDDLE, OUTWARD, category_of("cabinet").depth).depth_m == pytest.approx(0.55)
     np.testing.assert_allclose(distances_behind(walls, MIDDLE, OUTWARD), [0.1, 0.55, 0.7])
 
 
-def test_without_a_wall_a_front_is_as_deep_as_its_category_usually_is() -> None:
+def test_a_front_without_a_wall_has_the_usual_depth_of_its_category() -> None:
     depth = category_of("cabinet").depth
     assert front_depth((), MIDDLE, OUTWARD, depth).wall_m is None
     assert front_depth((wall_at(2.5),), MIDDLE, OUTWARD, depth).depth_m == depth.usual
 
 
-def test_a_lining_counts_for_what_stands_before_it_alone() -> None:
+def test_a_wall_lining_counts_only_for_positions_before_its_span() -> None:
     along = float(np.cross([0.0, 0.0, 1.0], OUTWARD) @ MIDDLE)
     before = replace(wall_at(0.55), span_m=(along - 0.2, along + 0.5))
     beside = replace(wall_at(0.55), span_m=(along + 0.2, along + 0.9))
@@ -78,6 +78,6 @@ def test_a_lining_counts_for_what_stands_before_it_alone() -> None:
     assert distances_behind((wall_at(0.63), beside), MIDDLE, OUTWARD) == pytest.approx([0.63])
 
 
-def test_what_reaches_into_a_wall_is_told_in_metres() -> None:
+def test_the_depth_of_points_inside_a_wall_is_in_metres() -> None:
     points = MIDDLE - np.outer([0.2, 0.6], OUTWARD)
     np.testing.assert_allclose(depths_in((wall_at(0.5), wall_at(0.9)), points), [0.1, -0.3])
