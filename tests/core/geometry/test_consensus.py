@@ -45,7 +45,7 @@ def assert_near(fit: SimilarityFit | None, wanted: Similarity3) -> None:
 @pytest.mark.parametrize("wrong_share", [0.0, 0.6, 0.8, 0.9, 0.95])
 @pytest.mark.parametrize("flat", [False, True])
 @pytest.mark.parametrize("seed", range(3))
-def test_the_right_ones_are_found_among_the_wrong(seed: int, flat: bool, wrong_share: float) -> None:
+def test_the_similarity_is_recovered_among_outliers(seed: int, flat: bool, wrong_share: float) -> None:
     source, target, truth = correspondences(seed, 600, wrong_share, flat=flat)
     rng = np.random.default_rng(seed)
     limit = 3 * NOISE_M
@@ -54,12 +54,12 @@ def test_the_right_ones_are_found_among_the_wrong(seed: int, flat: bool, wrong_s
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_twenty_right_ones_suffice_among_a_thousand(seed: int) -> None:
+def test_twenty_inliers_among_a_thousand_suffice(seed: int) -> None:
     source, target, truth = correspondences(seed, 1000, 0.98)
     assert_near(similarity_consensus(source, target, threshold=3 * NOISE_M, rng=np.random.default_rng(0)), truth)
 
 
-def test_more_correspondences_than_are_compared_all_count_in_the_fit() -> None:
+def test_all_correspondences_count_as_inliers_beyond_the_sample_limit() -> None:
     source, target, truth = correspondences(1, 5000, 0.7)
     fit = similarity_consensus(source, target, threshold=3 * NOISE_M, rng=np.random.default_rng(0))
     assert_near(fit, truth)
@@ -67,7 +67,7 @@ def test_more_correspondences_than_are_compared_all_count_in_the_fit() -> None:
     assert fit.inliers.sum() > 0.95 * 1500  # 97 % of a normal error are within three standard deviations of each axis
 
 
-def test_the_larger_of_two_agreements_wins() -> None:
+def test_the_larger_of_two_consensus_sets_wins() -> None:
     """Repeated fronts: a second similarity that half as many correspondences obey."""
     rng = np.random.default_rng(5)
     source = box_surface(400, rng)
@@ -98,14 +98,14 @@ def test_a_tiny_scale_cannot_win_by_collapsing_onto_a_cluster() -> None:
     assert fit.target_from_source.scale == pytest.approx(2.0, rel=0.02)
 
 
-def test_unrelated_points_give_nothing() -> None:
+def test_unrelated_points_give_no_fit() -> None:
     rng = np.random.default_rng(9)
     pair = rng.normal(size=(40, 3)), rng.normal(size=(40, 3))
     assert similarity_consensus(*pair, threshold=0.01, rng=rng, minimum_inliers=8) is None
 
 
 @pytest.mark.parametrize("count", [0, 2, 3])
-def test_too_few_or_coinciding_points_give_nothing(count: int) -> None:
+def test_too_few_or_coinciding_points_give_no_fit(count: int) -> None:
     points = np.ones((count, 3))
     assert similarity_consensus(points, points, threshold=0.01, rng=np.random.default_rng(0)) is None
     assert similarity_consensus(np.ones((9, 3)), np.ones((9, 3)), threshold=0.01, rng=np.random.default_rng(0)) is None

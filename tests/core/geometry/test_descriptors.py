@@ -8,7 +8,7 @@ def unit(rows: list[list[float]]) -> np.ndarray:
     return array / np.linalg.norm(array, axis=1, keepdims=True)
 
 
-def test_only_clear_and_mutual_pairs_are_taken() -> None:
+def test_only_unambiguous_mutual_pairs_are_matched() -> None:
     first = unit([[1, 0, 0], [0, 1, 0], [0.8, 0.1, 0.6], [0, 0, 1]])
     second = unit([[0, 1, 0.02], [1, 0.02, 0], [0.1, 0, 1], [0, 0.1, 1]])
     rows, columns = mutual_pairs(first, second, 0.8)
@@ -17,6 +17,6 @@ def test_only_clear_and_mutual_pairs_are_taken() -> None:
     assert columns.tolist() == [1, 0]
 
 
-def test_with_one_descriptor_nothing_is_clear() -> None:
+def test_a_single_descriptor_gives_no_matches() -> None:
     one = unit([[1, 0, 0]])
     assert [len(found) for found in mutual_pairs(one, unit([[1, 0, 0], [0, 1, 0]]), 0.8)] == [0, 0]

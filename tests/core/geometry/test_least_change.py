@@ -6,20 +6,20 @@ from r2c2r_core.geometry.least_change import least_change
 NONE = np.zeros((0, 2)), np.zeros(0)
 
 
-def test_nothing_changes_where_nothing_is_asked() -> None:
+def test_satisfied_bounds_give_zero_change() -> None:
     np.testing.assert_array_equal(least_change(*NONE, np.array([[1.0, 0.0]]), np.array([-1.0])), [0, 0])
 
 
-def test_the_nearest_point_of_a_half_plane_is_its_foot() -> None:
+def test_the_solution_for_one_bound_is_its_orthogonal_projection() -> None:
     np.testing.assert_allclose(least_change(*NONE, np.array([[3.0, 4.0]]), np.array([10.0])), [1.2, 1.6], atol=1e-12)
 
 
-def test_an_equality_and_a_bound_hold_together() -> None:
+def test_an_equality_and_a_bound_are_both_satisfied() -> None:
     y = least_change(np.array([[1.0, -1.0]]), np.array([1.0]), np.array([[0.0, 1.0]]), np.array([2.0]))
     np.testing.assert_allclose(y, [3, 2], atol=1e-9)
 
 
-def test_no_feasible_point_is_nearer() -> None:
+def test_no_feasible_point_is_closer_than_the_solution() -> None:
     """Against a slow reference: the conditions of Karush, Kuhn and Tucker on random problems."""
     rng = np.random.default_rng(0)
     for _ in range(20):
@@ -36,13 +36,13 @@ def test_no_feasible_point_is_nearer() -> None:
                 assert y @ (other - y) >= -1e-9
 
 
-def test_bounds_that_contradict_each_other_are_refused() -> None:
+def test_contradicting_bounds_raise() -> None:
     with pytest.raises(ValueError, match="contradict"):
         least_change(*NONE, np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([1.0, 1.0]))
 
 
 @pytest.mark.parametrize("far", [1e-3, 1.0, 1e3, 1e5])
-def test_a_far_bound_beside_a_nearly_rigid_one_is_met_all_the_same(far: float) -> None:
+def test_a_distant_bound_is_met_beside_a_nearly_rigid_one(far: float) -> None:
     """Unknowns that cost a thousand times what others do, as a soft bound beside a face."""
     rows = np.array([[5e-3, 5e-3, 1e-5, 0.0], [-5e-3, 5e-3, 0.0, 1e-5]])
     y = least_change(np.zeros((0, 4)), np.zeros(0), rows, np.array([5e-3 * far, -1e-4]))

@@ -11,7 +11,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(5)
 
 
-def test_normal_equations_add_up_to_those_of_all_rows(rng: np.random.Generator) -> None:
+def test_normal_equations_of_parts_sum_to_those_of_all_rows(rng: np.random.Generator) -> None:
     jacobian, residual, weight = rng.normal(size=(9, 3)), rng.normal(size=9), rng.uniform(0.1, 2.0, 9)
     whole = Normal.of(jacobian, residual, weight)
     first, second = (Normal.of(jacobian[part], residual[part], weight[part]) for part in (slice(4), slice(4, None)))
@@ -21,12 +21,12 @@ def test_normal_equations_add_up_to_those_of_all_rows(rng: np.random.Generator) 
     np.testing.assert_allclose((whole - second).step(), first.step(), atol=1e-9)
 
 
-def test_damping_shortens_a_step_and_bounds_one_without_evidence(rng: np.random.Generator) -> None:
+def test_damping_shortens_a_step_and_zeroes_unobserved_parameters(rng: np.random.Generator) -> None:
     normal = Normal.of(np.array([[1.0, 0.0], [2.0, 0.0]]), np.array([-1.0, -2.0]), np.ones(2))
     np.testing.assert_allclose(normal.step(1.0), [5.0 / 6.0, 0.0])
 
 
-def test_the_loss_has_the_slope_and_curvature_that_it_says() -> None:
+def test_slope_and_curvature_of_the_loss_match_finite_differences() -> None:
     scale = np.array([0.5, 2.0, np.inf])
     loss = cauchy_loss(scale)
     at, step = np.array([0.3, 7.0, 4.0]), 1e-5
@@ -38,7 +38,7 @@ def test_the_loss_has_the_slope_and_curvature_that_it_says() -> None:
 
 
 @pytest.mark.parametrize(("kernel", "scale"), [(cauchy, 0.03), (geman_mcclure, 0.15)])
-def test_a_line_is_found_among_outliers(kernel: object, scale: float, rng: np.random.Generator) -> None:
+def test_a_line_is_fitted_among_outliers(kernel: object, scale: float, rng: np.random.Generator) -> None:
     x = rng.uniform(-1.0, 1.0, 400)
     y = 0.3 * x - 0.1 + 0.01 * rng.standard_normal(400)
     wrong = rng.random(400) < 0.3
@@ -51,7 +51,7 @@ def test_a_line_is_found_among_outliers(kernel: object, scale: float, rng: np.ra
     assert (np.linalg.eigvalsh(information) > 0).all()
 
 
-def test_rows_with_several_targets_are_weighed_as_a_whole(rng: np.random.Generator) -> None:
+def test_rows_with_several_targets_get_one_weight(rng: np.random.Generator) -> None:
     z = np.linspace(0.0, 1.0, 50)
     middles = np.column_stack([0.2 * z, -0.1 * z]) + 0.4
     middles[:5, 0] += 0.5

@@ -18,7 +18,7 @@ def bumpy_sphere(rings=60, noise=0.01):
     return (vertices, faces) if meshes.volume(vertices, faces) > 0 else (vertices, faces[:, ::-1])
 
 
-def test_a_box_is_closed_manifold_outward_and_has_its_volume():
+def test_a_box_mesh_is_closed_manifold_and_outward_with_its_volume():
     vertices, faces = meshes.box_mesh(LOW, HIGH)
     assert meshes.is_watertight(vertices, faces)
     assert meshes.is_manifold(vertices, faces)
@@ -27,12 +27,12 @@ def test_a_box_is_closed_manifold_outward_and_has_its_volume():
     assert (outward > 0).all()
 
 
-def test_turning_the_faces_round_makes_the_volume_negative():
+def test_reversed_faces_give_a_negative_volume():
     vertices, faces = meshes.box_mesh(LOW, HIGH)
     assert meshes.volume(vertices, faces[:, ::-1]) == pytest.approx(-6.0)
 
 
-def test_a_missing_face_a_flipped_face_and_a_doubled_face_are_not_watertight():
+def test_missing_flipped_and_duplicate_faces_are_not_watertight():
     vertices, faces = meshes.box_mesh(LOW, HIGH)
     flipped = faces.copy()
     flipped[3] = flipped[3, ::-1]
@@ -41,12 +41,12 @@ def test_a_missing_face_a_flipped_face_and_a_doubled_face_are_not_watertight():
     assert not meshes.is_watertight(vertices, np.concatenate([faces, faces[:1]]))
 
 
-def test_seams_do_not_count_as_holes():
+def test_duplicate_vertices_along_seams_do_not_count_as_holes():
     vertices, faces = meshes.box_mesh(LOW, HIGH)
     assert meshes.is_watertight(vertices[faces].reshape(-1, 3), np.arange(36).reshape(-1, 3))
 
 
-def test_union_and_difference_have_the_volumes_of_the_sets():
+def test_union_and_difference_have_the_expected_volumes():
     slab = meshes.box_mesh(np.array([0.0, 0.0, 0.0]), np.array([1.0, 1.0, 1.0]))
     beside = meshes.box_mesh(np.array([0.5, 0.25, 0.25]), np.array([1.5, 0.75, 0.75]))
     assert meshes.volume(*meshes.unite([slab, beside])) == pytest.approx(1.125)
@@ -55,7 +55,7 @@ def test_union_and_difference_have_the_volumes_of_the_sets():
     assert meshes.is_watertight(*hollowed)
 
 
-def test_simplified_noise_stays_closed_keeps_its_volume_and_obeys_the_limit():
+def test_simplification_keeps_meshes_closed_and_within_the_face_limit():
     vertices, faces = bumpy_sphere()
     simple = meshes.simplify(vertices, faces, 0.005, 3000)
     assert len(faces) > 10_000
@@ -65,13 +65,13 @@ def test_simplified_noise_stays_closed_keeps_its_volume_and_obeys_the_limit():
     assert meshes.volume(*simple) == pytest.approx(4 / 3 * np.pi, rel=0.03)
 
 
-def test_simplifying_an_open_mesh_is_refused():
+def test_simplifying_an_open_mesh_raises():
     vertices, faces = meshes.box_mesh(LOW, HIGH)
     with pytest.raises(ValueError, match="not a closed manifold"):
         meshes.simplify(vertices, faces[1:], 0.01, 100)
 
 
-def test_the_largest_piece_is_kept():
+def test_the_largest_component_is_kept():
     big, small = meshes.box_mesh(LOW, HIGH), meshes.box_mesh(np.array([3.0, 3.0, 3.0]), np.array([3.1, 3.1, 3.1]))
     both = np.concatenate([small[0], big[0]]), np.concatenate([small[1], big[1] + 8])
     vertices, faces = meshes.largest_component(*both)
@@ -79,7 +79,7 @@ def test_the_largest_piece_is_kept():
     assert meshes.volume(vertices, faces) == pytest.approx(6.0)
 
 
-def test_samples_lie_on_the_surface_and_follow_area():
+def test_surface_samples_lie_on_the_mesh_and_follow_face_areas():
     vertices, faces = meshes.box_mesh(LOW, HIGH)
     points, face = meshes.sample_surface(vertices, faces, 4000, np.random.default_rng(0))
     assert meshes.distances_to_mesh(points, vertices, faces).max() < 1e-6

@@ -37,13 +37,13 @@ def test_attributes_are_interpolated_in_perspective() -> None:
     assert np.abs(raster.attributes[seen] - points[seen]).max() < 2e-3
 
 
-def test_triangles_behind_the_camera_leave_no_smear() -> None:
+def test_triangles_crossing_behind_the_camera_are_clipped() -> None:
     vertices, faces = wall([(-1, 1, -2.0), (1, 1, -2.0), (1, 1, 3.0), (-1, 1, 3.0)])  # a floor that passes under the camera
     raster = rasterize(vertices, faces, np.zeros((len(vertices), 3)), camera(), Rigid3())
     assert (raster.depth_m[:64] == 0).all()  # nothing above the horizon
 
 
-def test_a_fused_plane_lies_where_the_depth_says() -> None:
+def test_a_fused_plane_matches_the_depth_and_is_reproducible() -> None:
     vertices, faces = wall([(-2, -2, 1.5), (2, -2, 2.5), (2, 2, 3.5), (-2, 2, 2.5)])
     views = []
     for shift in (-0.1, 0.0, 0.1):

@@ -31,7 +31,7 @@ def test_umeyama_recovers_the_similarity_and_its_inverse(seed: int, flat: bool) 
     np.testing.assert_allclose(backward.matrix, truth.inverse.matrix, atol=1e-6)
 
 
-def test_equations_4_and_5_as_printed_give_the_inverse_rotation() -> None:
+def test_equations_4_and_5_of_the_paper_give_the_inverse_rotation() -> None:
     truth = random_similarity(3)
     p = np.random.default_rng(0).normal(size=(20, 3))
     q = truth.apply(p)
@@ -43,7 +43,7 @@ def test_equations_4_and_5_as_printed_give_the_inverse_rotation() -> None:
     assert angle_deg(umeyama(p, q).rotation, truth.rotation) < 1e-4
 
 
-def test_flat_noisy_fronts_never_come_out_mirrored() -> None:
+def test_flat_noisy_fronts_are_never_fitted_with_a_reflection() -> None:
     rng = np.random.default_rng(1)
     reflections = 0
     for seed in range(60):
@@ -65,18 +65,18 @@ def test_mirrored_clouds_are_not_matched_by_a_reflection() -> None:
     assert np.linalg.norm(fit.apply(source) - source * [-1, 1, 1], axis=1).mean() > 0.2
 
 
-def test_points_on_a_line_fix_no_rotation() -> None:
+def test_collinear_points_raise() -> None:
     line = np.outer(np.linspace(0, 1, 8), [1.0, 2.0, 3.0])
     with pytest.raises(DegenerateFitError):
         umeyama(line, line)
 
 
-def test_a_frozen_scale_stays() -> None:
+def test_a_fixed_scale_is_kept() -> None:
     source = np.random.default_rng(4).normal(size=(30, 3))
     assert umeyama(source, 2.0 * source, scale=1.5).scale == 1.5
 
 
-def test_weights_silence_outliers() -> None:
+def test_zero_weights_exclude_outliers() -> None:
     truth = random_similarity(5)
     source = np.random.default_rng(5).normal(size=(30, 3))
     target = truth.apply(source)
@@ -87,7 +87,7 @@ def test_weights_silence_outliers() -> None:
     np.testing.assert_allclose(shifts[0], truth.translation, atol=1e-7)
 
 
-def test_the_batch_equals_one_by_one() -> None:
+def test_the_batch_fit_equals_single_fits() -> None:
     rng = np.random.default_rng(6)
     source, target = rng.normal(size=(5, 9, 3)), rng.normal(size=(5, 9, 3))
     scales, rotations, shifts = umeyama_batch(source, target)

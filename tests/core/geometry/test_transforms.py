@@ -63,7 +63,7 @@ def is_member(transform: Transform) -> bool:
 
 @every_size
 @every_pair
-def test_a_product_is_in_the_larger_group_and_its_matrix_is_the_product(
+def test_a_product_has_the_larger_group_and_the_product_matrix(
     first: str, second: str, size: float, rng: np.random.Generator
 ) -> None:
     for _ in range(10):
@@ -76,7 +76,7 @@ def test_a_product_is_in_the_larger_group_and_its_matrix_is_the_product(
 
 @every_size
 @every_pair
-def test_applying_a_product_is_applying_one_after_the_other(
+def test_applying_a_product_equals_applying_its_factors_in_turn(
     first: str, second: str, size: float, rng: np.random.Generator
 ) -> None:
     points = rng.normal(size=(7, 3))
@@ -85,7 +85,7 @@ def test_applying_a_product_is_applying_one_after_the_other(
 
 
 @every_group
-def test_points_keep_the_shape_of_their_array(group: str, rng: np.random.Generator) -> None:
+def test_applying_a_transform_keeps_the_array_shape(group: str, rng: np.random.Generator) -> None:
     a, points = GROUPS[group](1.0, rng), rng.normal(size=(4, 5, 3))
     np.testing.assert_allclose(a.apply(points), a.apply(points.reshape(-1, 3)).reshape(4, 5, 3), atol=ATOL)
     np.testing.assert_allclose(a.apply(points[1, 2]), a.apply(points)[1, 2], atol=ATOL)
@@ -102,7 +102,7 @@ def test_products_are_associative(groups: tuple[str, str, str], size: float, rng
 
 @every_size
 @every_group
-def test_the_identity_leaves_a_transform_and_points_as_they_are(group: str, size: float, rng: np.random.Generator) -> None:
+def test_the_identity_leaves_transforms_and_points_unchanged(group: str, size: float, rng: np.random.Generator) -> None:
     a, points = GROUPS[group](size, rng), rng.normal(size=(5, 3))
     for neutral in (Rigid3(), Similarity3(1.0, np.eye(3), np.zeros(3))):
         np.testing.assert_array_equal(neutral.matrix, np.eye(4))
@@ -113,7 +113,7 @@ def test_the_identity_leaves_a_transform_and_points_as_they_are(group: str, size
 
 @every_size
 @every_group
-def test_an_inverse_undoes_from_either_side(group: str, size: float, rng: np.random.Generator) -> None:
+def test_an_inverse_cancels_from_either_side(group: str, size: float, rng: np.random.Generator) -> None:
     for _ in range(10):
         a, points = GROUPS[group](size, rng), rng.normal(size=(5, 3))
         assert type(a.inverse) is type(a)
@@ -125,16 +125,14 @@ def test_an_inverse_undoes_from_either_side(group: str, size: float, rng: np.ran
 
 @every_size
 @every_pair
-def test_the_inverse_of_a_product_is_the_inverses_in_turn(
-    first: str, second: str, size: float, rng: np.random.Generator
-) -> None:
+def test_the_inverse_of_a_product_reverses_the_inverses(first: str, second: str, size: float, rng: np.random.Generator) -> None:
     a, b = GROUPS[first](size, rng), GROUPS[second](size, rng)
     np.testing.assert_allclose(product_of(a, b).inverse.matrix, product_of(b.inverse, a.inverse).matrix, atol=ATOL)
 
 
 @every_group
 @pytest.mark.parametrize("count", [0, 1, 4])
-def test_points_move_as_their_homogeneous_coordinates_do_however_many(group: str, count: int, rng: np.random.Generator) -> None:
+def test_points_move_like_their_homogeneous_coordinates(group: str, count: int, rng: np.random.Generator) -> None:
     a, points = GROUPS[group](1.0, rng), rng.normal(size=(count, 3))
     homogeneous = np.column_stack([points, np.ones(count)]) @ a.matrix.T
     moved = a.apply(points)
@@ -144,7 +142,7 @@ def test_points_move_as_their_homogeneous_coordinates_do_however_many(group: str
 
 
 @every_group
-def test_every_distance_grows_by_the_scale(group: str, rng: np.random.Generator) -> None:
+def test_distances_are_multiplied_by_the_scale(group: str, rng: np.random.Generator) -> None:
     a, points = GROUPS[group](1.0, rng), rng.normal(size=(6, 3))
     before = np.linalg.norm(points[:, None] - points[None], axis=-1)
     moved = a.apply(points)
@@ -152,13 +150,13 @@ def test_every_distance_grows_by_the_scale(group: str, rng: np.random.Generator)
     np.testing.assert_allclose(after, getattr(a, "scale", 1.0) * before, atol=ATOL)
 
 
-def test_directions_turn_with_the_points_and_know_no_translation(rng: np.random.Generator) -> None:
+def test_directions_are_rotated_without_translation(rng: np.random.Generator) -> None:
     a = Rigid3(turned(rng.normal(size=3)), rng.normal(size=3))
     ends = rng.normal(size=(2, 5, 3))
     np.testing.assert_allclose(a.turn(ends[1] - ends[0]), a.apply(ends[1]) - a.apply(ends[0]), atol=ATOL)
 
 
-def test_a_rigid_transform_survives_its_matrix_and_noise_in_it_is_taken_out(rng: np.random.Generator) -> None:
+def test_from_matrix_restores_a_transform_and_removes_noise(rng: np.random.Generator) -> None:
     a = Rigid3(turned(rng.normal(size=3)), rng.normal(size=3))
     np.testing.assert_allclose(Rigid3.from_matrix(a.matrix).matrix, a.matrix, atol=ATOL)
     noisy = a.matrix
@@ -168,7 +166,7 @@ def test_a_rigid_transform_survives_its_matrix_and_noise_in_it_is_taken_out(rng:
     np.testing.assert_allclose(found.rotation, a.rotation, atol=5e-4)  # the noise, three entries of it at once
 
 
-def test_the_nearest_rotation_is_proper_keeps_rotations_and_is_nearer_than_any_other(rng: np.random.Generator) -> None:
+def test_the_nearest_rotation_is_proper_idempotent_and_optimal(rng: np.random.Generator) -> None:
     for _ in range(20):
         matrix = rng.normal(size=(3, 3))  # half of them contain a reflection
         found = nearest_rotation(matrix)
@@ -178,16 +176,14 @@ def test_the_nearest_rotation_is_proper_keeps_rotations_and_is_nearer_than_any_o
         assert np.linalg.norm(found - matrix) <= min(np.linalg.norm(other - matrix) for other in others) + ATOL
 
 
-def test_turns_about_z_add_up_and_follow_the_right_hand() -> None:
+def test_rotations_about_z_add_up_and_are_right_handed() -> None:
     np.testing.assert_allclose(rotation_about_z(np.pi / 2) @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=ATOL)
     for a, b in [(0.3, 0.4), (2.0, -3.0), (1e-9, 1e-9)]:
         np.testing.assert_allclose(rotation_about_z(a) @ rotation_about_z(b), rotation_about_z(a + b), atol=ATOL)
 
 
 @pytest.mark.parametrize("opening_rad", [0.0, 1e-7, 1e-3, 1.0, np.pi - 1e-3, np.pi - 1e-6, np.pi - 1e-9, np.pi])
-def test_the_smallest_rotation_between_directions_takes_one_onto_the_other(
-    opening_rad: float, rng: np.random.Generator
-) -> None:
+def test_rotation_between_maps_one_direction_to_another_without_roll(opening_rad: float, rng: np.random.Generator) -> None:
     for _ in range(10):
         source, aside = np.linalg.qr(rng.normal(size=(3, 2)))[0].T
         target = np.cos(opening_rad) * source + np.sin(opening_rad) * aside
@@ -198,7 +194,7 @@ def test_the_smallest_rotation_between_directions_takes_one_onto_the_other(
         assert angle == pytest.approx(opening_rad, abs=1e-7)  # no roll about the direction; arccos is flat at its ends
 
 
-def test_a_front_faces_where_it_was_told_with_its_left_on_the_left() -> None:
+def test_front_rotation_faces_the_given_direction_and_stays_upright() -> None:
     for yaw in np.linspace(0, 2 * np.pi, 9):
         outward = np.array([np.cos(yaw), np.sin(yaw), 0.4])  # the vertical component is ignored
         rotation = front_rotation(outward)
@@ -207,7 +203,7 @@ def test_a_front_faces_where_it_was_told_with_its_left_on_the_left() -> None:
         np.testing.assert_allclose(rotation @ [0, 0, 1], [0, 0, 1], atol=ATOL)
 
 
-def test_camera_axes_of_the_two_conventions_change_into_each_other_and_back() -> None:
+def test_opencv_and_opengl_camera_axes_convert_both_ways() -> None:
     np.testing.assert_array_equal(CAMERA_CV_FROM_GL @ CAMERA_CV_FROM_GL, np.eye(3))
     np.testing.assert_array_equal(CAMERA_CV_FROM_GL @ [0, 0, -1], [0, 0, 1])  # both look along the viewing direction
     np.testing.assert_array_equal(CAMERA_CV_FROM_GL @ [0, 1, 0], [0, -1, 0])  # up is -y in OpenCV

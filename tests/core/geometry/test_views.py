@@ -31,7 +31,7 @@ def chosen(views: list[MaskView], count: int) -> list[int]:
     return [found.frame_index for found in choose_views(views, count)]
 
 
-def test_each_interval_of_the_recording_gives_its_best_frame() -> None:
+def test_the_best_frame_of_each_interval_is_chosen() -> None:
     views = [view(k, azimuth_deg=0.5 * k, area=2000 if k % 5 == 3 else 1000) for k in reversed(range(100))]
     assert sorted(chosen(views, 10)) == sorted(set(chosen(views, 10)) & {5 * k + 3 for k in range(20)})
     assert len(chosen(views, 10)) == 10
@@ -42,13 +42,13 @@ def test_each_interval_of_the_recording_gives_its_best_frame() -> None:
     [{"left": 0}, {"sharpness": 0.1}, {"left": 560}, {"area": 300}, {"confidence": 0.2}],
     ids=["cropped", "blurred", "aside", "small", "unsure"],
 )
-def test_large_whole_sharp_central_and_sure_views_win(worse: dict[str, float]) -> None:
+def test_large_uncropped_sharp_central_and_confident_views_win(worse: dict[str, float]) -> None:
     assert chosen([view(0, **worse), view(1)], 1) == [1]  # type: ignore[arg-type]
     scores = view_scores([view(0, **worse), view(1)])  # type: ignore[arg-type]
     assert scores[0] < scores[1] <= 1
 
 
-def test_views_are_spread_over_angles_though_the_camera_lingered() -> None:
+def test_views_are_spread_over_angles_despite_a_lingering_camera() -> None:
     """Fifty frames from one place, ten on the way to another: intervals of time alone would take most from the first."""
     views = [view(k) for k in range(50)] + [view(50 + k, azimuth_deg=9 * k) for k in range(10)]
     frames = chosen(views, 4)
@@ -58,29 +58,29 @@ def test_views_are_spread_over_angles_though_the_camera_lingered() -> None:
     assert min(np.diff(azimuths)) >= 9  # one viewpoint is used once
 
 
-def test_the_first_is_the_best_of_all() -> None:
+def test_the_first_chosen_view_is_the_best() -> None:
     views = [view(k, azimuth_deg=3 * k, area=1000 + 10 * (k == 17)) for k in range(30)]
     assert chosen(views, 5)[0] == 17
 
 
-def test_the_choice_does_not_depend_on_the_order_the_views_come_in() -> None:
+def test_the_choice_does_not_depend_on_view_order() -> None:
     views = [view(k, azimuth_deg=7 * k % 90, area=1000 + 37 * k % 11, sharpness=float(k % 13)) for k in range(60)]
     assert chosen(views, 8) == chosen(views[::-1], 8)
 
 
-def test_no_more_views_than_there_are_and_none_without_the_object() -> None:
+def test_only_available_views_that_show_the_object_are_chosen() -> None:
     assert sorted(chosen([view(0), view(5)], 20)) == [0, 5]
     assert chosen([view(0, area=0)], 5) == []
 
 
-def test_cropped_means_touching_the_border() -> None:
+def test_masks_touching_the_image_border_are_cropped() -> None:
     assert not is_cropped(view(0).mask)
     assert is_cropped(view(0, left=1).mask)
     assert is_cropped(view(0, left=600).mask)
     assert is_cropped(view(0, top=440).mask)
 
 
-def test_a_pulled_drawer_stands_open_but_a_handle_and_a_side_do_not() -> None:
+def test_open_drawers_and_doors_are_detected_but_not_handles_and_sides() -> None:
     rng = np.random.default_rng(0)
     front = rng.normal(0, 0.01, 900)
     assert not stands_open(np.concatenate([front, rng.normal(0.045, 0.005, 100)]))  # its handle
