@@ -33,7 +33,7 @@ def turned(vertices: np.ndarray, degrees: float) -> np.ndarray:
 
 @pytest.mark.parametrize("degrees", [0.0, 2.0])
 @pytest.mark.parametrize("sunk_m", [0.005, 0.007, 0.012])
-def test_the_frame_of_a_shaker_door_is_its_front_however_large_the_panel(sunk_m: float, degrees: float) -> None:
+def test_the_front_of_a_shaker_door_is_its_frame(sunk_m: float, degrees: float) -> None:
     vertices, faces = shaker(sunk_m)
     vertices = turned(vertices, degrees)
     found = find_front(vertices, faces)
@@ -43,7 +43,7 @@ def test_the_frame_of_a_shaker_door_is_its_front_however_large_the_panel(sunk_m:
     np.testing.assert_allclose(found.corners, corners, atol=1.5e-3)  # accuracy of the samples' edge, where no vertex is nearer
 
 
-def test_noise_on_the_surface_moves_the_front_by_less_than_itself() -> None:
+def test_surface_noise_moves_the_front_by_less_than_1_mm() -> None:
     from trimesh.remesh import subdivide_to_size
 
     vertices, faces = shaker(0.012)
@@ -55,14 +55,14 @@ def test_noise_on_the_surface_moves_the_front_by_less_than_itself() -> None:
     assert np.abs(np.ptp(found.corners, axis=0)[[0, 2]] - [WIDTH, HEIGHT]).max() < 6e-3
 
 
-def test_what_looks_nowhere_forwards_has_no_front() -> None:
+def test_a_mesh_without_forward_facing_surface_has_no_front() -> None:
     assert find_front(*box_mesh(np.zeros(3), np.array([1.0, 1e-4, 1.0]))) is not None
     vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     assert find_front(vertices, np.array([[0, 1, 2]])) is None
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_sliver_along_an_edge_of_the_front_belongs_to_it(seed: int) -> None:
+def test_a_coplanar_strip_along_the_edge_belongs_to_the_front(seed: int) -> None:
     # As after a cut: a strip of the same plane, in separate faces; most of the surface is elsewhere
     x, y, top = 0.3, -4.0, 1.7
     body = block((-x, y, 0.0), (x, -y, top))

@@ -14,7 +14,7 @@ from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_un
 CABINET = Unit("a", "cabinet", (0.3, 0.2, 0.5), (0.6, 0.58, 0.7), yaw=0.4, handle=Handle(0.24, 0.2))
 
 
-def test_a_mesh_whose_fit_fails_leaves_its_primitive_and_the_others_dressed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_mesh_fit_falls_back_to_the_primitive_of_that_object_only(monkeypatch: pytest.MonkeyPatch) -> None:
     face_outwards = stage.face_outwards
 
     def facing(vertices: np.ndarray, *further: object, **settings: object) -> object:
@@ -66,7 +66,7 @@ def panel_extent(mesh: TexturedMesh, item: SceneObject) -> tuple[np.ndarray, np.
 
 @pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (1.08, 0.9, 0.94)])
 @pytest.mark.parametrize("category", ["cabinet", "drawer", "double_door_cabinet", "wall_cabinet", "dishwasher", "refrigerator"])
-def test_front_corners_coincide_within_a_millimetre(category: str, stretch: Stretch) -> None:
+def test_front_corners_of_mesh_and_primitive_agree_within_1_mm(category: str, stretch: Stretch) -> None:
     size = (0.6, 0.33, 0.7) if category == "wall_cabinet" else (0.6, 0.58, 0.7)
     handle = Handle(0, 0.31, length=0.3, vertical=False) if category == "dishwasher" else Handle(0.24, 0.2)
     item = dressed(Unit("a", category, (0.3, 0.2, 0.9), size, yaw=0.4, handle=handle), stretch=stretch)
@@ -81,7 +81,7 @@ def test_front_corners_coincide_within_a_millimetre(category: str, stretch: Stre
 
 
 @pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (1.08, 0.9, 0.94)])
-def test_nothing_is_mirrored_and_every_part_is_wound_outwards(stretch: Stretch) -> None:
+def test_fitted_parts_are_watertight_outward_and_not_mirrored(stretch: Stretch) -> None:
     item = dressed(CABINET, stretch=stretch)
     for index in range(2):
         mesh = in_object(item, index)
@@ -93,7 +93,7 @@ def test_nothing_is_mirrored_and_every_part_is_wound_outwards(stretch: Stretch) 
 
 
 @pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (1.1, 0.9, 0.92)])
-def test_a_handle_keeps_its_shape(stretch: Stretch) -> None:
+def test_a_handle_keeps_its_size_under_the_panel_map(stretch: Stretch) -> None:
     """Extents of the placed handle, which the stretch made, survive the panel's map."""
     item = dressed(CABINET, stretch=stretch)
     mesh = in_object(item, 1)
@@ -117,7 +117,7 @@ def colour_at(mesh: TexturedMesh, point: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (1.08, 0.9, 0.94)])
-def test_a_mark_on_the_front_stays_in_place(stretch: Stretch) -> None:
+def test_a_texture_mark_on_the_front_stays_in_place(stretch: Stretch) -> None:
     """The red mark lies in the upper left, at 1/8 of the width from the left and of the height from the top."""
     item = dressed(CABINET, stretch=stretch, subdivide=1)
     width, _, height = item.dimensions_m
@@ -135,13 +135,13 @@ def test_a_cabinet_is_hollow_behind_its_door_and_a_drawer_has_a_tray() -> None:
     assert np.ptp(drawer.vertices[:, 1]) > 0.4
 
 
-def test_two_doors_part_at_the_seam() -> None:
+def test_two_doors_are_separated_at_the_seam() -> None:
     item = dressed(Unit("p", "double_door_cabinet", (0, 0, 0.5), (0.8, 0.58, 0.7)))
     left, right = in_object(item, 1), in_object(item, 2)
     assert 0.001 < right.vertices[:, 0].min() - left.vertices[:, 0].max() < 0.005
 
 
-def test_a_leaning_mesh_is_set_upright() -> None:
+def test_a_leaning_mesh_is_fitted_within_1_mm() -> None:
     from r2c2r_core.geometry.transforms import Similarity3, rotation_between
 
     track, placement, asset = placed_unit(CABINET, np.random.default_rng(0))
@@ -155,7 +155,7 @@ def test_a_leaning_mesh_is_set_upright() -> None:
     assert item.warp_residual_m <= 1e-3
 
 
-def test_a_mesh_with_its_handle_behind_is_turned_half_round() -> None:
+def test_a_mesh_with_its_handle_at_the_back_is_rotated_by_180_degrees() -> None:
     from dataclasses import replace
 
     from r2c2r_core.geometry.transforms import Rigid3, Similarity3, rotation_about_z
@@ -172,21 +172,21 @@ def test_a_mesh_with_its_handle_behind_is_turned_half_round() -> None:
     assert mesh.vertices[:, 1].min() < -item.dimensions_m[1] / 2 - 0.03
 
 
-def test_an_open_surface_is_cut_and_backed_with_panels() -> None:
+def test_an_open_surface_mesh_is_fitted_to_the_front() -> None:
     item = dressed(CABINET, broken=True, subdivide=1)
     assert item.links[1].visual is not None
     assert item.warp_residual_m is not None
     assert item.warp_residual_m < 2e-3
 
 
-def test_a_mesh_of_another_shape_leaves_the_primitive_and_says_so() -> None:
+def test_a_mesh_of_another_shape_falls_back_to_the_primitive() -> None:
     item = dressed(CABINET, stretch=(1.8, 1.0, 1.0))
     assert item.links[1].visual is None
     assert item.warp_residual_m is None
     assert any("primitive is shown" in w for w in item.warnings)
 
 
-def test_a_thing_wears_its_placed_mesh() -> None:
+def test_a_thing_gets_its_placed_mesh_as_visual() -> None:
     unit = Unit("b", "bottle", (0.3, 0.1, 0.12), (0.08, 0.1, 0.24), yaw=0.5, kind="thing")
     item = dressed(unit)
     mesh = in_object(item, 0)
@@ -195,7 +195,7 @@ def test_a_thing_wears_its_placed_mesh() -> None:
     np.testing.assert_allclose(np.ptp(hull, axis=0), item.dimensions_m, atol=2e-3)
 
 
-def test_a_thing_that_a_person_turned_turns_with_its_mesh() -> None:
+def test_the_mesh_of_a_thing_follows_a_pose_set_by_a_person() -> None:
     from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
     from r2c2r_core.model.inputs import ObjectOverride
 
@@ -209,7 +209,7 @@ def test_a_thing_that_a_person_turned_turns_with_its_mesh() -> None:
     np.testing.assert_allclose(np.ptp(pose.inverse.apply(world), axis=0), unit.size, atol=2e-3)
 
 
-def test_the_papers_map_can_be_chosen_and_keeps_the_depth_that_ours_fits() -> None:
+def test_the_paper_map_keeps_the_mesh_depth_that_the_default_map_fits() -> None:
     """Eq. 16 has w* = w: a mesh that is not as deep as its primitive stays short of the back."""
     track, placement, asset = placed_unit(CABINET, np.random.default_rng(0), stretch=(1.0, 0.8, 1.0))
     scene = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())

@@ -14,7 +14,7 @@ def box(handle: bool = False) -> np.ndarray:
     return np.concatenate([CORNERS, back, np.asarray(tip)])
 
 
-def test_a_parallelogram_goes_onto_a_rectangle_exactly_with_its_depth_kept() -> None:
+def test_a_parallelogram_maps_exactly_to_a_rectangle_keeping_depth() -> None:
     """Six unknowns do for a parallelogram."""
     sheared = CORNERS + np.outer([0.02, 0.02, -0.02, -0.02], [1.0, 0.0, 0.0])
     fitted = fit_paper_map(sheared, CORNERS)
@@ -25,7 +25,7 @@ def test_a_parallelogram_goes_onto_a_rectangle_exactly_with_its_depth_kept() -> 
     np.testing.assert_allclose(fitted.apply(behind)[:, 1], CORNERS[:, 1] + 0.4, atol=1e-12)
 
 
-def test_corners_that_form_no_parallelogram_are_missed() -> None:
+def test_corners_that_form_no_parallelogram_leave_a_residual() -> None:
     """2 cm of noise on the corners leaves about a centimetre: eight equations, six unknowns."""
     rng = np.random.default_rng(0)
     noise = [CORNERS + rng.normal(0, 0.02, (4, 3)) * [1, 0, 1] for _ in range(300)]
@@ -34,7 +34,7 @@ def test_corners_that_form_no_parallelogram_are_missed() -> None:
 
 
 @pytest.mark.parametrize("handle", [False, True])
-def test_the_vertex_of_the_highest_score_of_each_quadrant_is_a_corner_or_a_handle_tip(handle: bool) -> None:
+def test_paper_corners_are_quadrant_extremes_including_handle_tips(handle: bool) -> None:
     found = paper_corners(box(handle))
     assert found is not None
     np.testing.assert_allclose(found[1:], CORNERS[1:])

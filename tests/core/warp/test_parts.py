@@ -42,7 +42,7 @@ def cut(item: SceneObject) -> dict[str, TexturedMesh]:
 
 
 @pytest.mark.parametrize("category", ["cabinet", "drawer", "double_door_cabinet", "drawer_stack", "fridge_freezer"])
-def test_a_unit_whose_back_board_is_called_rear_is_cut_the_same(category: str) -> None:
+def test_renaming_boards_does_not_change_the_cut(category: str) -> None:
     item = unit(category)
     named, other = cut(item), cut(renamed(item))
     assert named.keys() == other.keys()
@@ -51,7 +51,7 @@ def test_a_unit_whose_back_board_is_called_rear_is_cut_the_same(category: str) -
         np.testing.assert_allclose(np.ptp(other[link].vertices, axis=0), np.ptp(mesh.vertices, axis=0), atol=1e-9)
 
 
-def test_the_inside_lies_between_the_boards() -> None:
+def test_the_cavity_lies_between_the_boards() -> None:
     item = unit("cabinet")
     x, y, z = item.dimensions_m / 2
     low, high = cavity(item)
@@ -61,7 +61,7 @@ def test_the_inside_lies_between_the_boards() -> None:
 
 
 @pytest.mark.parametrize("axis_sign", [(0, -1), (0, 1), (1, 1), (2, -1), (2, 1)])
-def test_a_body_that_lacks_an_outer_board_has_no_inside_to_hollow(axis_sign: tuple[int, int]) -> None:
+def test_a_body_without_an_outer_board_has_no_cavity(axis_sign: tuple[int, int]) -> None:
     item = unit("cabinet")
     axis, sign = axis_sign
     base = item.links[0]
@@ -75,12 +75,12 @@ def test_a_body_that_lacks_an_outer_board_has_no_inside_to_hollow(axis_sign: tup
     assert (low > high).all()
 
 
-def test_a_solid_slab_has_no_inside() -> None:
+def test_a_solid_slab_has_no_cavity() -> None:
     low, high = cavity(unit("counter", (1.2, 0.6, 0.04)))
     assert (low > high).any()
 
 
-def test_a_door_and_its_body_share_no_material_and_the_body_is_hollow() -> None:
+def test_door_and_hollow_body_do_not_overlap() -> None:
     item = unit("cabinet")
     base, door = (cut(item)[link.name] for link in item.links)
     assert door.vertices[:, 1].max() < base.vertices[:, 1].min() + 1e-9
@@ -92,7 +92,7 @@ def test_a_door_and_its_body_share_no_material_and_the_body_is_hollow() -> None:
     assert 0 < volume(base.vertices, base.faces) < boards + 0.004  # and its shelf
 
 
-def test_fronts_reach_to_the_units_edge_and_stop_at_their_seam() -> None:
+def test_front_regions_reach_the_unit_edge_and_stop_at_the_seam() -> None:
     item = unit("double_door_cabinet")
     left, right = (front_region(item, link) for link in item.links[1:])
     assert left.low[0] < -1 < 1 < right.high[0]  # the mesh's own edge, wherever it ends
@@ -101,7 +101,7 @@ def test_fronts_reach_to_the_units_edge_and_stop_at_their_seam() -> None:
     assert left.high[1] == pytest.approx(-item.dimensions_m[1] / 2 + FRONT_M, abs=1e-9)
 
 
-def test_what_is_left_of_a_sliding_leafs_mesh_lies_clear_of_the_other_leafs_track() -> None:
+def test_the_body_of_a_sliding_leaf_stays_clear_of_the_other_track() -> None:
     """Front leaf and rear leaf 26 mm behind it: a body drawn over the whole box would stand where the rear one slides."""
     front = Unit("front", "sliding_door", (0.0, 0.0, 0.5), (0.6, 0.58, 0.7))
     rear = Unit("rear", "sliding_door", (0.58, 0.013, 0.5), (0.56, 0.554, 0.7), handle=Handle(0.2, 0.0, out=0.035))
