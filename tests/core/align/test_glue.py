@@ -88,7 +88,7 @@ def test_keypoints_lie_in_the_mask_are_limited_and_follow_a_shift(folders, pictu
 
 @pytest.mark.parametrize("name", MATCHERS)
 def test_stored_keypoints_match_like_the_forward_call_of_the_model(folders, name):
-    """Whole canvas, one image each: what `forward` finds with its own detection is what we find with kept keypoints."""
+    """On full-size images, `forward` with its own detection gives the same matches as stored keypoints."""
     matcher = MATCHERS[name](weights=folders[name])
     rng = np.random.default_rng(3)
     side = glue.CANVAS_PX
@@ -161,7 +161,7 @@ def test_a_folder_without_the_weights_raises_a_one_line_error(tmp_path, name):
 
 
 def test_a_photo_is_matched_against_rendered_views_and_lifted_to_points(folders, bench):
-    """The stage's own path: keypoints of photo and renders, pairs, points on the mesh and in the world."""
+    """The same path as in the stage: keypoints of photo and renders, pairs, points on the mesh and in the world."""
     mesh, capture, track = bench.free_box(textured=True)
     asset, _ = bench.as_candidate(mesh, 0)
     config = AlignConfig(match_views=8, match_photos=2)

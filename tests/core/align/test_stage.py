@@ -137,7 +137,7 @@ def test_a_chair_is_placed(bench: Any) -> None:
 
 
 @pytest.mark.skipif(not MUG.exists(), reason="the YCB mug is not on this machine")
-def test_a_mug_is_placed_by_its_handle(bench: Any) -> None:
+def test_a_mug_with_a_handle_is_placed(bench: Any) -> None:
     thing, capture, track = bench.film_mug(MUG)
     asset, truth = bench.as_candidate(thing, 7)
     assert_placed(Placer("sift", LIGHT)(capture, track, asset), truth, asset)

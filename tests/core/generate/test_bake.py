@@ -54,7 +54,7 @@ def test_door_and_unseen_sides_have_the_colour_of_the_door(front_scene):
 
 
 def test_an_unseen_side_of_the_handle_has_the_handle_colour(front_scene):
-    """From above, the bar shows its own colour though only its front was well seen."""
+    """From above, the bar has its own colour although only its front was well observed."""
     shape, atlas, picture = pictured(front_scene, box_shape, lambda v, f: planar_atlas(v, f, 768, 0.0012))
     above = Rigid3(np.array([[1.0, 0, 0], [0, -1, 0], [0, 0, -1]]), np.array([0.0, 0.0, 2.0]))  # looks along -Z
     image, _ = seen_from(shape, atlas, picture, above)
@@ -80,7 +80,7 @@ def test_the_parts_of_a_chair_keep_their_colours(chair_scene):
 
 
 def test_frames_with_an_open_front_are_not_used_for_texture(front_scene):
-    """Pulled or swung out by too little to show in depth, too."""
+    """Even where the front is open by too little to show in depth."""
     capture, track = front_scene
     opened = motion(dict.fromkeys(sorted(track.masks)[::2], 0.02))
     pool = gather_evidence(capture, replace(track, motions=(opened,)), 20).pool

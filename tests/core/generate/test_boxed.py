@@ -69,7 +69,7 @@ def test_a_front_without_a_wall_gets_the_usual_depth_of_its_category(front_scene
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_the_reported_depth_of_a_candidate_is_that_of_its_mesh(front_scene, seed):
-    """c0 goes to the wall, the last two are as deep as others that are sold."""
+    """c0 reaches the wall; the last two have catalogue depths."""
     evidence = gather_evidence(*front_scene, 6)
     cards = [Completion().measured(evidence, f"c{k}", seed) for k in range(4)]
     for shape, _, told in cards:

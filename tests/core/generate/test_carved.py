@@ -75,7 +75,7 @@ def test_a_carton_seen_from_above_is_not_extended_backwards(elevation_deg):
 
 
 def test_block_votes_equal_per_voxel_votes(chair_scene):
-    """The votes of a grid by blocks against those of every voxel, where they decide anything."""
+    """Votes computed by blocks of a grid agree with those of every voxel wherever they matter."""
     evidence = gather_evidence(*chair_scene, 10)
     variation = whole_pool(evidence)
     shape, voxel_m, truncation = (30, 30, 50), 0.02, 0.03
@@ -105,7 +105,7 @@ def test_votes_of_more_than_255_frames_are_counted(bottle_scene):
 
 
 def test_a_thin_shell_has_an_unseen_error_and_a_carved_solid_has_none():
-    """Of a body 0.2 m deep and 0.2 m high only front and top are seen: a shell 4 cm thick leaves half of it out."""
+    """Only front and top of a body 0.2 m deep and high are observed: a shell 4 cm thick leaves out half of it."""
     evidence = gather_evidence(*carton_scene(np.array([0.3, 0.2, 0.2]), arc_deg=30.0, elevation_deg=20.0, yaw_rad=0.0), 6)
     everything = whole_pool(evidence)
     family = {h.assumes: h for h in carved_family(evidence, everything, is_round=False)}

@@ -125,7 +125,7 @@ def test_open_and_very_large_meshes_are_penalised():
 
 
 def test_a_deviating_hypothesis_is_not_penalised_and_is_reported():
-    """Two hypotheses of one depth and one of another: what the scan says of the unseen side decides."""
+    """Two hypotheses have one depth and one has another: the evidence for the unseen side decides."""
     guesses = [replace(candidate(f"c{k}", 0.6, 0.5, 0.8), assumes="to the wall") for k in range(3)]
     guesses[2] = replace(candidate("c2", 1.0, 0.9, 0.3), assumes="shallower")
     far = [
@@ -169,7 +169,7 @@ def test_the_reason_gives_proportions_only_where_they_decide():
 
 
 def test_the_reason_gives_only_the_rank_where_the_fit_decides():
-    """The rank is that of the fit: what nobody saw has no part in it."""
+    """The rank is that of the fit alone, without the unseen side."""
     reason = choose_candidate(guesses({"unseen_error_m": 0.01}, {"mask_iou": 0.8})).reason
     assert "rank 1 of 2 by fit" in reason
     assert "but" not in reason
@@ -188,7 +188,7 @@ def test_carved_shapes_need_a_clearly_better_fit_than_clean_shapes():
 
 
 def test_the_reason_does_not_compare_an_upload_by_fit():
-    """The upload's shape is in the middle; nothing is said of who fits better than it."""
+    """The upload has the medoid shape; without alignment, its fit is unknown."""
     upload = candidate("upload0", 0.62, 0.52, 0.78, iou=None, generator="upload")
     others = [candidate("c0", 0.60, 0.50, 0.80, iou=0.9), candidate("c1", 0.66, 0.56, 0.74, iou=0.9)]
     reason = choose_candidate([*others, upload]).reason
@@ -199,7 +199,7 @@ def test_the_reason_does_not_compare_an_upload_by_fit():
 
 @pytest.mark.parametrize(("gain", "chosen"), [(0.015, "c0"), (0.04, "c1")])
 def test_among_equal_hypotheses_the_draw_from_most_frames_is_preferred(gain, chosen):
-    """Two draws of a mug differed by 0.017 of IoU; the one from a third of the frames was the worse mesh to place."""
+    """Two draws of a mug differed by an IoU of 0.017; the mesh from a third of the frames was the worse one to place."""
     whole, part = (candidate(f"c{k}", 0.6, 0.5, 0.8, 0.70 + k * gain) for k in (0, 1))
     whole = replace(whole, assumes="round and hollow", frames=tuple(range(30)))
     part = replace(part, assumes="round and hollow", frames=tuple(range(10)))

@@ -30,7 +30,7 @@ def shape_of(scene):
     ],
 )
 def test_the_depth_of_a_carton_is_estimated_from_its_outlines(arc_deg, elevation_deg):
-    """The segmenter's box is three times too deep: it took the wall's shine for the carton's back."""
+    """The box from segmentation is three times too deep: it includes depth of the wall."""
     shape = shape_of(carton_scene(SIZE, arc_deg=arc_deg, elevation_deg=elevation_deg, yaw_rad=0.3))
     assert shape.parameters["boxed"] == 1.0
     assert shape.parameters["depth_sigma_m"] < 0.006
@@ -40,7 +40,7 @@ def test_the_depth_of_a_carton_is_estimated_from_its_outlines(arc_deg, elevation
 
 
 def test_a_carton_seen_only_from_the_front_has_an_uncertain_depth():
-    """Cameras on one axis, level with its middle: any depth would look the same."""
+    """All cameras are on one axis through the middle of the carton: any depth would look the same."""
     shape = shape_of(carton_scene(SIZE, arc_deg=0.0, elevation_deg=0.0, yaw_rad=0.0))
     assert shape.parameters["depth_sigma_m"] > 0.1 * np.ptp(shape.vertices_local[:, 1])
     assert np.ptp(shape.vertices_local, axis=0)[[0, 2]] == pytest.approx(SIZE[[0, 2]], abs=0.008)

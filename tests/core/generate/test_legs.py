@@ -85,7 +85,7 @@ def test_bars_found_in_depth_are_legs_with_free_space_between(carving, everythin
 
 
 def test_legs_missing_from_all_masks_are_found_in_depth(carving, everything):
-    """Dark legs before a dark floor: colour cuts them off at the seat, depth does not."""
+    """With dark legs before a dark floor, colour segmentation cuts the legs off at the seat; depth does not."""
     local_from_world = carving.seen.world_from_local.inverse
 
     def on_legs(points):
@@ -109,7 +109,7 @@ def test_legs_missing_from_all_masks_are_found_in_depth(carving, everything):
 
 
 def test_a_table_with_legless_masks_gets_its_legs_from_depth():
-    """Thick square legs, some seen over a corner; the top alone would be a box in mid-air."""
+    """The legs are thick and square, some seen over a corner; without them, the table top would float."""
     evidence = gather_evidence(*scenes.table_scene(), 10)
     views = tuple(legless(view, 0.67) for view in evidence.pool)
     evidence, everything = replace(evidence, pool=views), replace(whole_pool(evidence), views=views)
@@ -124,7 +124,7 @@ def test_a_table_with_legless_masks_gets_its_legs_from_depth():
 
 
 def test_unseen_legs_are_not_placed_in_observed_free_space(carving, everything):
-    """Free space at both right corners; further in nobody looked."""
+    """Both right corners are observed to be free; the space further in is unobserved."""
     free = np.where(carving.grid.centres()[:, 0] > 0.15, np.float32(0.05), np.float32(-np.inf))
     local_from_world = carving.seen.world_from_local.inverse
     blind = [
@@ -146,7 +146,7 @@ def test_empty_corners_without_any_seen_leg_give_no_support(carving, everything)
 
 @pytest.mark.parametrize("scene", [scenes.storage_bench_scene, scenes.desk_scene])
 def test_closed_furniture_gets_no_legs(scene):
-    """Round a corner, a closed side seen at a slant is as slender as a post; between the corners it is not."""
+    """Near a corner, a closed side seen obliquely is as slender as a post; between the corners it is not."""
     evidence = gather_evidence(*scene(), 10)
     everything = whole_pool(evidence)
     assert category_of(evidence.track.category).on_legs

@@ -125,7 +125,7 @@ def test_scattered_tiny_triangles_are_rejected():
 
 
 def test_a_remeshed_body_keeps_its_proportions():
-    """A third of a side is gone, its walls stay: the surface is put back where it was, not a cell further out."""
+    """Part of a side is missing: the remeshed surface lies at the original one, not a voxel further out."""
     box = trimesh.creation.box((1.0, 0.3, 0.3)).subdivide().subdivide().subdivide()
     pinned = trimesh.creation.box((0.9, 0.2, 0.02))  # a shelf that pierces the side: edges with four faces after joining
     hole = (box.triangles_center[:, 0] > 0.3) & (box.face_normals[:, 2] > 0.9) & (box.triangles_center[:, 1] > 0)

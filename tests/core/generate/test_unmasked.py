@@ -14,7 +14,7 @@ BODY = Revolution(np.zeros(2), np.array([0.9, 1.09, 1.13, 1.15]), np.array([0.04
 
 
 def test_a_cap_missing_from_the_masks_is_found_in_depth(bottle_scene):
-    """The bottle ends at 1.18 m; the masks, and so the profile, at 1.15 m."""
+    """The bottle ends at 1.18 m, the masks and thus the profile at 1.15 m."""
     evidence = gather_evidence(*bottle_scene, 10)
     found = with_unmasked_top(BODY, evidence.pool, Rigid3())
     assert found.heights_m[-1] == pytest.approx(1.18, abs=0.005)
@@ -29,7 +29,7 @@ def test_a_complete_profile_is_not_extended_where_the_wall_shows_above(bottle_sc
 
 
 def test_a_profile_is_not_extended_when_depth_above_never_ends(bottle_scene):
-    """Depth as near as the axis all the way up belongs to something else."""
+    """Depth at the distance of the axis all the way up belongs to another object."""
     evidence = gather_evidence(*bottle_scene, 10)
     above = np.array([[0.0, 0.0, 1.16]])
     near = []

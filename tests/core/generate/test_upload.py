@@ -83,7 +83,7 @@ def test_a_small_hole_is_filled_with_a_warning(tmp_path):
 
 
 def test_an_open_shell_is_remeshed_with_a_warning_and_keeps_its_colours(tmp_path):
-    """A bucket without thickness: no hole filling closes it into what it is, so it gets walls."""
+    """Hole filling cannot close a bucket without wall thickness into a bucket, so it gets walls."""
     mesh = trimesh.creation.cylinder(radius=0.5, height=1.0, sections=48)
     sheet = mesh.submesh([np.flatnonzero(mesh.face_normals[:, 2] < 0.5)], append=True)
     handle = trimesh.creation.box((0.02, 1.0, 0.3))  # crosses the wall: edges with more than two faces after joining

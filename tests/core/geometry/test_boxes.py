@@ -61,7 +61,7 @@ def test_penetration_along_an_axis_equals_the_overlap(gap: float) -> None:
 
 
 def test_crossed_bars_are_separated_by_an_edge_cross_product_axis() -> None:
-    """Two bars at right angles, turned so that only a cross product of edges separates them."""
+    """Two perpendicular bars, rotated so that only a cross product of edges separates them."""
     rolled = np.array([[1, 0, 0], [0, 0.5**0.5, -(0.5**0.5)], [0, 0.5**0.5, 0.5**0.5]])
     bar = np.array([1.0, 0.1, 0.1])
     a = boxes(np.zeros(3), rolled, bar)

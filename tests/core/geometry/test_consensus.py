@@ -68,7 +68,7 @@ def test_all_correspondences_count_as_inliers_beyond_the_sample_limit() -> None:
 
 
 def test_the_larger_of_two_consensus_sets_wins() -> None:
-    """Repeated fronts: a second similarity that half as many correspondences obey."""
+    """As with repeated fronts, half as many correspondences agree with a second similarity."""
     rng = np.random.default_rng(5)
     source = box_surface(400, rng)
     large, small = random_similarity(rng), random_similarity(rng)

@@ -20,7 +20,7 @@ def test_an_equality_and_a_bound_are_both_satisfied() -> None:
 
 
 def test_no_feasible_point_is_closer_than_the_solution() -> None:
-    """Against a slow reference: the conditions of Karush, Kuhn and Tucker on random problems."""
+    """Checked on random problems against other feasible points, by the optimality condition of a projection."""
     rng = np.random.default_rng(0)
     for _ in range(20):
         equal, rows = rng.normal(size=(2, 8)), rng.normal(size=(12, 8))
@@ -43,7 +43,7 @@ def test_contradicting_bounds_raise() -> None:
 
 @pytest.mark.parametrize("far", [1e-3, 1.0, 1e3, 1e5])
 def test_a_distant_bound_is_met_beside_a_nearly_rigid_one(far: float) -> None:
-    """Unknowns that cost a thousand times what others do, as a soft bound beside a face."""
+    """The costs of the unknowns differ by large factors, as for a soft bound beside a face."""
     rows = np.array([[5e-3, 5e-3, 1e-5, 0.0], [-5e-3, 5e-3, 0.0, 1e-5]])
     y = least_change(np.zeros((0, 4)), np.zeros(0), rows, np.array([5e-3 * far, -1e-4]))
     assert (rows @ y >= [5e-3 * far * (1 - 1e-9), -1e-4 - 1e-9 * far]).all()

@@ -49,7 +49,7 @@ def test_large_uncropped_sharp_central_and_confident_views_win(worse: dict[str, 
 
 
 def test_views_are_spread_over_angles_despite_a_lingering_camera() -> None:
-    """Fifty frames from one place, ten on the way to another: intervals of time alone would take most from the first."""
+    """Fifty frames from one place and ten on the way to another: equal time intervals would favour the first place."""
     views = [view(k) for k in range(50)] + [view(50 + k, azimuth_deg=9 * k) for k in range(10)]
     frames = chosen(views, 4)
     azimuths = sorted(9 * (k - 50) if k >= 50 else 0 for k in frames)

@@ -114,7 +114,7 @@ def test_every_category_is_complete_and_consistent(category: Category) -> None:
 
 @pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
 def test_all_names_of_a_category_are_built_and_exported_the_same(category: Category) -> None:
-    """The object goes through the stages as text: what they make of it must not depend on the word."""
+    """Stages pass the category as text: their results must not depend on the synonym typed."""
     first, entry = exported_as(category.name, category)
     for name in category.names[1:]:
         item, said = exported_as(name, category)
@@ -169,7 +169,7 @@ def test_all_names_of_a_category_are_segmented_and_measured_the_same(
     ],
 )
 def test_names_resolve_to_one_category_kind_opening_and_depth(typed: str, kind: str, opens: str, depth_m: float) -> None:
-    """Names that were cut as a blob of 0.2 m, as one drawer or one door, or given an oven's depth, by one table or another."""
+    """These names once had different kinds, joints or depths in the tables of different stages."""
     category = category_of(typed)
     assert (category.kind, category.opens, category.depth.usual) == (kind, opens, depth_m)
     joints = built_as(typed, category).joints

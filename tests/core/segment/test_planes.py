@@ -76,7 +76,7 @@ def test_horizontal_and_back_facing_surfaces_are_ignored() -> None:
     assert find_planes(front(), CAMERAS * [1, -1, 1]) == ()
 
 
-def test_fronts_8_cm_apart_in_depth_are_two_planes_with_the_larger_first() -> None:
+def test_fronts_with_8_cm_depth_offset_are_two_planes_larger_first() -> None:
     regions = find_planes(together(front(width=0.5), front(x=0.7, y=0.08, width=0.9)), CAMERAS)
     assert [round(float(r.world_from_plane.translation[1]), 3) for r in regions] == [0.08, 0.0]
 

@@ -90,7 +90,7 @@ def test_an_object_whose_construction_fails_is_left_out(monkeypatch: pytest.Monk
         built(*[unit for unit in units if unit.name == "bottle"])
 
 
-def test_no_contacts_at_rest(kitchen: ArticulatedScene) -> None:
+def test_the_kitchen_has_no_contacts_at_rest(kitchen: ArticulatedScene) -> None:
     assert deepest_contact(compile_scene(kitchen)) < 5e-4
 
 
@@ -130,7 +130,7 @@ def test_joint_types_follow_the_category(kitchen: ArticulatedScene) -> None:
 
 
 def test_positive_joint_values_open_outwards(kitchen: ArticulatedScene) -> None:
-    """The middle of each moving part goes to -y of the object when its joint goes positive."""
+    """The middle of each moving part moves towards -y of the object when its joint value increases."""
     for item in kitchen.objects:
         for joint in item.joints:
             link = next(k for k in item.links if k.name == joint.child)
@@ -214,7 +214,7 @@ def test_a_wall_beside_the_hinge_limits_the_door() -> None:
     ],
 )
 def test_drawer_travel_comes_from_the_filmed_opening(seen_m: float | None, stop_seen: bool, source: str) -> None:
-    """Where it was seen to stop; else it opens at least so far; more than its depth is an error."""
+    """An observed stop sets the limit; without a stop it is a lower bound; travel beyond the unit's depth is ignored."""
     track, placement, asset = placed_unit(Unit("a", "drawer", (0, 0, 0.5), (0.5, 0.58, 0.3)), np.random.default_rng(0))
     if seen_m is not None:
         track = replace(track, motions=(motion({4: 0.05, 5: seen_m}, stop_seen=stop_seen),))
@@ -229,7 +229,7 @@ def test_drawer_travel_comes_from_the_filmed_opening(seen_m: float | None, stop_
 
 @pytest.mark.parametrize(("way", "stop_seen"), [("right", True), ("right", False), ("top", True), ("bottom", True)])
 def test_hinge_and_limit_come_from_the_filmed_opening_of_a_door(way: str, stop_seen: bool) -> None:
-    """Whatever its handle says."""
+    """Independently of its handle."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
@@ -247,7 +247,7 @@ def test_hinge_and_limit_come_from_the_filmed_opening_of_a_door(way: str, stop_s
 
 @pytest.mark.parametrize(("way", "opens_by_itself"), [("top", True), ("bottom", False), ("right", False)])
 def test_friction_keeps_doors_closed_against_gravity(way: str, opens_by_itself: bool) -> None:
-    """A leaf hung on its upper outer edge has its weight behind the hinge."""
+    """A leaf hinged at its upper outer edge has its centre of mass behind the hinge."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
@@ -262,7 +262,7 @@ def test_friction_keeps_doors_closed_against_gravity(way: str, opens_by_itself: 
 
 
 def test_a_hinge_filmed_far_from_the_edge_keeps_its_filmed_position() -> None:
-    """Within what both are known to, the edge is taken: doors then clear their neighbours."""
+    """Within the uncertainty of both, the edge is used, so that doors clear their neighbours."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
@@ -293,7 +293,7 @@ def test_a_hinge_filmed_near_the_edge_is_placed_so_that_the_leaf_clears() -> Non
 
 
 def test_inner_depth_and_shelves_observed_behind_a_front_are_built() -> None:
-    """What was not stays the category's, and says so."""
+    """Unobserved values are the category's defaults and are marked as such."""
     made = {}
     for category, way, inside in (
         ("cabinet", "left", Inside(depth_m=0.45, shelves_m=(0.2, 0.41))),
@@ -397,7 +397,7 @@ def test_a_drawer_filmed_below_refrigerator_doors_is_built(category: str, width_
 
 
 def test_a_filmed_opening_is_ignored_when_a_person_moves_the_hinge() -> None:
-    """A person hung it on the left: the angle that the scan shows was about the right edge."""
+    """A person moved the hinge to the left; the angle in the scan was measured about the right edge."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     track = replace(track, motions=(motion({5: 1.8}, "right", stop_seen=True),))
@@ -416,7 +416,7 @@ def test_hinge_confidence_is_higher_with_a_handle_near_the_edge() -> None:
 
 
 def test_a_handle_determines_the_hinge_despite_a_blocking_neighbour() -> None:
-    """Without a handle the door is hung so that it opens; a handle is seen, and a neighbour may be measured wrong."""
+    """Without a handle the hinge is on the side that opens; a handle is observed, a neighbour may be measured wrong."""
     block = Unit("block", "counter", (0.25, -0.43, 0.5), (0.06, 0.15, 0.7), kind="thing")
     sides = []
     for handle in (None, Handle(0.24, 0.2)):
@@ -426,7 +426,7 @@ def test_a_handle_determines_the_hinge_despite_a_blocking_neighbour() -> None:
 
 
 def test_a_wall_that_barely_touches_the_door_edge_does_not_block_it() -> None:
-    """The free edge of a thick door passes 2 mm beyond its closed place: less than a wall is known to."""
+    """The free edge of a thick door passes 2 mm beyond its closed position, less than the uncertainty of a wall."""
     wall = Wall(normal=np.array([1.0, 0.0, 0.0]), offset_m=-0.3, area_m2=6.0)
     fridge = Unit("f", "fridge", (0, 0, 0.9), (0.6, 0.6, 1.8), handle=Handle(-0.24, 0.2), kind="appliance")
     joint = built(fridge, walls=(wall,)).objects[0].joints[0]

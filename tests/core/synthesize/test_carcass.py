@@ -94,7 +94,7 @@ def test_a_drawer_keeps_part_of_its_tray_inside_at_full_travel() -> None:
 @needs_scene_synthesizer
 @every_plan
 def test_own_boards_match_those_of_scene_synthesizer(plan: CarcassPlan) -> None:
-    """The same outer boards, fronts and travel; its pair has its bottom in two halves, its trays' boards overlap."""
+    """Outer boards, fronts and travel are equal; Scene Synthesizer splits the bottom of a pair, and its tray boards overlap."""
     ours, theirs = Boards().panels(plan), CARCASSES.load("scene-synthesizer").panels(plan)
     for role in ("carcass", "inner", "front"):
         assert solid_m3(of_role(ours, role)) == pytest.approx(solid_m3(of_role(theirs, role)), abs=1e-9)
@@ -151,7 +151,7 @@ def closure(requirements: list[str]) -> set[str]:
 
 
 def test_an_observed_inner_depth_thins_the_front_unless_it_does_not_fit() -> None:
-    """A machine's door is no thicker than what its clear depth leaves."""
+    """The door of an appliance is no thicker than its clear depth allows."""
     machine = CarcassPlan(dimensions_m=np.array([0.6, 0.62, 1.8]), fronts=("door",), front_m=0.05)
     seen, too_deep = replace(machine, inner_depth_m=0.59), replace(machine, inner_depth_m=0.7)
     assert (machine.keeps_depth, seen.keeps_depth, too_deep.keeps_depth) == (False, True, False)

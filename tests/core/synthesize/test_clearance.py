@@ -94,7 +94,7 @@ def test_travel_is_full_without_obstacles_or_with_movable_ones() -> None:
 
 
 def test_a_wall_beside_the_hinge_limits_the_opening_angle() -> None:
-    """Hinged left with a wall a little way out: the door's far edge passes it at the angle that plane geometry says."""
+    """For a left hinge with a wall 10 cm beside it, the door's far edge hits the wall at the angle of plane geometry."""
     door = unit("cabinet")
     hinge_x = float(door.joints[0].origin_object[0])
     assert hinge_x < 0

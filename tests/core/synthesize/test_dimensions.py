@@ -120,7 +120,7 @@ def test_the_depth_of_a_round_thing_is_inferred_without_a_warning() -> None:
 
 @pytest.mark.parametrize("turn_deg", [12.0, 40.0])
 def test_a_round_thing_takes_the_yaw_of_its_box_and_a_carton_keeps_its_own(turn_deg: float) -> None:
-    """A turned carton keeps its own axes."""
+    """A rotated carton keeps its own axes."""
     track, placement, asset = placed_unit(CARTON, np.random.default_rng(0))
     at = placement.world_from_mesh
     turned = Similarity3(at.scale, rotation_about_z(np.radians(turn_deg)) @ at.rotation, at.translation)

@@ -93,7 +93,7 @@ def test_two_leaves_of_one_unit_are_aligned_in_height() -> None:
 
 
 def test_a_rear_leaf_cut_to_its_panel_is_extended_to_full_size() -> None:
-    """Its stile of 6 cm and its upper rail of 8 cm left out: the door in front shows both."""
+    """The cut leaves out the stile of 6 cm and the upper rail of 8 cm; the front leaf has both."""
     x, y, z = REAR.centre
     width, depth, height = REAR.size
     low = replace(REAR, centre=(x + 0.03, y, z - 0.04), size=(width - 0.06, depth, height - 0.08))
@@ -110,7 +110,7 @@ def test_a_rear_leaf_cut_to_its_panel_is_extended_to_full_size() -> None:
 
 
 def test_a_front_leaf_cut_too_wide_widens_the_rear_leaf_by_at_most_5_cm() -> None:
-    """7 cm of the unit beside it taken in at its free edge: no two leaves cover each other by 11 cm."""
+    """The cut includes 7 cm of the adjacent unit at the free edge; two leaves never overlap by 11 cm."""
     x, y, z = FRONT.centre
     wide = replace(FRONT, centre=(x - 0.035, y, z), size=(WIDTH_M + 0.07, *FRONT.size[1:]))
     scene = built(wide, REAR)
@@ -159,7 +159,7 @@ def test_a_leaf_size_set_by_a_person_is_kept() -> None:
 
 
 def test_the_middle_of_three_leaves_slides_away_from_its_pull() -> None:
-    """Front, rear, front: each outer one has one way, and the rear one is as wide as they are."""
+    """Front, rear, front: each outer leaf slides inwards, and the rear leaf is as wide as they are."""
     step = WIDTH_M - OVERLAP_M
     seen = WIDTH_M - 2 * OVERLAP_M
     units = [

@@ -53,7 +53,7 @@ def test_a_run_almost_parallel_to_the_room_is_aligned_with_it() -> None:
 
 
 def test_a_free_standing_appliance_keeps_its_yaw_unless_nearly_aligned() -> None:
-    """A degree off the run it was put that way; half a degree is what measuring its front can be wrong by."""
+    """About a degree of difference to the run is intended; half a degree is within the measurement error of its front."""
     for turned_deg, expected_deg in ((4.0, 4.0), (0.9, 0.9), (0.5, 0.0)):
         yaw = float(np.deg2rad(turned_deg))
         units = [
@@ -100,7 +100,7 @@ def test_an_unusually_large_move_gives_a_warning() -> None:
 
 
 def test_an_implausible_object_is_an_outlier_and_moves_nothing() -> None:
-    """Three fronts that each took in a part of the run, over two cabinets and a refrigerator that are right."""
+    """A front that includes several units of the run overlaps two cabinets and a refrigerator that are correct."""
     right = [
         Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7)),
         Unit("b", "cabinet", (0.503, 0, 0.5), (0.5, 0.58, 0.7)),
@@ -176,7 +176,7 @@ def test_a_wall_cabinet_stays_at_its_measured_height() -> None:
 
 
 def test_noisy_edges_of_a_run_snap_to_shared_lines_and_seams() -> None:
-    """Edges off by 3 mm each: tops and bottoms become level, gaps 3 mm, and widths no worse than they were measured."""
+    """With 3 mm of noise per edge, tops and bottoms become level, gaps 3 mm, and widths no less accurate than measured."""
     rng = np.random.default_rng(5)
     noisy = []
     for i in range(5):
@@ -194,7 +194,7 @@ def test_noisy_edges_of_a_run_snap_to_shared_lines_and_seams() -> None:
 
 
 def test_a_run_that_sags_along_its_length_is_levelled() -> None:
-    """A degree of roll: each unit 9 mm lower than the one before, 27 mm in all."""
+    """A degree of roll makes each unit 9 mm lower than the one before, 27 mm in all."""
     units = [Unit(f"d{i}", "cabinet", (0.503 * i, 0, 0.5 - 0.009 * i), (0.5, 0.58, 0.7)) for i in range(4)]
     layout = arranged(*units, manhattan=0.0)
     assert np.ptp([o.world_from_object.translation[2] for o in layout.objects]) < 1e-6
@@ -210,7 +210,7 @@ def test_a_shorter_neighbour_keeps_its_own_height() -> None:
 
 
 def test_a_thing_beside_a_step_does_not_overlap_the_step() -> None:
-    """Its support lies lower than the box it partly stands over, which carries too little of it to be its support."""
+    """The support is lower than the step that the mug partly overhangs, which is too small a part to support the mug."""
     layout = arranged(
         Unit("step", "counter", (0.0, 0, 0.9), (0.6, 0.6, 0.04), kind="thing"),
         Unit("mug", "mug", (0.335, 0, 0.962), (0.1, 0.1, 0.1), kind="thing"),

@@ -54,7 +54,7 @@ def test_two_marks_rescale_the_measured_states() -> None:
 
 
 def test_a_contradicting_mark_changes_only_its_own_frame() -> None:
-    """One frame was misread: the others are as they were measured."""
+    """Only one frame was measured wrong: the others keep their values."""
     found = measured({0: 0.0, 3: 0.0, 5: 1.4, 8: 0.9})
     assert values(as_marked(found, {5: 0.0}, HINGE, Rigid3())) == {0: 0.0, 3: 0.0, 5: 0.0, 8: 0.9}
     odd = as_marked(measured({0: 0.1, 5: 1.0, 8: 0.6}), {0: 0.0, 5: 0.9, 8: 0.0}, HINGE, Rigid3())
@@ -62,7 +62,7 @@ def test_a_contradicting_mark_changes_only_its_own_frame() -> None:
 
 
 def test_an_open_mark_on_a_closed_frame_shifts_all_states() -> None:
-    """It stood open from the start: what was taken for its closed state was not."""
+    """The leaf was open from the start: the state measured as closed was an open one."""
     found = measured({0: 0.0, 3: 0.0, 5: 0.7})
     moved = as_marked(found, {0: 0.5}, HINGE, Rigid3())
     assert values(moved) == {0: 0.5, 3: pytest.approx(0.5, abs=0.005), 5: pytest.approx(1.2, abs=0.005)}

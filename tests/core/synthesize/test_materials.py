@@ -57,7 +57,7 @@ def test_joint_friction_and_damping_allow_opening_with_one_hand(name: str) -> No
 
 @pytest.mark.parametrize("edge_m", [0.01, 0.09, 0.5])
 def test_the_mass_of_a_thing_is_scaled_into_its_usual_range(edge_m: float) -> None:
-    """A mug whose colliders are a lump, a sliver or right: scaled into the range, inertia with it."""
+    """The mass of a mug with too large, too small or correct colliders is scaled into the range, and inertia with it."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * edge_m
     raw = inertial_of_pieces([ConvexPiece(name="lump", vertices_link=corners)], materials.MUG.density_kg_m3)
     usual = materials.MUG.weight_kg

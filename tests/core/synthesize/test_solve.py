@@ -92,7 +92,7 @@ def test_objects_are_not_pushed_below_the_floor_or_further_below() -> None:
 
 
 def test_sizes_change_by_no_more_than_the_measurement_error() -> None:
-    """Three units in the room of two and nine tenths: they are pushed apart, not crushed."""
+    """Three units in too little space are moved, not shrunk."""
     items = [item(name, (x, 0, 0.5)) for name, x in (("a", 0.0), ("b", 0.56), ("c", 1.12))]
     found = solved(items, [], [(0, 1), (1, 2)], GAP_M)
     for before, after in zip(items, found, strict=True):

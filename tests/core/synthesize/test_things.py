@@ -24,7 +24,7 @@ def test_a_dense_hull_is_simplified_without_leaving_the_shape() -> None:
 
 
 def test_colliders_of_a_tube_keep_its_bore_open() -> None:
-    """A tube's hull would fill its bore; its pieces must not."""
+    """A single convex hull of the tube would fill its bore; the pieces must not."""
     mesh = annulus(r_min=0.04, r_max=0.05, height=0.1, sections=24)
     pieces = convex_pieces(solid(mesh), mesh.extents)
     assert 4 <= len(pieces) <= 16

@@ -94,7 +94,7 @@ def test_fitted_parts_are_watertight_outward_and_not_mirrored(stretch: Stretch) 
 
 @pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (1.1, 0.9, 0.92)])
 def test_a_handle_keeps_its_size_under_the_panel_map(stretch: Stretch) -> None:
-    """Extents of the placed handle, which the stretch made, survive the panel's map."""
+    """The extents of the stretched handle are preserved by the map of the panel."""
     item = dressed(CABINET, stretch=stretch)
     mesh = in_object(item, 1)
     tips = mesh.vertices[mesh.vertices[:, 1] < -item.dimensions_m[1] / 2 - 0.01]
@@ -210,7 +210,7 @@ def test_the_mesh_of_a_thing_follows_a_pose_set_by_a_person() -> None:
 
 
 def test_the_paper_map_keeps_the_mesh_depth_that_the_default_map_fits() -> None:
-    """Eq. 16 has w* = w: a mesh that is not as deep as its primitive stays short of the back."""
+    """Eq. 16 has w* = w: a mesh shallower than its primitive does not reach the back."""
     track, placement, asset = placed_unit(CABINET, np.random.default_rng(0), stretch=(1.0, 0.8, 1.0))
     scene = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
     ours = fit_meshes(scene, [track], [placement], [asset], WarpConfig()).objects[0]

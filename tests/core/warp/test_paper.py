@@ -15,7 +15,7 @@ def box(handle: bool = False) -> np.ndarray:
 
 
 def test_a_parallelogram_maps_exactly_to_a_rectangle_keeping_depth() -> None:
-    """Six unknowns do for a parallelogram."""
+    """Six unknowns suffice for a parallelogram."""
     sheared = CORNERS + np.outer([0.02, 0.02, -0.02, -0.02], [1.0, 0.0, 0.0])
     fitted = fit_paper_map(sheared, CORNERS)
     assert fitted is not None
@@ -26,7 +26,7 @@ def test_a_parallelogram_maps_exactly_to_a_rectangle_keeping_depth() -> None:
 
 
 def test_corners_that_form_no_parallelogram_leave_a_residual() -> None:
-    """2 cm of noise on the corners leaves about a centimetre: eight equations, six unknowns."""
+    """2 cm of noise on the corners leaves a residual of about a centimetre: eight equations, six unknowns."""
     rng = np.random.default_rng(0)
     noise = [CORNERS + rng.normal(0, 0.02, (4, 3)) * [1, 0, 1] for _ in range(300)]
     missed = [fit_paper_map(source, CORNERS).residual_m for source in noise]  # type: ignore[union-attr]

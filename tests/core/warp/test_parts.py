@@ -102,7 +102,7 @@ def test_front_regions_reach_the_unit_edge_and_stop_at_the_seam() -> None:
 
 
 def test_the_body_of_a_sliding_leaf_stays_clear_of_the_other_track() -> None:
-    """Front leaf and rear leaf 26 mm behind it: a body drawn over the whole box would stand where the rear one slides."""
+    """The rear leaf is 26 mm behind the front one: a body filling the whole box would block the rear leaf's track."""
     front = Unit("front", "sliding_door", (0.0, 0.0, 0.5), (0.6, 0.58, 0.7))
     rear = Unit("rear", "sliding_door", (0.58, 0.013, 0.5), (0.56, 0.554, 0.7), handle=Handle(0.2, 0.0, out=0.035))
     made = zip(*(placed_unit(each, np.random.default_rng(0)) for each in (front, rear)), strict=True)

@@ -20,7 +20,7 @@ def lines(count: int, length: int, scores: dict[int, float]) -> Evidence:
 
 
 def test_depth_above_a_refrigerator_does_not_outvote_its_clearer_top_edge() -> None:
-    """The worktop or shadow gap over it lies in its plane, and ends in a line that is nearly as clear."""
+    """The worktop or shadow gap above lies in the same plane and ends in a line that is nearly as clear."""
     seen = np.zeros((400, 160), bool)
     seen[ABOVE:BOTTOM, LEFT:RIGHT] = True
     run = SimpleNamespace(
@@ -49,7 +49,7 @@ def corners(cell: Any) -> list[float]:
 
 
 def test_wall_lines_behind_the_front_plane_are_not_edges_of_a_microwave() -> None:
-    """Its left and upper edge are fainter than where the wall's tiles end, and the larger size is the more usual one."""
+    """The microwave's left and upper edges are fainter than the ends of the wall's tiles, and the larger size is more usual."""
     run = on_a_wall({40: 4.0, 70: 3.0, 150: 4.0}, {30: 4.0, 60: 3.0, 104: 4.0}, (slice(62, 104), slice(72, 150)))
     past = np.zeros_like(run.seen)
     past[:60] = past[:, :70] = True

@@ -19,7 +19,7 @@ def candidates(places_px: list[float], contrasts: list[float]) -> EdgeView:
 
 
 def test_a_clear_distant_line_does_not_outweigh_a_nearby_edge() -> None:
-    """White keys beside the dark edge of a door: what is clear enough to be an edge is no more an edge when it is clearer."""
+    """White keys beside the dark edge of a door: above a threshold, more contrast does not make a line a likelier edge."""
     found = associate(np.zeros(1), candidates([0.5, 10.0], [12.0, 60.0]), 0.005)
     assert found.target_px[0] == pytest.approx(0.5, abs=0.4)
 

@@ -39,7 +39,7 @@ def test_top_and_back_converge_from_a_wrong_line_and_the_wall_depth() -> None:
 
 
 def test_different_depths_are_compared_by_edges_at_the_finest_spread(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At the widest one, a shadow on the wall behind is the likelier back."""
+    """At the widest spread, a shadow on the wall behind is the likelier back."""
 
     def annealed(_: Evidence, __: list[Photo], ___: Rigid3, box: np.ndarray, spreads_m: tuple[float, ...]) -> Solution:
         coarse = spreads_m == tuned(Params).spreads_m[:1]
@@ -53,7 +53,7 @@ def test_different_depths_are_compared_by_edges_at_the_finest_spread(monkeypatch
 
 @pytest.mark.parametrize("turn_deg", [1.4, -1.1])
 def test_photo_edges_correct_yaw_and_sides_of_the_box(turn_deg: float) -> None:
-    """And where its front and sides are, from a guess a centimetre off."""
+    """Front and sides too, from an initial guess that is a centimetre off."""
     turn, start = np.radians(turn_deg), TRUE.copy()
     start[[LEFT, RIGHT]] = LEFT_M + 0.004, RIGHT_M - 0.004
     found = solved(start, [photo(eye) for eye in EYES], Rigid3(rotation_about_z(turn), np.array([0.006, 0.004, 0.0])))
@@ -84,7 +84,7 @@ def test_occluded_edges_do_not_move_the_box() -> None:
 
 @pytest.mark.parametrize("off_m", [0.045, -0.02])
 def test_a_lower_edge_near_the_support_snaps_to_the_support(off_m: float) -> None:
-    """The line taken for its lower edge is that of its window, or a seam of the worktop."""
+    """The line mistaken for the lower edge is that of the window or a seam of the worktop."""
     start = TRUE.copy()
     start[BOTTOM] = TRUE[BOTTOM] + off_m
     assert solved(start, [], support_m=float(TRUE[BOTTOM])).box[BOTTOM] == pytest.approx(TRUE[BOTTOM], abs=0.008)
@@ -118,7 +118,7 @@ def test_an_edge_without_depth_beside_it_stays_in_place() -> None:
 
 @pytest.mark.parametrize("turn_deg", [-4.0, 0.0, 3.0])
 def test_depth_of_a_side_determines_the_yaw_of_a_mostly_glass_appliance(turn_deg: float) -> None:
-    """A strip of keys and the right side, 3 mm rough; no photographs."""
+    """Depth on a strip of keys and on the right side, with 3 mm of noise; no photographs."""
     rng, turn = np.random.default_rng(1), np.radians(turn_deg)
     keys = np.column_stack([rng.uniform(0.15, 0.25, 40), np.zeros(40), rng.uniform(-0.15, 0.15, 40)])
     side = np.column_stack([np.full(100, 0.25), rng.uniform(0.03, 0.35, 100), rng.uniform(-0.15, 0.15, 100)])
@@ -132,7 +132,7 @@ def test_depth_of_a_side_determines_the_yaw_of_a_mostly_glass_appliance(turn_deg
 
 
 def test_the_covariance_covers_centre_yaw_and_sizes() -> None:
-    """By perturbing the parameters: the box of a turned front, 1 mm and 1 mrad."""
+    """Compared with finite differences, for the box of a rotated front."""
     box = np.array([0.3, -0.2, 0.4, 0.05, 0.5, -0.1, 0.4])
     world_from_front = Rigid3(rotation_about_z(0.7), np.array([1.0, 2.0, 0.5]))
 

@@ -36,7 +36,7 @@ def test_sides_without_depth_past_them_have_no_rear_edge(scene: Scene, monkeypat
 
 @pytest.mark.parametrize(("wall_m", "ends"), [(0.30, False), (0.36, True)])
 def test_a_side_that_ends_at_the_wall_has_no_rear_edge(wall_m: float, ends: bool) -> None:
-    """A refrigerator stands against the wall: rays beyond its side meet the wall where that begins."""
+    """For a refrigerator against the wall, rays beyond its side hit the wall where the side ends."""
     y = np.arange(-0.2, 0.40, 0.001)
     noise = np.random.default_rng(0).normal(0, 0.002, len(y))
     found = _change_point(y, np.where(y < 0.30, 0.0, wall_m - y) + noise)

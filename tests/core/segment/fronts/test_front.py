@@ -38,7 +38,7 @@ def test_one_click_measures_a_door_within_3_mm(session: GeometricSession, boxes:
     assert np.sign(panel.handle.centre[0]) == (-1 if name == "door_b" else 1)
 
 
-def test_refined_front_edges_exclude_the_rails_of_a_face_frame(
+def test_refined_front_edges_pass_through_clear_of_rails(
     session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def halved(contrast: Contrast, panel: Cell, cut: Cell, cells: Sequence[Cell], cell_m: float) -> Cell:
@@ -52,7 +52,7 @@ def test_refined_front_edges_exclude_the_rails_of_a_face_frame(
     assert panel.height_m == pytest.approx((TOP_M - BOTTOM_M) / 2, abs=3e-3)
 
 
-def test_the_refined_upper_edge_of_a_front_is_evenly_framed(
+def test_refined_front_edges_pass_through_evenly_framed(
     session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def lowered(contrast: Contrast, relief: Relief, refined: Refined, cell_m: float) -> Cell:
@@ -208,7 +208,7 @@ def two_doors(capture: Capture) -> list[ObjectPrompt]:
 
 
 def test_a_click_just_past_the_edge_selects_the_front(session: GeometricSession, boxes: Boxes) -> None:
-    """Under it is a strip that no door is as low as: the plinth's shadow, or the gap below the worktop."""
+    """The click hits a strip lower than any door: the plinth's shadow, or the gap below the worktop."""
     left, width = DOORS["door_a"]
     panel = session.find(prompt("a", "cabinet", click_on(boxes[0], (left + 0.2, FRONT_Y, TOP_M + 0.008), 60))).panel()
     assert panel is not None

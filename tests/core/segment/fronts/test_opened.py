@@ -73,7 +73,7 @@ def assert_hinge_and_angle(filmed: Filmed, closed_frame: int, from_frame: int) -
 
 
 def test_a_click_on_an_open_drawer_selects_its_closed_front(drawn_out: Filmed) -> None:
-    """The same click on a front, where it is closed and where it stands open for a while."""
+    """Clicks on the same front in a frame where it is closed and in one where it is open."""
     capture, _, session = drawn_out
     closed, opened = (
         session.track(prompt("drawer_mid", "drawer", click_on(capture, (1.5, y, 0.5), frame))).front
@@ -99,7 +99,7 @@ def test_a_mostly_open_door_is_found_from_an_open_or_a_closed_click(swung_deg: f
 
 
 def test_an_open_drawer_gets_its_front_at_the_closed_position(drawn_out: Filmed) -> None:
-    """For half of the recording it is a board in the room, on a plane of its own."""
+    """For half of the recording the drawer front is a board in the room, on a separate plane."""
     capture, _, session = drawn_out
     drawer = prompt("drawer_mid", "drawer", click_on(capture, (1.5, FRONT_Y - OUT_M, 0.5), 110))
     track = session.track(drawer)

@@ -56,7 +56,7 @@ def test_clicked_frames_are_returned_first_starting_with_the_last() -> None:
 
 @MOST_FAMILIES
 def test_frames_after_the_click_match_the_reference_propagation_loop(family: Family) -> None:
-    """`propagate_in_video_iterator` holds the whole video and forgets nothing; forgetting must not change an answer."""
+    """`propagate_in_video_iterator` keeps the whole video in memory; dropping old frames must not change the masks."""
     model, count = tiny(family), 24  # more than the 16 frames of pointers and 7 of memories that it attends to
     session = model.session()
     session.processed_frames = {k: model.pixels(image(k)) for k in range(count)}

@@ -95,7 +95,7 @@ def test_true_masks_of_a_thing_give_its_box(session: GeometricSession, boxes: Bo
 
 
 def test_a_mask_leak_over_a_depth_edge_is_removed(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
-    """In one frame of three the mask grows over what stands behind the carton."""
+    """In one frame of three the mask grows over the background of the carton."""
 
     def leaking(position: int, mask: np.ndarray) -> np.ndarray:
         return mask if position % 3 else _moved(mask, -30) | mask
@@ -167,7 +167,7 @@ def test_a_nonexistent_frame_is_rejected(session: GeometricSession, boxes: Boxes
 
 
 def test_the_real_model_class_runs_with_random_weights(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
-    """Random masks say nothing, but every call is the real one: RGB-sized masks, one a frame, in the protocol's order."""
+    """Random masks mean nothing, but all calls are real: RGB-sized masks, one per frame, in the order of the protocol."""
     learned = opened(session, tiny(SAM2), least_area_px=0)
     found = list(learned.stream(carton))
     assert [frame for frame, _, _ in found][:5] == [60, 70, 50, 80, 40]

@@ -91,7 +91,7 @@ def test_a_depth_step_is_an_edge_only_where_the_network_allows_one() -> None:
 
 @pytest.mark.parametrize(("before_it", "found"), [(False, 105), (True, 100)])
 def test_a_depth_end_moves_the_edge_only_if_depth_continues_beyond(before_it: bool, found: int) -> None:
-    """It ends at 100; the network thinks an edge likelier at 105, as it is, than there, and possible at both."""
+    """Depth ends at 100; the network finds an edge likelier at 105 than at 100, and possible at both."""
     count, raised = np.zeros((140, 200)), np.zeros((140, 200))
     count[:, :100] = 10
     if before_it:  # a worktop's edge protrudes beyond

@@ -43,7 +43,7 @@ def test_an_edge_follows_the_colour_change_where_depth_ends_3_cm_short() -> None
 
 
 def test_a_black_door_ends_at_its_cut_above_an_equally_black_plinth() -> None:
-    """The plinth's own light begins 25 mm lower: where depth sees nothing, that would be the door's edge."""
+    """The plinth gets brighter 25 mm lower: without depth, that would be the door's edge."""
     black, lit = (12, 12, 14), (60, 60, 64)
     image, cut = mosaic((PANEL, black), (Cell(60, 300, 260, 340), black), (Cell(60, 310, 260, 340), lit)), PANEL
     assert edges(image, cut, cut)[3] == pytest.approx(310, abs=EDGE_CELLS)
@@ -79,7 +79,7 @@ def test_a_cut_10_mm_outside_the_panel_moves_to_the_panel_edge() -> None:
 
 
 def test_a_faint_gap_wins_over_the_clearer_end_of_the_face_frame() -> None:
-    """The gap round an inset front shows less than the end of the face frame, 20 mm on, against a wall."""
+    """The gap around an inset front has less contrast than the end of the face frame against the wall, 20 mm further."""
     framed = mosaic((Cell(52, 60, 260, 300), BLUE), (Cell(59, 60, 60, 300), (55, 80, 105)), background=WALL)
     assert edges(framed, Cell(57, 60, 260, 300), Cell(52, 60, 260, 300))[0] == pytest.approx(60, abs=EDGE_CELLS)
 
@@ -123,7 +123,7 @@ def test_the_top_face_of_a_panel_below_a_wide_gap_is_excluded() -> None:
 
 
 def test_a_shadow_under_a_white_worktop_is_not_taken_for_a_gap() -> None:
-    """It fades from 5 to 30 mm below, as light from a room does."""
+    """The shadow fades from 5 to 30 mm below the worktop, as under room light."""
     white, shade = (178, 178, 172), np.interp(np.arange(20), [2, 12], [0.66, 1.0])
     image = np.full((360, 320, 3), white, np.float64)
     image[60:80, 60:260] *= shade[:, None, None] ** (1 / 2.2)

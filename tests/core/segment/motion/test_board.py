@@ -30,7 +30,7 @@ class OnePhoto:
 
 
 def test_a_hand_on_a_handle_is_excluded_from_the_mask_of_the_open_front() -> None:
-    """It stands no further before the face than a handle does: depth alone keeps it."""
+    """The hand protrudes no more than a handle does: depth alone would keep it in the mask."""
     opened = OpenLeaf(leaf=LEAF.at(joint("out").pose(HELD_M)), movement="out", out_m=HELD_M)
     place = opened.leaf.world_from_front
     pose = look_at(place.apply(np.array([0.3, -1.5, 0.4])), place.translation)

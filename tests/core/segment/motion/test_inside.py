@@ -20,7 +20,7 @@ def test_inner_depth_is_measured_from_the_rear_board_of_an_open_unit() -> None:
 
 
 def test_a_row_of_jars_is_not_taken_for_the_rear_board() -> None:
-    """One looks past it along the shelf, to a rear that returns no light."""
+    """Rays pass the jars along the shelf and hit a rear without depth returns."""
     inside = measure_inside(LEAF, stays, filmed("left", HELD, jars=True))
     assert inside is None or inside.depth_m is None
 
@@ -43,7 +43,7 @@ def comes_out(frame: Frame) -> Rigid3 | None:
 
 
 def test_the_static_rear_of_a_unit_is_not_the_rear_of_a_drawer() -> None:
-    """The unit's own rear board is seen over the front of a drawer, in every frame farther behind that."""
+    """The rear board of the unit is visible above the drawer front, and farther behind it in every frame."""
     film = filmed("out", DRAWN)
     assert measure_inside(LEAF, comes_out, film, drawn_out_m=0.1) is None
     assert measure_inside(LEAF, stays_behind, film) is not None  # the rear is visible

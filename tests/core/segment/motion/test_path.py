@@ -6,7 +6,7 @@ from r2c2r_core.segment.motion.path import Params, best_path
 
 
 def test_best_path_matches_exhaustive_search() -> None:
-    """By trying every one."""
+    """Compared with all paths of a small problem."""
     log = np.random.default_rng(2).normal(0, 2, (6, 4))
     params = Params()
 

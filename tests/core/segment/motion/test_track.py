@@ -47,7 +47,7 @@ def test_each_joint_type_is_classified_and_measured(way: str) -> None:
 
 
 def test_a_leaf_resting_almost_closed_counts_as_closed() -> None:
-    """A pose or a frame's profile turns all depth of a closed leaf by more than a frame errs by itself."""
+    """Pose errors rotate all depth of a closed leaf by more than the noise of a single frame."""
     states = np.maximum(opened_and_held(np.deg2rad(75)), np.deg2rad(2.6))
     motion = find_motion(LEAF, scene("left", states))
     assert motion is not None
@@ -61,7 +61,7 @@ def test_flap_hypotheses_are_limited_to_120_degrees() -> None:
 
 @pytest.mark.parametrize("way", quick(RAD, ("left", "top")))
 def test_a_concealed_hinge_is_located_behind_the_edge(way: str) -> None:
-    """A concealed hinge turns about a line inside the unit: far from what is usual, and three ranges of angles tell it."""
+    """A concealed hinge turns about a line inside the unit, far from the usual one; three ranges of angles determine it."""
     off = (0.012, 0.015, 0.0) if way in ("left", "right") else (0.0, 0.015, 0.012)
     states = np.concatenate([np.zeros(4), np.linspace(0, np.deg2rad(95), 45)])
     motion = find_motion(LEAF, scene(way, states, pivot_off=off, noise_m=0.003))
@@ -116,7 +116,7 @@ def test_evidence_overrides_a_wrong_prior() -> None:
 
 @pytest.mark.parametrize("way", ["left", "slides_left"])
 def test_a_constant_open_state_is_not_reported_as_motion(way: str) -> None:
-    """A rectangle drawn too wide looks like a leaf that is half slid away: only a change tells a joint."""
+    """A rectangle drawn too wide looks like a leaf that is half slid away: only a change of state is evidence of a joint."""
     assert find_motion(LEAF, scene(way, np.full(30, 0.3))) is None
 
 
@@ -127,17 +127,17 @@ def test_a_leaf_of_a_pair_must_open_about_the_given_side() -> None:
 
 
 def test_another_leaf_in_the_opened_position_is_not_reported_as_motion() -> None:
-    """Its place is only hidden then: a door that is open leaves it to be seen into."""
+    """The other leaf only hides the front; an open door would reveal the inside of its unit."""
     assert find_motion(LEAF, scene("left", np.zeros(36), other=range(10, 26))) is None
 
 
 def test_static_appliances_beside_a_leaf_are_not_reported_as_motion() -> None:
-    """One stands where an open door would, the other hides the closed one; but they stand there in every frame."""
+    """One appliance stands where an open door would be, the other hides the closed door, both in every frame."""
     assert find_motion(LEAF, scene("left", np.zeros(36), niche=True)) is None
 
 
 def test_a_leaf_open_at_the_start_has_no_observed_stop() -> None:
-    """Its first frames err by a little: nobody saw it arrive."""
+    """The first frames have small errors, but no frame shows the leaf arriving at a stop."""
     states = np.concatenate([[1.15], np.full(14, 1.2), np.linspace(1.2, 0, 12), np.zeros(6)])
     motion = find_motion(LEAF, scene("left", states))
     assert motion is not None
@@ -145,7 +145,7 @@ def test_a_leaf_open_at_the_start_has_no_observed_stop() -> None:
 
 
 def test_black_glass_counts_as_closed_where_it_has_no_depth() -> None:
-    """An oven's door: its outer face returns no light, its inner one does."""
+    """The outer face of an oven door has no depth returns, its inner face has."""
     states = opened_and_held(1.4)
     motion = find_motion(LEAF, scene("bottom", states, glass=True))
     assert motion is not None

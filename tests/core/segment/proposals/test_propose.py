@@ -146,7 +146,7 @@ def test_size_determines_the_category_of_a_thing(extent: tuple[float, float, flo
 
 
 def test_the_lower_edge_is_ignored_only_for_floor_standing_objects(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A refrigerator's foot lies in shadow: the network sees no edge there."""
+    """The lower edge of a refrigerator lies in shadow: the network sees no edge there."""
     monkeypatch.setattr(panels, "edge_strengths", lambda _: (0.96, 0.97, 0.98, 0.12))
     front = cast(Front, None)  # only the edges of the front are evaluated
     assert panels.outlined(front, stands=True) == 0.96

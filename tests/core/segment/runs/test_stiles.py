@@ -81,7 +81,7 @@ def test_a_face_frame_strip_outside_the_door_gap_is_not_joined() -> None:
 
 
 def test_a_strip_beyond_a_full_height_line_is_not_joined() -> None:
-    """A gap parts it from the front; the line round a sunk panel ends at the stiles. Faint borders do not tell a rail."""
+    """A line over the full height is a gap beside the front; the outline of a recessed panel ends at the rails."""
     light = np.full((340, 320), 170, np.float32)
     light[round(CUT.top) : round(CUT.bottom), round(CUT.left)] = 150
     assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, lines(*PANEL_LINES), Contrast(light), FLAT)) == CUT
@@ -91,7 +91,7 @@ def test_a_strip_beyond_a_full_height_line_is_not_joined() -> None:
 
 @pytest.mark.parametrize(("sunk_m", "marked", "whole"), [(0.007, True, True), (0.007, False, False), (0.001, True, False)])
 def test_a_strip_is_joined_by_depth_only_with_a_line_and_a_recessed_panel(sunk_m: float, marked: bool, whole: bool) -> None:
-    """Nothing shows opposite the strip: depth and a line between them tell that it is a stile."""
+    """The opposite stile is not visible: a depth step and a line beside the strip identify it as a stile."""
     light = np.full((340, 320), 170, np.float32)
     light[round(PANEL.top) : round(PANEL.bottom), round(CUT.left)] = 150 if marked else 170
     level = np.zeros((170, 160))
@@ -102,7 +102,7 @@ def test_a_strip_is_joined_by_depth_only_with_a_line_and_a_recessed_panel(sunk_m
 
 
 def test_wood_grain_on_a_recessed_panel_does_not_separate_its_stile() -> None:
-    """Lines of the grain lie where a panel of its own would begin; the panel's line ends at both rails."""
+    """Grain lines lie where a separate panel would begin; the line of the recessed panel ends at both rails."""
     light, level = np.full((340, 320), 170, np.float32), np.zeros((170, 160))
     light[round(PANEL.top) : round(PANEL.bottom), round(CUT.left)] = 150
     level[25:145, 55:125] = -0.007
@@ -115,7 +115,7 @@ def test_wood_grain_on_a_recessed_panel_does_not_separate_its_stile() -> None:
 
 @pytest.mark.parametrize(("rail", "found"), [(30, 30), (15, 22)])
 def test_a_shadowed_edge_is_placed_at_the_common_frame_width(rail: int, found: float) -> None:
-    """The shadow ends at row 30; it was followed up to row 22. All other stiles and rails are 30 cells wide."""
+    """The shadow ends at row 30, and the edge was followed up to row 22. All other stiles and rails are 30 cells wide."""
     sunk = Cell(110, 30 + rail, 250, 290)
     light = np.full((340, 320), 170, np.float32)
     cv2.rectangle(light, (round(sunk.left), round(sunk.top)), (round(sunk.right), round(sunk.bottom)), 120, 1)
@@ -126,7 +126,7 @@ def test_a_shadowed_edge_is_placed_at_the_common_frame_width(rail: int, found: f
 
 @pytest.mark.parametrize(("sunk_m", "found"), [(0.007, 30), (0.0, 22)])
 def test_a_shadowed_edge_is_placed_from_a_panel_recessed_only_in_depth(sunk_m: float, found: float) -> None:
-    """Light from above shows the upper line of the panel alone."""
+    """Only the upper line of the panel is visible, in light from above."""
     light, level = np.full((340, 320), 170, np.float32), np.zeros((170, 160))
     light[60, 110:250], level[30:145, 55:125] = 120, -sunk_m
     followed = Refined(Cell(80, 22, 280, 320), lit_top=30)

@@ -82,7 +82,7 @@ def test_a_faint_seam_is_cut_only_between_two_handles() -> None:
 
 
 def test_a_narrow_stile_with_the_handle_is_not_cut_off() -> None:
-    """A faint line at 6 cm from a door's edge: a strip so narrow is hardly ever a front, nor the rest without handle."""
+    """A faint line 6 cm from the edge of a door: so narrow a strip is rarely a front, nor is the rest without its handle."""
     whole, line = Cell(0, 0, 200, 288), [(176, 0, 288)]
     assert len(cut_panels(odds(200, 288, line, [], sure=1.0, handles=[(188, 60)]), whole, CELL_M)) == 1
     pull_out = [(140, 0, 288)]  # 15 cm wide
@@ -131,7 +131,7 @@ def test_a_click_on_an_oven_window_selects_the_whole_oven() -> None:
 
 
 def test_a_range_extends_to_its_own_top_edge_beside_a_lower_door() -> None:
-    """Three clear edges, a usual size and a row do not make up for a fourth that nothing shows."""
+    """Three clear edges, a usual size and an aligned row do not compensate for a missing fourth edge."""
     cells = (whole := Cell(0, 0, 240, 372), Cell(240, 0, 372, 108), Cell(240, 108, 372, 372))
     lines = odds(380, 380, [(0, 0, 372), (240, 0, 372), (372, 0, 372)], [(0, 0, 372), (108, 240, 372), (372, 0, 372)])
     run: Any = SimpleNamespace(cells=cells, grid=SimpleNamespace(cell_m=CELL_M), odds=lines, seen=np.ones(SEEN, bool))
@@ -146,7 +146,7 @@ def test_an_oven_is_separated_from_the_drawers_beside_it() -> None:
 
 
 def test_a_black_glass_oven_is_separated_from_the_drawer_below_it() -> None:
-    """All edges are clear, and a rectangle of both is as near an oven's usual size: but the drawer's front returns light."""
+    """All edges are clear and oven and drawer together have a usual oven size, but only the drawer front has depth returns."""
     cells = (oven := Cell(0, 0, 240, 200), Cell(0, 200, 240, 372), Cell(240, 0, 372, 372))
     lines = odds(380, 380, [(0, 0, 372), (240, 0, 372), (372, 0, 372)], [(0, 0, 372), (200, 0, 240), (372, 0, 372)])
     seen = np.ones(SEEN, bool)
@@ -184,7 +184,7 @@ def test_a_line_too_faint_for_one_front_cuts_a_row_of_fronts() -> None:
 
 
 def test_a_narrow_strip_with_a_handle_is_not_cut_off_as_filler() -> None:
-    """A line 6 cm before a door's end, with the knob beyond it: the inner line of its stile, not the end of the door."""
+    """A line 6 cm before the end of a door with the knob beyond it is the inner line of its stile, not the end of the door."""
     door, line = Cell(0, 0, 176, 300), [(152, 0, 300)]
     assert len(cut_panels(odds(176, 300, line, [], sure=3.5, handles=[(164, 30)]), door, CELL_M)) == 1
     assert len(cut_panels(odds(176, 300, line, [], sure=3.5, handles=[]), door, CELL_M)) == 2
@@ -192,7 +192,7 @@ def test_a_narrow_strip_with_a_handle_is_not_cut_off_as_filler() -> None:
 
 @pytest.mark.parametrize("apart", [24, 36])
 def test_seams_at_different_heights_do_not_cut_the_door_between_stacks(apart: int) -> None:
-    """A path along both bends by 60 to 90 mm over the door, and shows over three quarters of its span."""
+    """A line through both seams bends by 60 to 90 mm over the door and is visible over three quarters of its span."""
     run = odds(1000, 300, [(260, 0, 300), (480, 0, 300)], [(150 + apart, 0, 260), (150, 480, 1000)], sure=4.0)
     found = {(round(cell.left), round(cell.top)) for cell in cut_panels(run, Cell(0, 0, 1000, 300), CELL_M)}
     assert found == {(0, 0), (0, 151 + apart), (261, 0), (481, 0), (481, 151)}

@@ -95,7 +95,7 @@ def test_a_round_body_with_a_negative_click_is_rejected(
 
 
 def test_a_neck_is_detected_by_its_consistent_colour_in_all_views() -> None:
-    """Neither depth nor colours learned elsewhere say anything of it."""
+    """Neither depth nor colour models give evidence here."""
     views, levels, cells, radius = 12, 20, 24, 8
     rng = np.random.default_rng(0)
     lab = rng.integers(40, 220, (views, levels, 2 * cells, 3), dtype=np.uint8)  # a background that differs in every view
@@ -111,7 +111,7 @@ def test_a_neck_is_detected_by_its_consistent_colour_in_all_views() -> None:
 
 
 def test_the_profile_stops_at_edges_despite_similar_colours_beyond() -> None:
-    """A dark wall continues a body sideways with the same colours; the true border is an edge in all views."""
+    """A dark wall beside the body has the same colours; the true border is an edge in all views."""
     levels, cells, radius, top = 40, 24, 10, 30
     odds = np.full((levels, cells), -2.0)
     odds[:top, :radius] = 2.0

@@ -64,7 +64,7 @@ def test_a_second_click_without_depth_does_not_lose_the_object(
 def test_each_point_is_checked_with_the_ray_of_its_own_click(
     session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An appliance's first clicks may hit nothing; where it is cut as a thing, the others still belong to their points."""
+    """The first click on an appliance may hit no surface; the remaining clicks must still belong to their own points."""
     blind, first, second = (click_on(boxes[0], (1.06, -0.36, 1.0), frame) for frame in (50, 60, 70))
     pick, behind = Scene.pick, {70: np.array([1.06, -0.6, 1.4])}  # the third click shows what is behind the thing
     monkeypatch.setattr(

@@ -113,7 +113,7 @@ def test_clicks_far_from_any_surface_give_no_thing(scene: Scene) -> None:
 
 
 def test_noisier_depth_carves_less(scene: Scene, hull: Thing) -> None:
-    """The carton's face was carved to within the recording's noise; depth ten times as noisy leaves more standing before it."""
+    """The face of the carton is carved to within the depth noise; with noisier depth, more volume remains before it."""
     noise = DepthNoise(floor_m=0.02, per_m=0.02)
     noisy = dataclasses.replace(scene, capture=dataclasses.replace(scene.capture, depth_noise=noise))
     loose = glimpse_small(noisy, ON_IT, NO_POINTS, CARTON, ())
