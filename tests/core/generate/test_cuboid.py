@@ -30,7 +30,7 @@ def shape_of(scene):
     ],
 )
 def test_the_depth_of_a_carton_is_estimated_from_its_outlines(arc_deg, elevation_deg):
-    """The box from segmentation is three times too deep: it includes depth of the wall."""
+    """The box from segmentation is three times too deep."""
     shape = shape_of(carton_scene(SIZE, arc_deg=arc_deg, elevation_deg=elevation_deg, yaw_rad=0.3))
     assert shape.parameters["boxed"] == 1.0
     assert shape.parameters["depth_sigma_m"] < 0.006
