@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { Answers } from "../../static/js/lib/answers.js";
 
-test("an answer that a later one overtook is not taken, and one before a failure is", async () => {
+test("an outdated response is ignored, and a failed later request does not discard earlier responses", async () => {
   const answers = new Answers();
   const shown = [];
   const say = [];

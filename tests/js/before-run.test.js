@@ -21,7 +21,7 @@ const object = (id, more = {}) => ({
   ...more,
 });
 
-test("a few frames show every object, and no more are looked at than that takes", () => {
+test("the frames to check together show every object that has frames, up to the given limit", () => {
   assert.deepEqual(
     framesToLook([
       lane(1, [0, 3]),
@@ -38,7 +38,7 @@ test("a few frames show every object, and no more are looked at than that takes"
   assert.deepEqual(framesToLook([]), []);
 });
 
-test("two objects that are one are told once, on the first frame that shows it", () => {
+test("a contradiction between two objects is reported once, on the first frame that shows it", () => {
   const said = [
     { object: 1, other: 2, text: "on the same thing as b" },
     { object: 2, other: 1, text: "on the same thing as a" },
@@ -55,7 +55,7 @@ test("two objects that are one are told once, on the first frame that shows it",
   ]);
 });
 
-test("an object without a click and one without a mask are told, with the frame of its click", () => {
+test("an object without clicks is reported without a frame, one without a mask with the frame of its click", () => {
   const told = spoiling(
     [
       object(1, { points: [] }),

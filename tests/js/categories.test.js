@@ -16,7 +16,7 @@ const ALL = [
   category("mug", "mug", "none"),
 ];
 
-test("each category is offered once, by how it opens", () => {
+test("categories are grouped by how they open, and synonyms are listed once", () => {
   const names = byOpening(ALL).map(({ text, of }) => [text, ...of.map(({ name }) => name)]);
   assert.deepEqual(names, [
     ["turns", "cabinet"],
@@ -25,7 +25,7 @@ test("each category is offered once, by how it opens", () => {
   ]);
 });
 
-test("what a kitchen uses comes first, synonyms last", () => {
+test("the categories used most in the kitchen come first, synonyms last", () => {
   const names = usedFirst(ALL, ["mug", "door", "mug"]).map(({ name }) => name);
   assert.deepEqual(names, ["mug", "door", "drawer", "cabinet", "pull_out"]);
 });

@@ -13,7 +13,7 @@ const list = [
   { name: "mug", category: "mug" },
 ];
 
-test("what no object is called is still to be clicked", () => {
+test("checklist entries remain until an object has their name, ignoring case", () => {
   const left = remaining(list, [{ name: "Oven_1" }, { name: "vase" }]);
   assert.deepEqual(
     left.map(({ name }) => name),
@@ -21,7 +21,7 @@ test("what no object is called is still to be clicked", () => {
   );
 });
 
-test("the next one follows the last in the order of the list, and the first the end", () => {
+test("the next entry is the first remaining one after the given entry, wrapping around at the end", () => {
   const left = [list[0], list[2]];
   assert.equal(following(list, left, "oven_1"), list[2]);
   assert.equal(following(list, left, "mug"), list[0]);
@@ -29,17 +29,17 @@ test("the next one follows the last in the order of the list, and the first the 
   assert.equal(following(list, [], "mug"), null);
 });
 
-test("a list as text is that list again", () => {
+test("a checklist converted to text is parsed to the same checklist", () => {
   assert.deepEqual(fromText(asText(list)), list);
 });
 
-test("what a person wrote becomes names that can be used, each with a category", () => {
+test("a typed checklist is parsed to valid object names, each with a category", () => {
   assert.deepEqual(
     fromText("Top drawer; drawer\n\n wall_cabinet_2\n7\n,oven\n"),
     [
       { name: "Top_drawer", category: "drawer" },
       { name: "wall_cabinet_2", category: "wall_cabinet" },
-      { name: "item_7", category: "object" }, // no name begins with a digit
+      { name: "item_7", category: "object" }, // a name must not begin with a digit
     ],
   );
 });

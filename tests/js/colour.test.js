@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { inkOn } from "../../static/js/lib/colour.js";
 
-test("a number is read on every colour of the palette", () => {
+test("text is light on the dark colours of the palette and dark on the light ones", () => {
   assert.deepEqual(["#0072b2", "#f0e442", "#000000", "#e69f00"].map(inkOn), [
     "#ffffff",
     "#10131a",

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { ranked } from "../../static/js/lib/commands.js";
 
-test("the palette finds by any word, best first", () => {
+test("the command palette lists commands that contain all typed words, sorted by rank", () => {
   const commands = ["Next frame", "Object drawer_1", "Frame without masks"].map((text) => ({ text, run: () => {} }));
   assert.deepEqual(
     ranked(commands, "frame").map((c) => c.text),

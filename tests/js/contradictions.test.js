@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { contradictionsOn, unseenOn } from "../../static/js/lib/contradictions.js";
 
-/** A mask of these columns, 10 rows high, of a picture of 100 x 20. */
+/** A mask of these columns, 10 rows high, in an image of 100 x 20 pixels. */
 const columns = (object, left, right, clicks = []) => ({
   object,
   name: `door_${object}`,
@@ -20,11 +20,11 @@ const columns = (object, left, right, clicks = []) => ({
   clicks,
 });
 
-test("masks that share no more than a border contradict nothing", () => {
+test("masks that overlap along a border only, or are empty, are no contradiction", () => {
   assert.deepEqual(contradictionsOn([columns(1, 0, 51), columns(2, 50, 100), columns(3, 80, 80)]), []);
 });
 
-test("masks that share much of the smaller are said of both objects, with what mends it", () => {
+test("a large overlap of two masks is reported for both objects, and a full one proposes to merge them", () => {
   const some = contradictionsOn([columns(1, 0, 50), columns(2, 40, 90)]);
   assert.deepEqual(
     some.map(({ object, text }) => [object, text.split(":")[0]]),
@@ -44,14 +44,14 @@ test("masks that share much of the smaller are said of both objects, with what m
   );
 });
 
-test("a mask that leaves out a click on it or takes in one off it says so", () => {
+test("a positive click outside the mask and a negative click inside it are reported", () => {
   const click = (x, label) => ({ x, y: 10.5, label });
   assert.deepEqual(contradictionsOn([columns(1, 0, 50, [click(20.5, 1), click(50.5, 1), click(70.5, 0)])]), []);
   assert.match(contradictionsOn([columns(1, 0, 50, [click(60.5, 1)])])[0].text, /lies outside its mask/);
   assert.match(contradictionsOn([columns(1, 0, 50, [click(20.5, 1), click(30.5, 0)])])[0].text, /lies inside its mask/);
 });
 
-test("a click on a frame where the object has no mask is said once its masks are found, unless a person set the frame", () => {
+test("a click on a frame without a mask is reported once segmentation is done, unless a user corrected that frame", () => {
   const point = { frame: 4, label: 1 };
   const object = (more = {}) => ({ id: 1, segment: "done", points: [point], frames: [], ...more });
   const said = (more, frame = 4, seen = false) => unseenOn([object(more)], frame, () => seen).map(({ text }) => text);

@@ -15,7 +15,7 @@ const group = (override) => ({
   },
 });
 
-test("how it opens is copied, where it is and how large is not", () => {
+test("hinge, limits and type of opening are copied to other objects; size, pose and candidate are not", () => {
   const from = group({
     hinge: "left",
     joint_lower: 0,
@@ -37,7 +37,7 @@ test("how it opens is copied, where it is and how large is not", () => {
   assert.equal(copiedWords(copied(group({}))), "");
 });
 
-test("Shift selects what lies between, either way round", () => {
+test("a Shift selection includes all objects between two in the list, in either direction", () => {
   assert.deepEqual(between([4, 7, 9, 2], 9, 7), [7, 9]);
   assert.deepEqual(between([4, 7, 9, 2], 4, 2), [4, 7, 9, 2]);
   assert.deepEqual(between([4, 7], 99, 7), [7]);

@@ -26,7 +26,7 @@ const BOX = {
   ],
 };
 
-test("a box before the camera has twelve edges and six sides, called as one sees them", () => {
+test("a crop box in front of the camera has twelve edges and six sides, named as seen in the photo", () => {
   assert.equal(edges(BOX, CAMERA).length, 12);
   const named = Object.fromEntries(
     sides(BOX, CAMERA).map((side) => [side.name, side]),
@@ -44,7 +44,7 @@ test("a box before the camera has twelve edges and six sides, called as one sees
   assert.ok(named.Front.distance < named.Back.distance);
 });
 
-test("the same box stored with other axes is called the same", () => {
+test("the names of the sides do not depend on the axes in which the crop box is stored", () => {
   const turned = {
     corner_m: [0.5, 0.5, 3],
     edges_m: [
@@ -58,7 +58,7 @@ test("the same box stored with other axes is called the same", () => {
   assert.deepEqual(at(turned), at(BOX));
 });
 
-test("a side moves along its own way, the opposite one stays, and some thickness is left", () => {
+test("moving a side keeps the opposite side in place and a minimum thickness", () => {
   const nearer = moved(BOX, { axis: 2, away: false }, 0.25);
   assert.deepEqual(nearer.corner_m, [-0.5, -0.5, 1.75]);
   assert.deepEqual(sizes(nearer), [1, 1, 1.25]);
@@ -67,7 +67,7 @@ test("a side moves along its own way, the opposite one stays, and some thickness
   assert.ok(sizes(thin)[0] > 0);
 });
 
-test("what reaches behind the camera is not drawn", () => {
+test("edges that reach behind the camera are not drawn", () => {
   assert.equal(
     edges({ ...BOX, corner_m: [-0.5, -0.5, -0.5] }, CAMERA).length,
     4,

@@ -20,7 +20,7 @@ import {
   withEdge,
 } from "../../static/js/lib/elevation.js";
 
-// A plane of 2.4 x 0.9 m, turned by 30 degrees, in a world whose y points up
+// A plane of 2.4 x 0.9 m, rotated by 0.5 rad, in a world whose y points up
 const [c, s] = [Math.cos(0.5), Math.sin(0.5)];
 const PLANE = /** @type {any} */ ({
   cell_m: 0.01,
@@ -33,7 +33,7 @@ const PLANE = /** @type {any} */ ({
 });
 const RECT = { left: 0.2, top: 0.1, right: 0.8, bottom: 0.82 };
 
-test("a rectangle goes to the recording's world and comes back", () => {
+test("a rectangle on a plane converts to world coordinates and back", () => {
   const corners = cornersOf(PLANE, RECT);
   assert.deepEqual(corners[0]?.[1], 0.8);
   const back = rectOf(PLANE, corners);
@@ -41,7 +41,7 @@ test("a rectangle goes to the recording's world and comes back", () => {
     assert.ok(Math.abs((back?.[side] ?? 9) - RECT[side]) < 1e-4);
 });
 
-test("a front off the plane, beside it or on its back is on another one", () => {
+test("a front off the plane, outside its extent or facing backwards does not belong to the plane", () => {
   const off = (/** @type {number} */ by) =>
     cornersOf(PLANE, RECT).map(([x = 0, y = 0, z = 0]) => [
       x - s * by,
@@ -58,7 +58,7 @@ test("a front off the plane, beside it or on its back is on another one", () => 
   assert.equal(rectOf(PLANE, /** @type {number[][]} */ ([b, a, e, d])), null);
 });
 
-/** Seams at 60 and 120 cm, the second in the lower half only. */
+/** Lines at 60 and 120 cm, the second in the lower half only. */
 function lines() {
   const clarity = new Uint8Array(9 * 240);
   for (let block = 0; block < 9; block++) {
@@ -73,7 +73,7 @@ function lines() {
   });
 }
 
-test("an edge snaps to the line that its own height shows, within reach", () => {
+test("an edge snaps to a line that is visible at its own height, within reach", () => {
   const low = profileOf(lines(), 0.01, 0.5, 0.9);
   const high = profileOf(lines(), 0.01, 0, 0.4);
   assert.equal(snapped(0.615, 0.02, [], low), 0.605);
@@ -82,14 +82,14 @@ test("an edge snaps to the line that its own height shows, within reach", () => 
   assert.equal(snapped(1.21, 0.02, [], high), 1.21);
 });
 
-test("another front's edge draws as a line does, the nearer one more", () => {
+test("an edge snaps to another front's edge or to a line, whichever is nearer", () => {
   const profile = profileOf(lines(), 0.01, 0, 0.9);
   assert.equal(snapped(0.612, 0.02, [0.6], null), 0.6);
   assert.equal(snapped(0.606, 0.02, [0.62], profile), 0.605);
   assert.equal(snapped(0.618, 0.02, [0.62], profile), 0.62);
 });
 
-test("a seam leaves two parts that meet, or none where one would be too small", () => {
+test("splitting a front at a seam gives two adjacent parts, or null where one would be too small", () => {
   assert.deepEqual(split(RECT, "upright", 0.5), [
     { ...RECT, right: 0.5 },
     { ...RECT, left: 0.5 },
@@ -99,7 +99,7 @@ test("a seam leaves two parts that meet, or none where one would be too small", 
   assert.deepEqual(around(split(RECT, "level", 0.4) ?? []), RECT);
 });
 
-test("an edge stops before the front is gone, and seams are no overlap", () => {
+test("a moved edge leaves the front its minimum size, and adjacent fronts do not overlap", () => {
   assert.equal(withEdge(RECT, "left", 2).left, 0.78);
   assert.equal(withEdge(RECT, "bottom", 0).bottom, RECT.top + SMALLEST_M);
   assert.equal(overlap(RECT, { ...RECT, left: 0.8, right: 1.4 }), false);
@@ -107,7 +107,7 @@ test("an edge stops before the front is gone, and seams are no overlap", () => {
   assert.deepEqual(nearestEdge(RECT, { x: 0.79, y: 0.4 }).side, "right");
 });
 
-test("a handle stays on its front, upright beside a door's side and lying on a drawer", () => {
+test("a new handle lies within its front: vertical near the side of a door, horizontal on a drawer", () => {
   const door = handleAt(RECT, { x: 0.79, y: 0.2 });
   assert.ok(door.top_m - door.bottom_m > door.right_m - door.left_m);
   assert.ok(door.right_m <= 0.3 + 1e-9);
@@ -118,7 +118,7 @@ test("a handle stays on its front, upright beside a door's side and lying on a d
   assert.ok(drawer.right_m - drawer.left_m > drawer.top_m - drawer.bottom_m);
 });
 
-test("a handle stays where it is when an edge is moved, and goes with the front", () => {
+test("a handle stays in place when an edge of its front is moved, and moves along with the whole front", () => {
   const box = { left_m: 0.2, right_m: 0.22, bottom_m: 0.1, top_m: 0.26 };
   const wider = handleAfter(box, RECT, { ...RECT, right: 1, bottom: 0.92 });
   assert.deepEqual(wider, {
@@ -131,7 +131,7 @@ test("a handle stays where it is when an edge is moved, and goes with the front"
   assert.equal(handleAfter("none", RECT, { ...RECT, right: 1 }), "none");
 });
 
-test("a handle is copied as far from the edge that it is near, else as far from the middle, and never over the front", () => {
+test("a copied handle keeps its distance from a near edge, else from the centre, and stays within the front", () => {
   const box = { left_m: 0.2, right_m: 0.22, bottom_m: -0.05, top_m: 0.05 };
   const from = { left: 0, right: 0.5, top: 0, bottom: 0.7 };
   const to = (/** @type {number} */ wide, /** @type {number} */ high) => ({ left: 2, right: 2 + wide, top: 1, bottom: 1 + high });
@@ -140,14 +140,14 @@ test("a handle is copied as far from the edge that it is near, else as far from 
   assert.deepEqual(handleLike(box, from, to(0.5, 0.06)), { ...box, bottom_m: -0.03, top_m: 0.03 });
 });
 
-test("a handle that its front no longer reaches is looked for anew", () => {
+test("a handle that no longer lies on its changed front is reset to null", () => {
   const box = { left_m: 0.2, right_m: 0.22, bottom_m: 0.1, top_m: 0.26 };
   assert.equal(handleAfter(box, RECT, { ...RECT, right: 0.71 }), null);
   assert.equal(handleAfter(box, RECT, { ...RECT, top: 0.25 }), null);
-  assert.notEqual(handleAfter(box, RECT, { ...RECT, right: 0.72 }), null); // up to its edge
+  assert.notEqual(handleAfter(box, RECT, { ...RECT, right: 0.72 }), null); // ends exactly at the front's edge
 });
 
-test("fronts that nobody could tell apart are the same, whatever order they are said in", () => {
+test("fronts with the same corners, handle and hinge are equal, whatever the key order of the handle", () => {
   const handle = { left_m: 0.2, right_m: 0.22, bottom_m: 0.1, top_m: 0.26 };
   const said = { right_m: 0.22, top_m: 0.26, left_m: 0.2, bottom_m: 0.1 };
   const front = { corners_m: cornersOf(PLANE, RECT), handle, hinge: null };
@@ -166,20 +166,20 @@ test("fronts that nobody could tell apart are the same, whatever order they are 
   assert.ok(!sameFront(front, { ...front, hinge: "left" }));
 });
 
-test("what a front is follows from its shape and height", () => {
+test("the likely category of a front follows from its shape and height", () => {
   assert.equal(likelyCategory(RECT, 0.9), "cabinet");
   assert.equal(likelyCategory({ ...RECT, bottom: 0.3 }, 0.9), "drawer");
   assert.equal(likelyCategory(RECT, 2.2), "wall_cabinet");
 });
 
-test("an edge let go among lines that are all clear stays where the hand was, and a far one draws it off no near one", () => {
+test("an edge among equally clear lines stays in place, and a near line wins over a clearer one further away", () => {
   const cell = 0.0025;
   const at = (/** @type {(i: number) => number} */ clear) => ({
     positions: Float32Array.from({ length: 400 }, (_, i) => clear(i)),
     cell,
   });
   const wide = at((i) => (i > 180 && i < 220 ? 1 : 0));
-  assert.ok(Math.abs(snapped(0.501, 0.012, [], wide) - 0.501) < 0.002); // half a cell, and the cell's middle
+  assert.ok(Math.abs(snapped(0.501, 0.012, [], wide) - 0.501) < 0.002); // within a cell: lines are at the centres of cells
   const two = at((i) => (i === 200 ? 0.8 : i === 204 ? 1 : 0));
   assert.ok(Math.abs(snapped(0.502, 0.012, [], two) - 200.5 * cell) < 1e-9);
 });

@@ -22,7 +22,7 @@ test("a finding about several objects is shown at each of them", () => {
   assert.deepEqual(concerned("cabinet_1, mug_1"), ["cabinet_1", "mug_1"]);
 });
 
-test("a finding at a part is its object's, of the longest name that it begins with", () => {
+test("a finding about a part is shown at the object with the longest name that the part's name starts with", () => {
   assert.deepEqual(concerned("cabinet_1_door_hinge"), ["cabinet_1_door"]);
   assert.deepEqual(concerned("cabinet_1_hinge"), ["cabinet_1"]);
 });

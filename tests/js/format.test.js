@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { ago, bytes, counted, duration, jointValue, usableName } from "../../static/js/lib/format.js";
 
-test("numbers read well", () => {
+test("sizes, durations, ages, counts and joint values are formatted with their units", () => {
   assert.equal(bytes(999), "999 B");
   assert.equal(bytes(1_500_000), "1.5 MB");
   assert.equal(duration(75), "1 min 15 s");
@@ -14,7 +14,7 @@ test("numbers read well", () => {
   assert.equal(jointValue("prismatic", 0.42), "42 cm");
 });
 
-test("a name is joined to one that simulators accept", () => {
+test("a typed name is converted to one that simulators accept", () => {
   for (const [typed, name] of [
     ["cook books", "cook_books"],
     [" Müsli-Schüssel ", "Musli_Schussel"],
@@ -22,7 +22,7 @@ test("a name is joined to one that simulators accept", () => {
     ["drawer_1", "drawer_1"],
     ["架子", ""],
     ["2-door cabinet", "item_2_door_cabinet"],
-    ["CON", "item_CON"], // Windows unpacks no folder of that name
+    ["CON", "item_CON"], // a reserved name on Windows
     ["console", "console"],
   ])
     assert.equal(usableName(typed ?? ""), name);

@@ -6,9 +6,9 @@ import { edgeMiddle, edgeOf, hingeLine, slideArrow } from "../../static/js/lib/f
 
 /** @typedef {import("../../static/js/lib/elevation.js").Rect} Rect */
 
-/** @param {number} left @param {number} right @returns {Rect} 0.4 m wide as a rule, 0.8 m high */
+/** @param {number} left @param {number} right @returns {Rect} 0.4 m wide by default, 0.8 m high */
 const door = (left, right = left + 0.4) => ({ left, right, top: 0, bottom: 0.8 });
-/** @type {import("../../static/js/lib/front-hits.js").Snap} to whole decimetres within 3 cm */
+/** @type {import("../../static/js/lib/front-hits.js").Snap} to multiples of 10 cm within 3 cm */
 const snap = (_side, at) => (Math.abs(at - Math.round(10 * at) / 10) < 0.03 ? Math.round(10 * at) / 10 : at);
 
 /** @param {Rect} found @param {Rect} wanted metres */
@@ -17,7 +17,7 @@ function same(found, wanted) {
     assert.ok(Math.abs(found[side] - wanted[side]) < 1e-9, `${side}: ${found[side]}, not ${wanted[side]}`);
 }
 
-test("a press at a shared seam takes the chosen front's edge, inside it the whole front, elsewhere nothing", () => {
+test("a press takes an edge within reach, of the chosen front at a shared seam, else a chosen front around it", () => {
   const fronts = [
     { key: "a", rect: door(0), chosen: false },
     { key: "b", rect: door(0.4), chosen: true },
@@ -28,14 +28,14 @@ test("a press at a shared seam takes the chosen front's edge, inside it the whol
   assert.equal(heldAt(fronts, { x: 0.2, y: 0.4 }, 0.01), null);
 });
 
-test("of nested fronts the smallest is the one clicked", () => {
+test("a click on nested fronts selects the smallest", () => {
   const fronts = [{ rect: door(0, 1) }, { rect: door(0.2) }];
   assert.equal(smallestAt(fronts, { x: 0.3, y: 0.4 }), fronts[1]);
   assert.equal(smallestAt(fronts, { x: 0.9, y: 0.4 }), fronts[0]);
   assert.equal(smallestAt(fronts, { x: 2, y: 0.4 }), null);
 });
 
-test("an edge snaps where it is dragged, stays put without snapping, and leaves a front its least size", () => {
+test("a dragged edge snaps, or follows the pointer without snapping, and leaves the front its minimum size", () => {
   same(carried(door(0), "right", { x: 0.4, y: 0 }, { x: 0.52, y: 0 }, snap), door(0, 0.5));
   same(carried(door(0), "right", { x: 0.4, y: 0 }, { x: 0.52, y: 0 }, null), door(0, 0.52));
   same(carried(door(0), "right", { x: 0.4, y: 0 }, { x: -1, y: 0 }, null), door(0, 0.02));
@@ -52,13 +52,13 @@ test("a front dragged as a whole keeps its size and snaps by its nearest edge", 
   });
 });
 
-test("a new rectangle snaps on all sides unless it would be too small", () => {
+test("a new rectangle snaps on all sides unless that makes it too small", () => {
   same(drawn({ x: 0.41, y: 0.79 }, { x: 0.02, y: 0.01 }, snap), { left: 0, right: 0.4, top: 0, bottom: 0.8 });
   const narrow = { left: 0.08, right: 0.12, top: 0, bottom: 0.8 };
   same(drawn({ x: 0.08, y: 0 }, { x: 0.12, y: 0.8 }, snap), narrow);
 });
 
-test("marks of a front: its edges, the triangle that points to the hinge, the arrow of a sliding door", () => {
+test("the marks of a front are its edges, a triangle that points to the hinge and the arrow of a sliding door", () => {
   const rect = { left: 10, right: 110, top: 20, bottom: 60 };
   assert.deepEqual(edgeOf(rect, "bottom"), [
     [10, 60],

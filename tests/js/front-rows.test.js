@@ -14,7 +14,7 @@ const millimetres = (/** @type {any[] | null} */ rects) =>
     [left, right, top, bottom].map((edge) => Math.round(1000 * edge)),
   );
 
-test("a front is divided into equal parts, or as its sizes were typed, with the rest as one more", () => {
+test("a front is divided into equal parts or by typed sizes, with the rest as one more part", () => {
   assert.deepEqual(millimetres(divided(RECT, "upright", "2")), [
     [200, 1000, 100, 800],
     [1000, 1800, 100, 800],
@@ -31,7 +31,7 @@ test("a front is divided into equal parts, or as its sizes were typed, with the 
   ]);
 });
 
-test("what is no division, or has no room, divides nothing", () => {
+test("an invalid division, or one that does not fit, gives null", () => {
   for (const text of [
     "",
     "1",
@@ -46,7 +46,7 @@ test("what is no division, or has no room, divides nothing", () => {
     assert.equal(divided(RECT, "upright", text), null, text);
 });
 
-test("a front again stands beside it or below it, as large, a seam away", () => {
+test("a repeated front has the same size and is placed to the right or below, with a seam of 3 mm", () => {
   assert.deepEqual(
     millimetres([again(RECT, "upright"), again(RECT, "level")]),
     [
@@ -56,7 +56,7 @@ test("a front again stands beside it or below it, as large, a seam away", () => 
   );
 });
 
-test("columns go from left to right, each from the top down, though drawn by hand", () => {
+test("fronts drawn by hand are ordered by column from left to right, each from top to bottom", () => {
   const at = (
     /** @type {string} */ name,
     /** @type {number} */ left,
@@ -77,7 +77,7 @@ test("columns go from left to right, each from the top down, though drawn by han
   );
 });
 
-test("fronts are numbered past the names of others, and no name is there twice on the way", () => {
+test("numbered names skip those taken by other objects, and no renaming step creates a duplicate name", () => {
   const names = ["drawer_2", "drawer_1", "cabinet_1"];
   const fronts = names.map((name, k) => ({ key: String(k), name }));
   const steps = renamed(fronts, "drawer", ["Drawer_3"]);

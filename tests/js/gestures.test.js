@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { Gestures } from "../../static/js/lib/gestures.js";
 
-test("a press that stays is a click, one that wanders a box, a click under it is carried, two fingers only zoom", () => {
+test("a press is a click, a drag draws a box, pans or moves the mark under it, and two fingers only pinch", () => {
   const at = (x, y) => ({ x, y });
   const free = { pan: false, held: null };
   const gestures = new Gestures();

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { motionOf } from "../../static/js/lib/joints.js";
 
-test("a joint is named by what a person before it sees", () => {
+test("the motion of a joint is described as seen by a person in front of the object", () => {
   const joint = (
     /** @type {any} */ type,
     /** @type {number[]} */ axis,

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { forget, keep, keptBy, named } from "../../static/js/lib/kept.js";
 
-test("changes are kept in order, each person's own, until they are answered; what cannot be read is passed over", () => {
+test("pending changes are stored per user and in order until they are answered; unreadable ones are skipped", () => {
   const items = new Map();
   const store = {
     get length() {
@@ -48,7 +48,7 @@ test("changes are kept in order, each person's own, until they are answered; wha
   );
 });
 
-test("a click on an object that is still being made finds it once that has a number", () => {
+test("a click on an object still being created gets the id of that object once it is known", () => {
   const click = {
     method: "POST",
     path: "/api/projects/p/objects/{k1}/points?infer=true",

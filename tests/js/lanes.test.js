@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { nextDoubtful, runs, worstFirst } from "../../static/js/lib/lanes.js";
 
-test("doubtful frames are found, and the worst come first", () => {
+test("the next doubtful frame is found in a direction, and the frames to check are sorted worst first", () => {
   const frames = [0, 3, 7, 9].map((index) => ({ index }));
   const sure = new Map([
     [0, 0.9],
@@ -23,7 +23,7 @@ test("doubtful frames are found, and the worst come first", () => {
   assert.equal(worstFirst(sure, 10).length, 4);
 });
 
-test("a lane is drawn in as few bars as it has stretches", () => {
+test("a lane has one bar for each run of consecutive frames that are all sure or all doubtful", () => {
   assert.deepEqual(runs([0.9, 0.8, undefined, 0.9, 0.2, 0.1]), [
     { from: 0, to: 2, doubtful: false },
     { from: 3, to: 4, doubtful: false },

@@ -40,15 +40,15 @@ const DRAWER = { ...DOOR, part: "drawer", type: "prismatic", most: 0.5, axis: [0
 
 const near = (a, b) => a.forEach((row, k) => row.forEach((x, j) => assert.ok(Math.abs(x - b[k][j]) < 1e-9)));
 
-test("a door turns about its hinge, a drawer goes along its axis", () => {
+test("a door rotates about its hinge, and a drawer slides along its axis", () => {
   near(leafAt(DOOR, 0), STILL);
   const [[, , , x], [, , , y]] = leafAt(DOOR, Math.PI / 2);
   assert.ok(Math.abs(x - -0.29) < 1e-9);
-  assert.ok(Math.abs(y - -0.31) < 1e-9); // towards who stands before it
+  assert.ok(Math.abs(y - -0.31) < 1e-9); // towards a person in front of it
   assert.equal(leafAt(DRAWER, 0.25)[1][3], -0.25);
 });
 
-test("it is held at the edge that swings furthest, and dragging that says how far it is open", () => {
+test("a leaf is dragged by the edge that swings furthest, and the position of the drag gives its opening", () => {
   assert.ok(holdAt(DOOR, 0, CAMERA)[0] > 360); // its right edge
   for (const value of [0.3, 1.2, 1.9]) {
     const [x, y] = holdAt(DOOR, value, CAMERA);
@@ -61,7 +61,7 @@ test("it is held at the edge that swings furthest, and dragging that says how fa
   assert.equal(holdAt(DOOR, 0, behind), null);
 });
 
-test("a mark joins those before it, goes where it is taken away, and is by its part", () => {
+test("marks are stored by part in the order of frames, replaced on the same frame and removed with null", () => {
   const one = withMark({}, DOOR, 7, 0.5);
   assert.deepEqual(one, { door: [{ frame: 7, state: 0.5 }] });
   const two = withMark(one, DOOR, 3, 0);
@@ -71,7 +71,7 @@ test("a mark joins those before it, goes where it is taken away, and is by its p
   assert.deepEqual(withMark({ a_door_joint: one.door, lid: [] }, DOOR, 3, 0), { lid: [], door: two.door });
 });
 
-test("what a person said is told from what was measured", () => {
+test("a state set by a user is distinguished from a measured one", () => {
   const states = [
     { frame: 0, value: 0, sigma: null },
     { frame: 1, value: null, sigma: null },

@@ -7,7 +7,7 @@ import {
   rescaleNotes,
 } from "../../static/js/lib/lengths.js";
 
-test("a length is typed in millimetres, or with its unit, and may say what it is of", () => {
+test("a typed length is in millimetres or in its unit, and may be followed by a description", () => {
   assert.deepEqual(parseLength("596"), { metres: 0.596, text: "" });
   assert.deepEqual(parseLength(" 596 mm, worktop beside the sink "), {
     metres: 0.596,
@@ -20,13 +20,13 @@ test("a length is typed in millimetres, or with its unit, and may say what it is
     assert.equal(parseLength(wrong), null);
 });
 
-test("how far the scan is off is told in millimetres and percent", () => {
+test("the error of the scan is given in millimetres and percent", () => {
   assert.equal(offBy({ metres: 0.6, error_m: -0.0072 }), "−7 mm, −1.2 %");
   assert.equal(offBy({ metres: 0.6, error_m: 0.0001 }), "as measured");
   assert.equal(offBy({ metres: 0.6, error_m: null }), "not in the scene now");
 });
 
-test("a rescale says by how much, what becomes of the largest, and that one length is thin", () => {
+test("the notes on a rescale give the change in percent, the new largest sizes and a warning about a single length", () => {
   const one = {
     id: 1,
     text: "",

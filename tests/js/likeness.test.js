@@ -38,7 +38,7 @@ const proposal = (id, more) => ({
   ...more,
 });
 
-test("an object's front says its sides and how its handle lies", () => {
+test("the features of an object with a front are its width, height and orientation of the handle", () => {
   assert.equal(drawer.handle, "level");
   assert.ok(
     Math.abs((drawer.sides?.[0] ?? 0) - 0.6) < 1e-9 &&
@@ -52,7 +52,7 @@ test("an object's front says its sides and how its handle lies", () => {
   );
 });
 
-test("category, size and handle rank what is alike, whatever the confidence", () => {
+test("similar proposals are ranked by category, size and handle, not by confidence", () => {
   const found = alike(drawer, [
     proposal("tall", { size_m: [0.6, 0.5, 0.72] }),
     proposal("other handle", { handle: [] }),
@@ -68,7 +68,7 @@ test("category, size and handle rank what is alike, whatever the confidence", ()
   assert.ok(Math.abs((found[0]?.confidence ?? 0) - 1) < 1e-9);
 });
 
-test("of what has no flat front the category alone is known", () => {
+test("without a flat front only the category is compared", () => {
   const found = alike(kindOf("bottle", undefined), [
     proposal("a", {}),
     proposal("b", { category: "bottle", kind: "thing" }),

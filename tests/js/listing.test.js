@@ -22,7 +22,7 @@ const names = (wanted) =>
     group.entries.map(({ object }) => object.name),
   );
 
-test("objects are kept by whose turn they are, and found by the name of that person", () => {
+test("objects are filtered by assignment and found by the name of their assignee", () => {
   const some = [
     entry(1, "drawer_1", "drawer", { mine: true }),
     entry(2, "oven_1", "oven"),
@@ -40,7 +40,7 @@ test("objects are kept by whose turn they are, and found by the name of that per
   assert.deepEqual(found({ typed: "@bea" }), ["oven_1"]);
 });
 
-test("objects are ordered by name as people count, by doubt, and in groups", () => {
+test("objects are sorted by name in natural order or by confidence, or grouped by category", () => {
   assert.deepEqual(names({ order: "name" }), [
     "drawer_2",
     "drawer_10",
@@ -61,7 +61,7 @@ test("objects are ordered by name as people count, by doubt, and in groups", () 
   );
 });
 
-test("objects are kept by a state and found by words; the current one stays", () => {
+test("objects are filtered by state and by search text; the current one is always listed", () => {
   assert.deepEqual(names({ state: "doubtful" }), ["oven_1"]);
   assert.deepEqual(names({ state: "unmasked" }), ["drawer_2"]);
   assert.deepEqual(names({ state: "hidden" }), ["drawer_2"]);
@@ -76,14 +76,14 @@ test("objects are kept by a state and found by words; the current one stays", ()
   );
 });
 
-test("a span goes both ways, and is one where it has no start", () => {
+test("a range of objects is selected in either direction, and a single object without a valid start", () => {
   assert.deepEqual(span([4, 7, 9, 2], 9, 4), [4, 7, 9]);
   assert.deepEqual(span([4, 7, 9, 2], 7, 2), [7, 9, 2]);
   assert.deepEqual(span([4, 7], null, 7), [7]);
   assert.deepEqual(span([4, 7], 99, 7), [7]);
 });
 
-test("how sure an object's masks are is their mean", () => {
+test("the confidence of an object is the mean over its masks, and null without masks", () => {
   assert.equal(meanOf(new Map()), null);
   assert.equal(
     meanOf(

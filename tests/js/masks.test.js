@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { decodeBox, paintBox, rgbOf } from "../../static/js/lib/masks.js";
 
-test("a packed mask comes out as it went in", async () => {
+test("decoding a packed mask restores its pixels", async () => {
   const packed = Uint8Array.from([0b10110000]); // 1 0 1 1 0 0 of a 3 x 2 box
   const stream = new Blob([packed]).stream().pipeThrough(new CompressionStream("deflate"));
   const bits = Buffer.from(await new Response(stream).arrayBuffer()).toString("base64");
@@ -19,7 +19,7 @@ test("a packed mask comes out as it went in", async () => {
   assert.deepEqual([...(await decodeBox(mask))], [1, 0, 1, 1, 0, 0]);
 });
 
-test("a mask is painted in its colour, opaque at the rim, clear outside", () => {
+test("a mask is painted in its colour: opaque at the rim, translucent inside, transparent outside", () => {
   const full = new Uint8Array(25).fill(1);
   const rgba = paintBox(full, 5, 5, [10, 20, 30], 0.5);
   assert.deepEqual([...rgba.slice(0, 4)], [10, 20, 30, 255]);

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { Meanwhile } from "../../static/js/lib/meanwhile.js";
 
-test("what is told while a list is on its way stands over that list, and is known at once", async () => {
+test("an update received while a list is loading is applied at once and again after the list", async () => {
   const [meanwhile, known] = [new Meanwhile(), new Map([["a", "waiting"]])];
   /** @type {(list: [string, string][]) => void} */
   let answer = () => {};
@@ -32,7 +32,7 @@ test("what is told while a list is on its way stands over that list, and is know
   );
 });
 
-test("a list that is refused leaves what was told, and later ones do not hear of it again", async () => {
+test("updates received during a failed load stay, and a later load does not apply them again", async () => {
   const [meanwhile, told] = [new Meanwhile(), /** @type {string[]} */ ([])];
   const refused = meanwhile.during(Promise.reject(new Error("away")), () =>
     told.push("filled"),

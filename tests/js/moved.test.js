@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { moved, shiftBetween } from "../../static/js/lib/moved.js";
 
-test("a box moved and moved back is where it was, whichever way it faces", () => {
+test("the shift between two poses is the one that was applied, along the axes of the box", () => {
   const [c, s] = [Math.cos(0.7), Math.sin(0.7)];
   const pose = [
     [c, -s, 0, 1],
@@ -26,7 +26,7 @@ test("a box moved and moved back is where it was, whichever way it faces", () =>
   assert.deepEqual(
     faced.slice(0, 3).map((row) => row[3]),
     [1, 2, 3],
-  ); // right of who faces its front at -Y
+  ); // to the right as seen by a person facing its front at -Y
   assert.deepEqual(
     faced.slice(0, 2).map((row) => Math.round(row[0])),
     [0, 1],

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { Newest } from "../../static/js/lib/newest.js";
 
-test("of two sets of bitmaps the newer one is held, whichever comes first, and every other one is closed", async () => {
+test("the newest complete set of bitmaps is held, whichever resolves first, and all others are closed", async () => {
   const closed = [];
   const bitmap = (name) => ({ name, close: () => closed.push(name) });
   const newest = new Newest();

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { nextPage } from "../../static/js/lib/next-page.js";
 
-test("after signing in only a page of this server opens, with its query", () => {
+test("after signing in only pages of the same origin are opened, with their query", () => {
   const here = "http://localhost:8000";
   assert.equal(nextPage("/p/a/review?object=3", here), `${here}/p/a/review?object=3`);
   assert.equal(new URL(nextPage("/.//evil.example/x", here), here).host, "localhost:8000");

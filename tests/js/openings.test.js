@@ -20,7 +20,7 @@ const DOOR = {
   ],
 };
 
-test("a state is said in words, with twice its standard deviation", () => {
+test("the state of an opening is given in words, with twice its standard deviation", () => {
   assert.equal(stateIn(DOOR, 0), "closed");
   assert.equal(stateIn(DOOR, 10), "opening, 40° ± 6°");
   assert.equal(stateIn(DOOR, 20), "open, 80° ± 1°");
@@ -35,7 +35,7 @@ test("a state is said in words, with twice its standard deviation", () => {
   assert.equal(stateIn(drawer, 0), "opening, 20 cm ± 6 mm");
 });
 
-test("frames that do not show it part its spans", () => {
+test("frames that do not show the front split its spans", () => {
   const spans = spansOf(
     { ...DOOR, states: [state(0, 0), state(10, 0), state(30, 0)] },
     [0, 10, 20, 30],
@@ -46,7 +46,7 @@ test("frames that do not show it part its spans", () => {
   ]);
 });
 
-test("only what is known is drawn as a curve, where its frame is", () => {
+test("the curve has known states only, at the positions of their frames", () => {
   assert.deepEqual(
     readings(DOOR, [0, 10, 20, 30, 40, 50]).map(({ position }) => position),
     [0, 1, 2, 5],

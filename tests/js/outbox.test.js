@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 
 const kept = new Map();
-/** What listens to the browser's storage. */
+/** Listeners to the storage events of the browser. */
 const listeners = [];
 globalThis.addEventListener = (type, act) =>
   type === "storage" && listeners.push(act);
@@ -19,7 +19,7 @@ const { Outbox, outbox } = await import("../../static/js/outbox.js");
 const { Tabs } = await import("../../static/js/lib/tabs.js");
 const { live } = await import("../../static/js/live.js");
 
-/** A server that answers what it is told to. */
+/** Mock server that gives these responses in order; undefined: a lost connection. */
 function serve(...answers) {
   const asked = [];
   globalThis.fetch = async (path, { headers, body }) => {
@@ -42,7 +42,7 @@ function serve(...answers) {
 
 const change = (path, json = {}) => ({ method: "POST", path, json });
 
-test("a change whose answer is lost is sent again under its own key, the next under another, and both are kept until then", async () => {
+test("a change without a response is sent again with the same key, and stays stored until it is answered", async () => {
   const asked = serve(
     undefined,
     undefined,
@@ -64,7 +64,7 @@ test("a change whose answer is lost is sent again under its own key, the next un
   assert.equal(kept.size, 0);
 });
 
-test("a server that is busy or full is asked again; a change is never sent for somebody else", async () => {
+test("a change is sent again with the same key while the server is busy or its disk is full", async () => {
   const busy = {
     status: 503,
     body: {
@@ -84,7 +84,7 @@ test("a server that is busy or full is asked again; a change is never sent for s
   assert.equal(new Set(asked.map(({ key }) => key)).size, 1);
 });
 
-test("a click on an object that is still being made goes to the number it gets, whatever else waits", async () => {
+test("a click on an object still being created is sent to the id that the object gets", async () => {
   const asked = serve({ body: { id: 41 } }, { body: {} });
   const made = outbox.send(change("/objects"), "k1");
   const clicked = outbox.send(change("/objects/{k1}/points"));
@@ -95,7 +95,7 @@ test("a click on an object that is still being made goes to the number it gets, 
   );
 });
 
-test("what an earlier visit left is sent, that person's alone; a refusal is said and not tried again", async () => {
+test("changes left by an earlier visit are sent for the same user only; a refusal is reported and final", async () => {
   const left = (key, user, at) =>
     JSON.stringify({ ...change(`/${key}`), key, user, at });
   kept.set("r2c2r-change-0000000000000001-x", left("x", "ann", 1));
@@ -117,7 +117,7 @@ test("what an earlier visit left is sent, that person's alone; a refusal is said
   kept.clear();
 });
 
-test("what disagrees with somebody else's change is merged, and sent as another change", async () => {
+test("a change in conflict with another user's is merged and sent with a new key", async () => {
   const conflict = {
     status: 409,
     body: {
@@ -144,7 +144,7 @@ test("what disagrees with somebody else's change is merged, and sent as another 
   assert.notEqual(asked[0].key, asked[1].key);
 });
 
-test("of two corrections of different things both stay; the second is sent again over the first", async () => {
+test("a correction merges with another user's correction of a different field and takes over its version", async () => {
   globalThis.HTMLElement ??= class {};
   const { merged } = await import("../../static/js/conflict.js");
   const mine = {
@@ -163,7 +163,7 @@ test("of two corrections of different things both stay; the second is sent again
   });
 });
 
-test("clicks on an object whose making was refused are refused here, in words, and not sent", async () => {
+test("clicks on an object whose creation was refused are rejected without a request", async () => {
   const asked = serve({
     status: 422,
     body: { kind: "prompt", message: "no such frame", hint: "" },
@@ -179,7 +179,7 @@ test("clicks on an object whose making was refused are refused here, in words, a
   assert.equal(kept.size, 0);
 });
 
-test("an answer that is cut off is asked for again under the same key", async () => {
+test("a change whose response is truncated is sent again with the same key", async () => {
   const asked = [];
   globalThis.fetch = async (_, { headers }) => {
     asked.push(headers["Idempotency-Key"]);
@@ -190,7 +190,7 @@ test("an answer that is cut off is asked for again under the same key", async ()
   assert.deepEqual(asked, ["cut", "cut"]);
 });
 
-test("what was done before it is known who does it is that person's", async () => {
+test("a change made before the user is known is stored under that user afterwards", async () => {
   outbox.begin("");
   serve(undefined, { body: {} });
   const sent = outbox.send(change("/early"));
@@ -202,7 +202,7 @@ test("what was done before it is known who does it is that person's", async () =
   await sent;
 });
 
-/** A browser's locks: one holder each, the others in the order they came; `close` is the end of a tab. */
+/** Mock of the Web Locks API: one holder per lock, the others wait in order; `close` ends the tab that made the requests. */
 function locksOf(all) {
   const mine = [];
   return {
@@ -221,7 +221,7 @@ function locksOf(all) {
   };
 }
 
-test("what waits in an open tab is left to it; once it is gone one of the others sends it, once", async () => {
+test("pending changes of an open tab are left to it; once it is closed, another tab of the user sends them once", async () => {
   const all = {};
   const tabs = ["one", "two", "three"].map((name) => ({
     locks: locksOf(all),
@@ -238,13 +238,13 @@ test("what waits in an open tab is left to it; once it is gone one of the others
   one.begin("ann");
   one.send(change("/a"));
   one.send(change("/b"));
-  two.begin("ann"); // opened while they wait
+  two.begin("ann"); // opened while the changes are pending
   three.begin("bea");
   for (const heard of listeners) heard({ key: [...kept.keys()][0] });
   await new Promise((resolve) => setTimeout(resolve));
   assert.deepEqual([one.waiting, two.waiting, three.waiting], [2, 0, 0]);
   assert.deepEqual(new Set(asked), new Set(["/a"]));
-  globalThis.fetch = () => new Promise(() => {}); // the first tab says nothing any more
+  globalThis.fetch = () => new Promise(() => {}); // the first tab gets no more responses
   live.dispatchEvent(new Event("online"));
   await new Promise((resolve) => setTimeout(resolve));
   asked.length = 0;

@@ -15,7 +15,7 @@ const MASK = {
   pixels: Uint8Array.from([0, 1, 1, 0, 0, 0, 0, 1]),
 };
 
-test("a mask's runs begin with what is off it and cover the frame", () => {
+test("the run lengths of a mask start with unset pixels and cover the frame", () => {
   assert.deepEqual(runsOf(MASK), { width: 4, height: 2, runs: [1, 2, 4, 1] });
   assert.deepEqual(
     runsOf({ width: 2, height: 1, pixels: Uint8Array.from([1, 1]) }).runs,
@@ -27,7 +27,7 @@ test("a mask's runs begin with what is off it and cover the frame", () => {
   );
 });
 
-test("a painted mask goes out as those of the server come, and a box is put in its frame", async () => {
+test("an encoded mask decodes to the same mask, and a box is placed in its frame", async () => {
   const bits = await encoded(MASK);
   assert.deepEqual(wholeMask(bits, await decodeBox(bits)), MASK);
   assert.equal(isEmpty(MASK), false);
@@ -38,7 +38,7 @@ test("a painted mask goes out as those of the server come, and a box is put in i
   );
 });
 
-test("a mask with nothing on it has no box, as those of the server", async () => {
+test("an empty mask is encoded with an empty box and decodes to an empty mask", async () => {
   const none = { width: 4, height: 2, pixels: new Uint8Array(8) };
   assert.ok(isEmpty(none));
   const bits = await encoded(none);

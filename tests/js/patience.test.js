@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { patiently } from "../../static/js/lib/patience.js";
 
-test("what is refused as too much at once is asked again after the time that was named, and said once", async () => {
+test("a request refused with a retry time is sent again after it, at most 20 times in all, and reported once", async () => {
   const heard = [];
   const waits = {
     retryMs: ({ ms }) => ms ?? null,

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { project } from "../../static/js/lib/points.js";
 
-test("of two points behind each other the nearer one is drawn", () => {
+test("of two points on one line of sight the nearer one is drawn", () => {
   const cloud = {
     positions: Int16Array.from([0, -50, 0, 0, 50, 0]),
     colours: Uint8Array.from([9, 9, 9, 200, 0, 0]),

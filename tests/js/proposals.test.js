@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { neighbour, surest } from "../../static/js/lib/proposals.js";
 
-test("proposals are walked round the end, past those about to go", () => {
+test("stepping through proposals wraps around and skips removed ones; confirming all leaves out doubtful ones", () => {
   const items = /** @type {any[]} */ (
     ["a", "b", "c"].map((id, k) => ({
       id,
@@ -22,6 +22,6 @@ test("proposals are walked round the end, past those about to go", () => {
   const ids = (/** @type {any[]} */ all) => all.map((item) => item.id);
   assert.deepEqual(ids(surest(items, 0.6).sure), ["a", "b"]);
   const [first, second] = [{ ...items[0], doubts: ["overlaps a drawer"] }, items[1]];
-  assert.deepEqual(ids(surest([first, second], 0.6).sure), ["b"]); // a person looks at the other first
+  assert.deepEqual(ids(surest([first, second], 0.6).sure), ["b"]); // the other has a doubt that a person should check
   assert.deepEqual(ids(surest([first, second], 0.6).leftOut), ["a"]);
 });

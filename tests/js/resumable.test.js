@@ -5,7 +5,7 @@ import { PIECE, sendRest, stoppedUpload } from "../../static/js/lib/resumable.js
 
 const file = new Blob([new Uint8Array(2 * PIECE + 10)]);
 
-/** A server that keeps half of a piece and then cannot be reached, so often. */
+/** Mock server that stores half of a piece and then loses the connection, this number of times. */
 function faultyServer(failures) {
   const kept = { bytes: 0, failures };
   return {
@@ -25,7 +25,7 @@ function faultyServer(failures) {
   };
 }
 
-test("an upload goes on where the server's copy ends, however often the connection is lost", async () => {
+test("an upload continues at the server's offset after each lost connection", async () => {
   for (const failures of [0, 1, 5]) {
     const server = faultyServer(failures);
     await sendRest(file, 0, server);
@@ -33,7 +33,7 @@ test("an upload goes on where the server's copy ends, however often the connecti
   }
 });
 
-test("an upload that is refused is given up", async () => {
+test("a refused upload fails with the server's error", async () => {
   const refusing = {
     ...faultyServer(0),
     send: async () => Promise.reject(new Error("too large")),
@@ -41,7 +41,7 @@ test("an upload that is refused is given up", async () => {
   await assert.rejects(sendRest(file, 0, refusing), /too large/);
 });
 
-test("only the same file goes on with a stopped upload", () => {
+test("a stopped upload is continued only with a file of the same name, size and date", () => {
   const stopped = { file_name: "a.r3d", size: 9, modified: 1.5, offset: 3 };
   assert.equal(stoppedUpload({ name: "a.r3d", size: 9, lastModified: 1500 }, [stopped]), stopped);
   for (const other of [{ name: "b.r3d" }, { size: 8 }, { lastModified: 1501 }])

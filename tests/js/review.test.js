@@ -60,7 +60,7 @@ function near(got, wanted) {
   );
 }
 
-test("a joint's motion there and back is no motion", () => {
+test("a joint motion followed by its inverse is the identity", () => {
   const turn = {
     name: "",
     kind: /** @type {const} */ ("revolute"),
@@ -71,7 +71,7 @@ test("a joint's motion there and back is no motion", () => {
   near(product(motion(turn, 0.7), motion(turn, -0.7)), STILL);
 });
 
-test("what hangs on an open door turns with it, and slides along its own axis", () => {
+test("a drawer on an open door turns with the door and slides along its own axis", () => {
   const scene = kitchen();
   scene.put(1, Math.PI / 2);
   scene.put(2, 0.5);
@@ -79,7 +79,7 @@ test("what hangs on an open door turns with it, and slides along its own axis", 
   near(apply(scene.worlds[2] ?? [], [0, 0, 0]), [1, 0.5, 0]);
 });
 
-test("a joint goes to its goal in steps and stops there", () => {
+test("a joint moves to its goal in steps and stops there", () => {
   const scene = kitchen();
   scene.toggle(2);
   assert.equal(scene.step(0.1), true);
@@ -89,7 +89,7 @@ test("a joint goes to its goal in steps and stops there", () => {
   assert.equal(scene.step(0.1), false);
 });
 
-test("a ray meets the nearest body, where that stands now", () => {
+test("a ray hits the nearest body at its current pose", () => {
   const scene = kitchen();
   assert.equal(scene.hit([0.5, 0.5, 5], [0, 0, -1]), 0);
   assert.equal(scene.hit([1.5, 0.5, 5], [0, 0, -1]), 1);

@@ -8,7 +8,7 @@ const group = (placement = {}) => ({ placement: { unsure: false, mask_iou: 0.95,
 /** @param {object} [more] @returns {any} */
 const item = (more = {}) => ({ warnings: [], joints: [{ sources: { axis: "measured", limits: "measured" } }], ...more });
 
-test("what is sure has no risk, and every doubt is told in words", () => {
+test("a reliable object has no risk, and every problem of an object is described in words", () => {
   assert.deepEqual(riskOf(group(), item(), []), { score: 0, why: "" });
   assert.equal(riskOf(/** @type {any} */ ({ placement: null }), undefined, []).why, "not placed");
   const doubtful = riskOf(group({ unsure: true, mask_iou: 0.5 }), item({ joints: [{ sources: { limits: "default" } }] }), []);
@@ -17,7 +17,7 @@ test("what is sure has no risk, and every doubt is told in words", () => {
   assert.ok(failed.score > riskOf(group({ unsure: true }), item(), []).score);
 });
 
-test("the riskiest come first, and those alike stay in their order", () => {
+test("objects with the highest risk come first, and equal ones keep their order", () => {
   const risks = new Map([1, 2, 3, 4].map((object) => [object, { score: object === 3 ? 5 : 1, why: "" }]));
   const order = riskiestFirst([{ object: 4 }, { object: 1 }, { object: 3 }, { object: 2 }], risks);
   assert.deepEqual(order.map(({ object }) => object), [3, 4, 1, 2]);

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { strips } from "../../static/js/lib/strips.js";
 
-test("frames that stand out are marked in the strips", () => {
+test("outlier frames are marked in every strip and counted in its summary", () => {
   const usual = {
     sharpness: 1,
     depth_share: 0.9,

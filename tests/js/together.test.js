@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { together } from "../../static/js/lib/together.js";
 
-test("the others are named once each, with where they are, and oneself not at all", () => {
+test("other people are listed once with all their pages, and the user's other tabs as their own", () => {
   const here = (tab, who, page, object = null) => ({ tab, who, page, object });
   const people = [
     here("a", "ann", "annotate", 3),

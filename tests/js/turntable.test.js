@@ -3,13 +3,13 @@ import { test } from "node:test";
 
 import { differs, turnedBy } from "../../static/js/lib/turntable.js";
 
-test("a drag turns by whole pictures, to either side", () => {
+test("a drag turns the candidate by whole images in either direction", () => {
   assert.equal(turnedBy(3, 25), 5);
   assert.equal(turnedBy(3, -25), 1);
   assert.equal(turnedBy(3, 2), 3);
 });
 
-test("how far a candidate lies off is told in millimetres where its size is known", () => {
+test("the deviation of a candidate is in millimetres where its size is known, else in percent", () => {
   const all = { against: "c0", longest_m: 0.8 };
   assert.equal(
     differs({ share: 0.124, most: 0.05 }, all),

@@ -14,14 +14,14 @@ const OFFER = {
   free_bytes: 30_000_000,
 };
 
-test("what variants take is told before they are made, with what is free", () => {
+test("the space that variants need is shown together with the free space", () => {
   assert.deepEqual(variantsTake(OFFER, 100), {
     text: "About 9.0 MB to download; 26.0 MB of disk while they are made, 30.0 MB free.",
     fits: true,
   });
 });
 
-test("more than there is room for, and no number, are not made", () => {
+test("variants that exceed the free space, or a count of zero, are not possible", () => {
   const { text, fits } = variantsTake(OFFER, 1000);
   assert.match(text, /too little room: 80\.0 MB of disk/);
   assert.equal(fits, false);

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { fit, pinch, toImage, toScreen, zoom } from "../../static/js/lib/view.js";
 
-test("zooming keeps the point under the cursor; screen and image are inverse", () => {
+test("zooming keeps the point under the cursor, and screen and image coordinates are inverse", () => {
   const view = fit({ width: 960, height: 720 }, { width: 500, height: 500 });
   const at = { x: 123, y: 321 };
   const before = toImage(view, at);
@@ -13,12 +13,12 @@ test("zooming keeps the point under the cursor; screen and image are inverse", (
   assert.ok(Math.abs(there.x - at.x) < 1e-9 && Math.abs(there.y - at.y) < 1e-9);
 });
 
-test("the whole image is visible and centred when fitted", () => {
+test("a fitted image is wholly visible and centred", () => {
   const view = fit({ width: 200, height: 100 }, { width: 400, height: 400 });
   assert.deepEqual(view, { scale: 2, x: 0, y: 100 });
 });
 
-test("two fingers keep what is between them, and spread it as they spread", () => {
+test("a pinch keeps the point between the fingers in place and scales by their distance", () => {
   const view = { scale: 2, x: 10, y: -5 };
   const [before, after] = [
     [
