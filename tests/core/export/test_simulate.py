@@ -168,6 +168,24 @@ def test_the_good_kitchen_has_no_contacts(tmp_path: Path) -> None:
     assert touches(model, {}) == []
 
 
+def test_a_touch_is_the_deepest_contact_of_its_pair_and_the_deepest_pair_is_first() -> None:
+    """Three balls of one body are 5, 12 and 8 mm deep in a block, the ball of another body is 20 mm deep in it."""
+
+    def ball(x: float, depth_m: float) -> str:
+        return f'<geom type="sphere" size="0.05" pos="{x} 0 {0.15 - depth_m}"/>'
+
+    bodies = {
+        "block": '<geom type="box" size="0.5 0.1 0.1"/>',
+        "three": ball(-0.4, 0.005) + ball(-0.2, 0.012) + ball(0.0, 0.008),
+        "one": ball(0.3, 0.02),
+    }
+    text = "".join(f'<body name="{name}"><freejoint/>{geoms}</body>' for name, geoms in bodies.items())
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{text}</worldbody></mujoco>")
+    found = touches(model, {})
+    assert [touch.names for touch in found] == ["one and block", "three and block"]
+    assert [touch.depth_m for touch in found] == pytest.approx([0.02, 0.012], abs=1e-6)
+
+
 def _without_body(text: str, name: str) -> str:
     import xml.etree.ElementTree as ET
 
