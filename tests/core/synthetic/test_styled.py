@@ -150,9 +150,11 @@ def test_object_surfaces_match_their_box(style: str) -> None:
 
 
 @pytest.mark.parametrize("palette", PALETTES)
-def test_a_palette_changes_the_front_paints(palette: str) -> None:
+def test_a_palette_changes_the_front_paints_but_not_their_gaps_or_thickness(palette: str) -> None:
     plain, painted = (plan_styled_kitchen(3, Choice(style="shaker", palette=p)) for p in (None, palette))
     assert painted.style.base_front != plain.style.base_front
+    assert painted.style.gap_m == plain.style.gap_m
+    assert painted.style.front_thickness_m == plain.style.front_thickness_m
     assert (painted.style.base_front == painted.style.wall_front) == (palette != "two-tone")
     mean = float(np.mean(painted.style.base_front.colour))
     assert {"dark": mean < 0.05, "white": mean > 0.7}.get(palette, True)
