@@ -1,5 +1,6 @@
 """Objects that fail while the bundle is written are left out, and the rest is certified."""
 
+import xml.etree.ElementTree as ET
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,8 @@ from r2c2r_core.export import stage, support
 from r2c2r_core.export.stage import ExportConfig, write_bundle
 from r2c2r_core.export.writers import table
 from r2c2r_core.model.report import ALIKE, Certificate
-from tests.core.export.kitchen import CREATED, reconstruction
+from r2c2r_core.model.scene import ArticulatedScene
+from tests.core.export.kitchen import CREATED, bottle, counter, reconstruction
 
 QUICK = ExportConfig(pictures=False, gripper=False, texture_max_px=64)
 
@@ -68,12 +70,20 @@ def test_an_object_that_fails_to_export_is_omitted_and_reported(
         assert "bottle_1" in archive.read("report.json").decode()
 
 
-def test_an_object_whose_support_search_fails_is_still_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_object_whose_support_search_fails_is_exported_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bottle is 5 mm above the counter, onto which the search would lower it."""
+
     def fails(*_: Any) -> None:
         raise np.linalg.LinAlgError("SVD did not converge")
 
     monkeypatch.setattr(support, "_carried_at", fails)
-    assert write_bundle(reconstruction(), tmp_path / "b.zip", QUICK, created=CREATED).left_out == {}
+    objects = (counter("counter_1"), bottle("bottle_1", bottom_z=0.87))
+    scene = ArticulatedScene(name="t", objects=objects, layout_moves_m={}, warnings=())
+    assert write_bundle(reconstruction(scene), tmp_path / "b.zip", QUICK, created=CREATED).left_out == {}
+    with zipfile.ZipFile(tmp_path / "b.zip") as archive:
+        origin = ET.fromstring(archive.read("scene.urdf")).find("joint[@name='bottle_1_body_to_world']/origin")
+    assert origin is not None
+    assert [float(number) for number in origin.attrib["xyz"].split()] == pytest.approx([0.2, -0.1, 0.87], abs=1e-6)
 
 
 @pytest.mark.parametrize(("step", "file"), [("scan_fits", ""), ("preview_png", "preview.png"), ("review_html", "review.html")])
