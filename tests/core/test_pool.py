@@ -98,13 +98,16 @@ def test_a_worker_exits_when_its_owner_is_gone() -> None:
         worker._process.wait()
 
 
-def test_the_number_of_workers_is_limited_by_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_workers_is_limited_by_memory_and_by_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(64)))
     free = psutil.virtual_memory()
     monkeypatch.setattr(psutil, "virtual_memory", lambda: free._replace(available=4 << 30))
     assert usual_workers() == 2
     monkeypatch.setattr(psutil, "virtual_memory", lambda: free._replace(available=0))
     assert usual_workers() == 1
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: free._replace(available=64 << 30))
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1, 2})
+    assert usual_workers() == 3
 
 
 def test_a_pool_without_tasks_starts_no_process() -> None:
