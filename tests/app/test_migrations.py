@@ -1,12 +1,16 @@
 import sqlite3
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
+import pytest
 from alembic.autogenerate import compare_metadata
+from alembic.config import Config
 from alembic.migration import MigrationContext
 from sqlalchemy import create_engine
 from sqlmodel import SQLModel
 
+from alembic import command
 from app.db.engine import migrate, open_engine
 from app.settings import shipped
 
@@ -19,6 +23,20 @@ def test_migrating_an_empty_file_gives_the_schema_of_the_models(tmp_path: Path) 
         context = MigrationContext.configure(connection, opts={"compare_type": True, "render_as_batch": True})
         assert compare_metadata(context, SQLModel.metadata) == []
     engine.dispose()
+
+
+def test_all_migrations_can_be_undone_and_applied_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "round.db"
+    open_engine(path).dispose()
+    before = _schema(path)
+    monkeypatch.setenv("R2C2R_DATABASE", f"sqlite:///{path}")
+    config = Config()
+    config.set_main_option("script_location", str(shipped("alembic", "env.py")))
+    config.set_main_option("path_separator", "os")
+    command.downgrade(config, "base")
+    assert set(_schema(path)) == {"alembic_version"}
+    command.upgrade(config, "head")
+    assert _schema(path) == before
 
 
 def test_migrating_a_migrated_database_again_keeps_its_tables(tmp_path: Path) -> None:
@@ -66,6 +84,13 @@ def _filled(connection: sqlite3.Connection, table: str) -> int:
     marks = ",".join("?" * len(values))
     connection.execute(f"INSERT INTO {table} ({','.join(values)}) VALUES ({marks})", list(values.values()))
     return int(connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0])
+
+
+def _schema(path: Path) -> dict[str, list[tuple[Any, ...]]]:
+    """Every table's columns, by its name."""
+    with closing(sqlite3.connect(path)) as connection:
+        names = _tables(path) - {"sqlite_sequence"}
+        return {name: connection.execute(f"PRAGMA table_info({name})").fetchall() for name in names}
 
 
 def _tables(path: Path) -> set[str]:
