@@ -17,6 +17,7 @@ from app.services.people import LOOK_UPS
 from r2c2r_core.errors import InputError
 from tests.app.conftest import ORIGIN, SOCKETS, Running
 from tests.app.people import PASSWORD
+from tests.app.test_people import closed_with
 
 PROXY, ELSEWHERE = "10.20.0.7", "10.20.1.7"
 TRUSTING = {
@@ -93,7 +94,7 @@ def test_a_forwarded_client_address_is_not_checked_as_the_proxy(web: Running) ->
     assert by(web, PROXY, "ann", **told).get("/api/system").status_code == 200
 
 
-def test_websockets_are_accepted_from_the_proxy_only_and_follow_the_role(web: Running) -> None:
+def test_websockets_are_accepted_from_the_proxy_only_and_follow_the_account(web: Running) -> None:
     at = {"headers": {"Origin": ORIGIN}}
     with (
         pytest.raises(WebSocketDisconnect) as refused,
@@ -106,6 +107,9 @@ def test_websockets_are_accepted_from_the_proxy_only_and_follow_the_role(web: Ru
         accounts.change(web.context.engine, "ann", role="reviewer")
         web.context.people.look_again()
         assert live.receive_json() == {"type": "you", "seq": 0, "project": None, "name": "ann", "role": "reviewer"}
+        accounts.remove(web.context.engine, "ann")
+        web.context.people.look_again()
+        assert closed_with(live) == 4401
 
 
 def test_a_duplicated_user_header_is_refused(web: Running) -> None:
