@@ -40,6 +40,14 @@ def run(web: Running, project: str) -> int:
     return int(web.post(f"/api/projects/{project}/run", {}, 202)["id"])
 
 
+def worker_of(web: Running, job: int) -> int:
+    """Process id of the job's worker, 0 before it has one."""
+    with reading(web.context.engine) as session:
+        row = session.get(Job, job)
+        assert row is not None
+        return row.worker_pid or 0
+
+
 def request_of(web: Running, project: str, job: int) -> Path:
     """Folder of the job's request files."""
     return web.settings.data_dir / "projects" / project / "requests" / str(job)
@@ -131,10 +139,7 @@ def test_a_job_resumes_after_its_worker_is_killed_once(web: Running) -> None:
     job = run(web, project)
     web.until(lambda: (folder / "hanging").exists())
     (folder / "behave.json").unlink()
-    with reading(web.context.engine) as session:
-        row = session.get(Job, job)
-        assert row is not None
-        os.killpg(row.worker_pid or 0, signal.SIGKILL)
+    os.killpg(worker_of(web, job), signal.SIGKILL)
     assert web.job(job, "done", "failed")["state"] == "done"
     assert "taken up again" in str(web.get(f"/api/jobs/{job}/events"))
 
@@ -167,6 +172,22 @@ def test_cancelling_stops_workers_also_if_they_ignore_sigterm(web: Running) -> N
         assert web.post(f"/api/jobs/{job}/cancel")["state"] in ("cancelling", "cancelled")
         web.job(job, "cancelled")
         assert web.get(f"/api/projects/{project}")["status"] == "ready"
+
+
+@about_workers
+def test_cancelling_answers_before_the_worker_stops(start: Callable[..., Any]) -> None:
+    with start(kill_grace_s=PATIENCE_S) as web:  # the deaf worker runs until this test kills it
+        project = web.sample()
+        folder = behave(web, project, segment="deaf")
+        job = run(web, project)
+        web.until(lambda: (folder / "hanging").exists() and worker_of(web, job))
+        worker = worker_of(web, job)
+        try:
+            assert web.post(f"/api/jobs/{job}/cancel")["state"] == "cancelling"
+            assert _alive(worker)
+        finally:
+            os.killpg(worker, signal.SIGKILL)
+        web.job(job, "cancelled")
 
 
 def test_heavy_jobs_run_one_at_a_time_and_report_their_queue_position(web: Running) -> None:
