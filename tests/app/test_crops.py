@@ -52,10 +52,10 @@ def test_prompts_json_version_3_stores_the_crop_box_and_is_read_back(web: Runnin
 
 
 @pytest.mark.parametrize("edges", [CROP["edges_m"][:2], [[1, 0, 0], [1, 1, 0], [0, 0, 1]], [[0, 0, 0]] * 3])
-def test_an_invalid_crop_box_is_not_stored(web: Running, edges: Any) -> None:
+def test_an_invalid_crop_box_is_refused_and_not_stored(web: Running, edges: Any) -> None:
     project = web.sample()
     made = web.post(f"/api/projects/{project}/objects", MUG, 201)
-    web.client.patch(f"/api/projects/{project}/objects/{made['id']}", json={"crop": {**CROP, "edges_m": edges}})
+    web.patch(f"/api/projects/{project}/objects/{made['id']}", {"crop": {**CROP, "edges_m": edges}}, 422)
     (item,) = [one for one in web.get(f"/api/projects/{project}/objects") if one["id"] == made["id"]]
     assert item["crop"] is None
 
