@@ -66,10 +66,14 @@ def test_accounts_are_managed_from_the_command_line(
     assert "ann" not in user("list")[1]
 
 
-def test_a_data_folder_that_cannot_be_created_raises(tmp_path: Path) -> None:
+def test_a_data_folder_that_cannot_be_created_is_reported_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(EnvironmentProblem):
-        serve(host="127.0.0.1", port=0, data_dir=tmp_path / "file" / "data")
+    assert main(["serve", "--port", "0", "--data", str(tmp_path / "file" / "data")]) == EnvironmentProblem.exit_code
+    captured = capsys.readouterr()
+    (line,) = (captured.out + captured.err).splitlines()
+    assert "file/data: Not a directory; choose another folder with --data" in line
 
 
 def test_the_server_prints_its_address_and_locks_its_data_folder(tmp_path: Path) -> None:
