@@ -137,7 +137,7 @@ def test_a_job_resumes_after_its_worker_is_killed_once(web: Running) -> None:
     project = web.sample()
     folder = behave(web, project, generate="hang")
     job = run(web, project)
-    web.until(lambda: (folder / "hanging").exists())
+    web.until(lambda: (folder / "hanging").exists() and worker_of(web, job))
     (folder / "behave.json").unlink()
     os.killpg(worker_of(web, job), signal.SIGKILL)
     assert web.job(job, "done", "failed")["state"] == "done"
@@ -360,12 +360,12 @@ def test_a_job_interrupted_by_restarts_survives_a_killed_worker(start: Callable[
         session.add(Job(project_id=project, kind="run", state="running", created=time.time(), attempts=5))
     engine.dispose()
     with start() as web:
-        web.until(lambda: (folder / "hanging").exists())
-        (folder / "behave.json").unlink()
         with reading(web.context.engine) as session:
-            (job,) = session.exec(select(Job).where(Job.kind == "run"))
-        os.killpg(job.worker_pid or 0, signal.SIGKILL)
-        assert web.job(job.id or 0, "done", "failed")["state"] == "done"
+            job = session.exec(select(Job).where(Job.kind == "run")).one().id or 0
+        web.until(lambda: (folder / "hanging").exists() and worker_of(web, job))
+        (folder / "behave.json").unlink()
+        os.killpg(worker_of(web, job), signal.SIGKILL)
+        assert web.job(job, "done", "failed")["state"] == "done"
 
 
 def test_a_killed_server_loses_no_clicks_and_the_next_one_continues(start: Callable[..., Any], tmp_path: Path) -> None:
