@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 from tests.app.nouns import finish
 from tests.browser.looks import picture
 from tests.browser.serving import NewContext, box_of
-from tests.browser.test_together import sample
+from tests.browser.test_together import ready, sample
 from tests.browser.together import Server, signed_in
 
 
@@ -34,6 +34,7 @@ def test_a_crop_box_is_dragged_typed_undone_and_removed(new_context: NewContext,
     project = sample(page).split("/p/")[1]
     finish(server.data / "projects" / project / "work")  # cameras and depth, as after reading the recording
     page.get_by_role("link", name="Annotate").click()
+    ready(page)
     page.get_by_role("button", name="mug_1", exact=True).click()
     page.keyboard.press("g")
     expect(page.locator("r2c2r-object-cloud")).to_contain_text("from")
