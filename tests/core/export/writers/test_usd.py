@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
@@ -106,6 +107,17 @@ def test_drives_and_friction_use_usd_units(stage: Usd.Stage, plan: Plan) -> None
         ]
         say = prim.GetAttribute(f"physxJointAxis:{instance}:staticFrictionEffort")
         assert say.Get() == pytest.approx(body.joint.friction)
+
+
+def test_newton_gets_the_joint_parameters_that_mujoco_has_in_the_mjcf(stage: Usd.Stage, good_folder: Path) -> None:
+    model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+    joints = [model.joint(number) for number in range(model.njnt) if model.jnt_type[number] != mujoco.mjtJoint.mjJNT_FREE]
+    assert joints
+    for joint in joints:
+        prim = named(stage, joint.name)
+        assert prim.GetAttribute("mjc:frictionloss").Get() == pytest.approx(joint.frictionloss[0])
+        assert prim.GetAttribute("mjc:armature").Get() == pytest.approx(joint.armature[0])
+        assert list(prim.GetAttribute("mjc:solreflimit").Get()) == pytest.approx(list(model.jnt_solref[joint.id]))
 
 
 def test_visuals_are_textured_and_colliders_are_convex_guides(stage: Usd.Stage, good_folder: Path) -> None:
