@@ -49,6 +49,9 @@ APART = {
         variable="R2C2R_WARP_PYTHON", module="mujoco_warp", reads="scene.xml", probe="warp_probe.py", seconds=900
     ),
     "Newton": Apart(variable="R2C2R_NEWTON_PYTHON", module="newton", reads="scene.usda", probe="newton_probe.py", seconds=900),
+    "Genesis": Apart(  # its first run compiles its kernels: 240 s of processor
+        variable="R2C2R_GENESIS_PYTHON", module="genesis", reads="scene.xml", probe="genesis_probe.py", seconds=900
+    ),
     "NVIDIA asset validator": Apart(
         variable="R2C2R_ASSET_VALIDATOR_PYTHON", module="omni.asset_validator", reads="scene.usda", probe="omniverse_probe.py"
     ),

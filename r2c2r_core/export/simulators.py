@@ -83,6 +83,20 @@ solver = newton.solvers.SolverMuJoCo(model)""",
         loader="Newton",
     ),
     Recipe(
+        simulator="Genesis",
+        install="pip install genesis-world torch",
+        language="python",
+        code="""\
+import genesis as gs
+gs.init(backend=gs.cpu)  # or gs.gpu
+scene = gs.Scene(show_viewer=False)
+kitchen = scene.add_entity(gs.morphs.MJCF(file="scene.xml", decimate=False))
+scene.build()
+scene.step()""",
+        note="The first run compiles for minutes. decimate=False keeps the colliders as they are: simple and convex.",
+        loader="Genesis",
+    ),
+    Recipe(
         simulator="Isaac Sim",
         install="Isaac Sim 5, its own Python",
         language="python",

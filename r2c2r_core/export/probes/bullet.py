@@ -1,4 +1,4 @@
-"""Load a URDF in PyBullet and write out its values: `python bullet.py scene.urdf answer.json`."""
+"""Load a URDF in PyBullet, release every joint along its travel, write out its values: `bullet.py scene.urdf answer.json`."""
 
 import json
 import sys
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from releasing import STEP_S, STEPS, release_everywhere  # type: ignore[import-not-found]  # the file beside this one
 
 
 def read_back(urdf: str) -> dict[str, Any]:
@@ -43,8 +44,27 @@ def read_back(urdf: str) -> dict[str, Any]:
                 "effort": info[10],
                 "velocity": info[11],
             }
+    problem = _swept(pybullet, body, joints)
     pybullet.disconnect(client)
-    return {"version": f"PyBullet {version('pybullet')}", "joints": joints, "bodies": bodies}
+    return {"version": f"PyBullet {version('pybullet')}", "joints": joints, "bodies": bodies, "problem": problem}
+
+
+def _swept(pybullet: Any, body: int, joints: dict[str, Any]) -> str:
+    """Description of the first joint that fails the release sweep, without the default motors; empty where none does."""
+    number = {pybullet.getJointInfo(body, k)[1].decode(): k for k in range(pybullet.getNumJoints(body))}
+    pybullet.setTimeStep(STEP_S)
+    pybullet.setGravity(0, 0, -9.81)
+    for name in joints:
+        pybullet.setJointMotorControl2(body, number[name], pybullet.VELOCITY_CONTROL, force=0)
+
+    def released(name: str, position: float) -> float:
+        for other in joints:
+            pybullet.resetJointState(body, number[other], position if other == name else 0.0)
+        for _ in range(STEPS):
+            pybullet.stepSimulation()
+        return float(pybullet.getJointState(body, number[name])[0])
+
+    return str(release_everywhere({name: (joint["lower"], joint["upper"]) for name, joint in joints.items()}, released))
 
 
 def _rotation(pybullet: Any, quat_xyzw: tuple[float, ...]) -> np.ndarray:

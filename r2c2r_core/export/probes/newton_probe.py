@@ -1,8 +1,8 @@
 """Load scene.usda in Newton, on the CPU, and write out its values: `python newton_probe.py scene.usda answer.json`.
 
-Runs in Newton's own environment, so it imports nothing from r2c2r. Every joint in turn is set to its limit and the scene
-stepped by Newton's MuJoCo solver: a non-finite value is a problem. Newton reads friction and armature from its own schema,
-damping and effort from the drive; it has no body for fixed parts.
+Runs in Newton's own environment, so it imports nothing from r2c2r but its neighbouring script. Every joint is released along
+its travel in Newton's MuJoCo solver. Newton reads friction and armature from its own schema, damping and effort from the
+drive; it has no body for fixed parts.
 """
 
 import json
@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from releasing import STEP_S, STEPS, release_everywhere  # type: ignore[import-not-found]  # the file beside this one
 
-_STEPS, _STEP_S = 10, 0.002
 _KINDS = {0: "prismatic", 1: "revolute"}  # newton.JointType
 _COLLIDES = 2  # newton.ShapeFlags.COLLIDE_SHAPES
-_HELD = 0.05  # maximum fraction of its travel that a joint may move in 0.02 s when released at its limit
 
 
 def read_back(scene: Path) -> dict[str, Any]:
@@ -83,27 +82,25 @@ def _body(model: Any, closed: Any, body: int) -> dict[str, Any]:
 
 
 def _swept(newton: Any, model: Any, moving: list[int]) -> str:
-    """Description of the first joint that fails at its limit; empty where none does."""
-    solver, control = newton.solvers.SolverMuJoCo(model), model.control()
-    for joint in moving:
-        name = str(model.joint_label[joint]).rsplit("/", 1)[-1]
-        at, dof = int(model.joint_q_start.numpy()[joint]), int(model.joint_qd_start.numpy()[joint])
-        upper = float(model.joint_limit_upper.numpy()[dof])
-        now, after = model.state(), model.state()
-        q = model.joint_q.numpy()
-        q[at] = upper
+    """Description of the first joint that fails the release sweep; empty where none does."""
+    solver, control, closed = newton.solvers.SolverMuJoCo(model), model.control(), model.joint_q.numpy()
+    number = {str(model.joint_label[joint]).rsplit("/", 1)[-1]: joint for joint in moving}
+    starts, dofs = model.joint_q_start.numpy(), model.joint_qd_start.numpy()
+    lower, upper = model.joint_limit_lower.numpy(), model.joint_limit_upper.numpy()
+
+    def released(name: str, position: float) -> float:
+        now, after, q = model.state(), model.state(), closed.copy()
+        q[starts[number[name]]] = position
         now.joint_q.assign(q)
         newton.eval_fk(model, now.joint_q, now.joint_qd, now)
-        for _ in range(_STEPS):
+        for _ in range(STEPS):
             now.clear_forces()
-            solver.step(now, after, control, None, _STEP_S)
+            solver.step(now, after, control, None, STEP_S)
             now, after = after, now
-        found = now.joint_q.numpy()
-        if not np.isfinite(found).all():
-            return f"it diverges with {name} open"
-        if abs(found[at] - upper) > _HELD * upper:
-            return f"{name}, released at {upper:.3g}, is at {found[at]:.3g} after {_STEPS} steps"
-    return ""
+        return float(now.joint_q.numpy()[starts[number[name]]])
+
+    limits = {name: (float(lower[dofs[joint]]), float(upper[dofs[joint]])) for name, joint in number.items()}
+    return str(release_everywhere(limits, released))
 
 
 def _matrix(quat_xyzw: np.ndarray) -> np.ndarray:

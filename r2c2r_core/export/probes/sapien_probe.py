@@ -1,11 +1,13 @@
 """Load a URDF in SAPIEN and write out its values: `python sapien_probe.py scene.urdf answer.json`.
 
-Runs in SAPIEN's own environment, so it imports nothing from r2c2r. Visuals are stripped first: SAPIEN 3 needs a Vulkan GPU for
+Runs in SAPIEN's own environment, so it imports nothing from r2c2r but its neighbouring script. Every joint is released along
+its travel, with the pairs of scene.srdf disabled. Visuals are stripped first: SAPIEN 3 needs a Vulkan GPU for
 them even to load. Its URDF loader drops joint friction, effort and velocity (3.0.3: `articulation_builder.py` sets limits and
 damping only, every joint keeps PhysX's default friction of 0.05), so those are not read.
 """
 
 import json
+import shutil
 import sys
 import tempfile
 import xml.etree.ElementTree as ET
@@ -13,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from releasing import STEP_S, STEPS, release_everywhere  # type: ignore[import-not-found]  # the file beside this one
 
 
 def read_back(urdf: Path) -> dict[str, Any]:
@@ -21,6 +24,7 @@ def read_back(urdf: Path) -> dict[str, Any]:
     from sapien import physx
 
     scene = sapien.Scene([physx.PhysxCpuSystem()])
+    scene.set_timestep(STEP_S)
     loader = scene.create_urdf_loader()
     loader.fix_root_link = True
     with tempfile.TemporaryDirectory() as scratch:
@@ -30,7 +34,25 @@ def read_back(urdf: Path) -> dict[str, Any]:
         "version": f"SAPIEN {sapien.__version__}",
         "joints": {joint.name: _joint(joint) for joint in robot.get_active_joints()},
         "bodies": {link.name: _body(link) for link in robot.get_links() if link.name != "world"},
+        "problem": _swept(scene, robot),
     }
+
+
+def _swept(scene: Any, robot: Any) -> str:
+    """Description of the first joint that fails the release sweep; empty where none does."""
+    joints = robot.get_active_joints()
+    number = {joint.name: k for k, joint in enumerate(joints)}
+
+    def released(name: str, position: float) -> float:
+        qpos = np.zeros(robot.dof)
+        qpos[number[name]] = position
+        robot.set_qpos(qpos)
+        robot.set_qvel(np.zeros(robot.dof))
+        for _ in range(STEPS):
+            scene.step()
+        return float(robot.get_qpos()[number[name]])
+
+    return str(release_everywhere({joint.name: tuple(map(float, joint.get_limits()[0])) for joint in joints}, released))
 
 
 def _joint(joint: Any) -> dict[str, Any]:
@@ -60,7 +82,7 @@ def _body(link: Any) -> dict[str, Any]:
 
 
 def without_visuals(urdf: Path, scratch: Path) -> Path:
-    """A copy of the URDF without <visual>, its mesh paths made absolute."""
+    """A copy of the URDF without <visual>, its mesh paths made absolute, beside a copy of its SRDF."""
     document = ET.parse(urdf)
     for link in document.getroot().iter("link"):
         for visual in link.findall("visual"):
@@ -69,6 +91,8 @@ def without_visuals(urdf: Path, scratch: Path) -> Path:
         mesh.set("filename", str(urdf.parent / mesh.get("filename", "")))
     stripped = scratch / "stripped.urdf"
     document.write(stripped)
+    if urdf.with_suffix(".srdf").is_file():
+        shutil.copy(urdf.with_suffix(".srdf"), stripped.with_suffix(".srdf"))  # SAPIEN looks for it beside the URDF
     return stripped
 
 

@@ -1,11 +1,15 @@
 """The valid kitchen as a bundle's folder, without the slow parts (preview, reports)."""
 
+import importlib
 import json
 import shutil
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import r2c2r_core.export.probes as probes
 from r2c2r_core.export.handles import with_handles
 from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.plan import Plan, plan_bundle
@@ -41,3 +45,13 @@ def write_folder(scene: ArticulatedScene, folder: Path) -> Path:
 def write_meshes(plan: Plan, folder: Path, texture_max_px: int = 2048) -> None:
     for body in plan.bodies:
         write_body(body, folder, texture_max_px)
+
+
+def probe(name: str) -> Any:
+    """A probe, imported as the program that it is: with its folder on the path, where it finds its neighbours."""
+    folder = str(Path(probes.__file__).parent)
+    sys.path.insert(0, folder)
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path.remove(folder)

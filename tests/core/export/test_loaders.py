@@ -56,6 +56,20 @@ def test_newton_keeps_all_values_except_velocity_and_fixed_bodies(good_folder: P
     assert found.detail.endswith("it does not keep joint velocity")
 
 
+@own_environment("Genesis")
+def test_genesis_accepts_the_good_bundle_and_detects_an_edited_limit(
+    good_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(APART["Genesis"].variable, GIVEN["Genesis"])
+    found = verdicts(good_folder)["Genesis"]
+    assert found.state == "passed", found
+    assert "4 joints, 9 links" in found.detail
+    assert found.detail.endswith("it does not keep joint velocity")
+    scene = good_folder / "scene.xml"
+    scene.write_text(scene.read_text().replace('range="0 0.42"', 'range="0 0.9"'))
+    assert "drawer_1_slide has limits 0 .. 0.9, not 0 .. 0.42" in verdicts(good_folder)["Genesis"].detail
+
+
 @own_environment("NVIDIA asset validator")
 def test_nvidias_validator_passes_the_good_bundle_and_fails_one_without_a_unit(
     good_folder: Path, monkeypatch: pytest.MonkeyPatch

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from r2c2r_core.export.probes import bullet, mujoco_model, sapien_probe, usd, yourdf
+from r2c2r_core.export.probes import mujoco_model, usd, yourdf
 from r2c2r_core.export.readback import RESISTANCE, Readback, differences, expected_readback, readback_of
 from r2c2r_core.export.reading import read_urdf
+from tests.core.export.conftest import probe
 
 SAPIEN = os.environ.get("R2C2R_SAPIEN_PYTHON", "")
 JOINT, LINK = "drawer_1_slide", "drawer_1_drawer"
@@ -77,7 +78,7 @@ URDF_EDITS: dict[str, tuple[Callable[[ET.Element], None], str]] = {
 URDF_PROBES: dict[str, Callable[[Path], dict[str, Any]]] = {
     "yourdfpy": yourdf.read_back,
     "mujoco": mujoco_model.read_back,
-    "pybullet": lambda path: bullet.read_back(str(path)),
+    "pybullet": lambda path: probe("bullet").read_back(str(path)),
 }
 
 
@@ -110,7 +111,7 @@ def test_sapien_keeps_all_values_except_friction_effort_and_velocity(bundle: Pat
 
     answer = bundle / "sapien.json"
     broken = edited_urdf(bundle, "sapien", all_of_them)
-    subprocess.run([SAPIEN, sapien_probe.__file__, str(broken), str(answer)], check=True, capture_output=True)
+    subprocess.run([SAPIEN, probe("sapien_probe").__file__, str(broken), str(answer)], check=True, capture_output=True)
     found = readback_of(json.loads(answer.read_text()))
     assert found.not_kept == ("friction", "effort", "velocity")
     lines = differences(expected, found)

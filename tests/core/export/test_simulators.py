@@ -9,15 +9,14 @@ from pathlib import Path
 import pytest
 
 from r2c2r_core.export.loaders import APART, EVERY_LOADER
-from r2c2r_core.export.probes.sapien_probe import without_visuals
 from r2c2r_core.export.simulators import Recipe, recipes
-from tests.core.export.conftest import write_folder
+from tests.core.export.conftest import probe, write_folder
 from tests.core.export.kitchen import kitchen
 from tests.waiting import PATIENCE_S
 
 RECIPES = {recipe.simulator: recipe for recipe in recipes("hand made", "cabinet_1")}
 HERE = {"MuJoCo": "mujoco", "PyBullet": "pybullet"}
-ELSEWHERE = {"MJX": "MJX", "MuJoCo Warp": "MuJoCo Warp", "Newton": "Newton", "Drake": "Drake"}
+ELSEWHERE = {"MJX": "MJX", "MuJoCo Warp": "MuJoCo Warp", "Newton": "Newton", "Drake": "Drake", "Genesis": "Genesis"}
 WITHOUT_A_DEVICE = {"SAPIEN, ManiSkill"}
 NOT_FROM_PYPI = {"Isaac Sim", "Isaac Lab", "ROS 2", "Gazebo"}  # only files are checked: they need a GPU or a system
 READERS = {"yourdfpy", "MuJoCo (URDF)", "USD"}  # loaders of the certificate that are not separate simulators
@@ -78,7 +77,7 @@ def test_the_sapien_recipe_runs_without_a_gpu_as_its_note_describes(folder: Path
     without = re.search(r"sapien\.Scene\([^)]*\)\]\)", recipe.note)
     assert without is not None
     code = recipe.code.replace("sapien.Scene()", without[0]).replace(
-        "scene.urdf", str(without_visuals(folder / "scene.urdf", tmp_path))
+        "scene.urdf", str(probe("sapien_probe").without_visuals(folder / "scene.urdf", tmp_path))
     )
     ran = subprocess.run([python, "-c", code], cwd=folder, capture_output=True, text=True, check=False, timeout=PATIENCE_S * 4)
     assert ran.returncode == 0, ran.stderr

@@ -1,6 +1,5 @@
 """Joint sweeps compared with MuJoCo's, with MuJoCo's own steps in place of another engine's."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,17 +7,12 @@ import mujoco
 import numpy as np
 import pytest
 
-import r2c2r_core.export.probes as probes
+from tests.core.export.conftest import probe
 
 
-@pytest.fixture
-def sweeping(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The module, imported as the probes import it: from the same folder."""
-    monkeypatch.syspath_prepend(str(Path(probes.__file__).parent))
-    import sweeping
-
-    yield sweeping
-    sys.modules.pop("sweeping")
+@pytest.fixture(scope="module")
+def sweeping() -> Any:
+    return probe("sweeping")
 
 
 def stepped_in(model: Any) -> Any:
