@@ -1,6 +1,7 @@
 """`r2c2r doctor`: capabilities of this machine, and commands that fix missing ones."""
 
 import ctypes.util
+import os
 import shutil
 import socket
 import sys
@@ -100,6 +101,8 @@ def _plugins() -> list[MachineFinding]:
 
 
 def _loaders() -> list[MachineFinding]:
+    from r2c2r_core.export.loaders import APART
+
     findings = []
     for package, hint in (
         ("mujoco", ""),
@@ -111,7 +114,18 @@ def _loaders() -> list[MachineFinding]:
             findings.append(MachineFinding(f"loader {package}", "ok", version(package)))
         except PackageNotFoundError:
             findings.append(MachineFinding(f"loader {package}", "absent", hint))
-    return findings
+    return [*findings, *(_environment(name, own.variable) for name, own in APART.items())]
+
+
+def _environment(loader: str, variable: str) -> MachineFinding:
+    """Finding on the separate Python environment of a loader."""
+    python = os.environ.get(variable)
+    if not python:
+        hint = f"install it in an environment of its own and set {variable} to its python"
+        return MachineFinding(f"loader {loader}", "absent", hint)
+    if not Path(python).is_file():
+        return MachineFinding(f"loader {loader}", "problem", f"{variable} is {python}, which does not exist")
+    return MachineFinding(f"loader {loader}", "ok", python)
 
 
 def _gpu() -> MachineFinding:

@@ -16,6 +16,8 @@ import pytest
 
 from r2c2r_core import cli
 from r2c2r_core.cli import build_parser, main
+from r2c2r_core.doctor import examine_machine
+from r2c2r_core.export.loaders import APART
 from r2c2r_core.synthetic.choices import LAYOUTS, PALETTES, STYLES
 
 from .ingest.corruptions import Corruption, corrupt_r3d
@@ -207,6 +209,18 @@ def test_doctor_lists_every_segmenter_and_licence(tmp_path: Path) -> None:
     assert "SAM License" in said
     assert "licence" in said.lower() or "Apache" in said
     assert json.loads((tmp_path / "d.json").read_text())["version"] == 1
+
+
+def test_doctor_reports_the_environments_of_loaders(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for own in APART.values():
+        monkeypatch.delenv(own.variable, raising=False)
+    monkeypatch.setenv("R2C2R_DRAKE_PYTHON", sys.executable)
+    monkeypatch.setenv("R2C2R_GENESIS_PYTHON", str(tmp_path / "python"))
+    found = {finding.what: finding for finding in examine_machine(tmp_path)}
+    assert {found[f"loader {name}"].state for name in APART} == {"ok", "absent", "problem"}
+    assert found["loader Drake"].detail == sys.executable
+    assert found["loader Genesis"].detail == f"R2C2R_GENESIS_PYTHON is {tmp_path / 'python'}, which does not exist"
+    assert "set R2C2R_NEWTON_PYTHON" in found["loader Newton"].detail
 
 
 @pytest.mark.parametrize(
