@@ -1,4 +1,4 @@
-"""Convex decomposition of a mug or a bowl that keeps its cavity open: staves around it, in rings, on a floor.
+"""Convex decomposition of a mug or a bowl that keeps its cavity open: staves around it on a floor, in rings where curved.
 
 CoACD does not handle thin walls well: with 12 to 24 pieces 66 to 87 % of a mug's cavity stayed open, in 3 to 10 s of CPU;
 staves leave 98 %, in under a second (measured on a mug and a bowl with walls of 4 and 8 mm).
@@ -41,13 +41,33 @@ def staves(vertices: Points, faces: Faces) -> list[Points] | None:
         return None
     floor, top = hollow.floor_z + params.floor_m, float(vertices[:, 2].max())
     centre = hollow.points.mean(axis=0)
-    pieces = [solid.trim_by_plane((0.0, 0.0, -1.0), -floor)]
-    edges = np.linspace(floor, top, params.rings + 1)
-    for low, high in pairwise(edges):
-        ring = solid.trim_by_plane((0.0, 0.0, 1.0), low).trim_by_plane((0.0, 0.0, -1.0), -high)
-        pieces += [_sector(ring, centre, number) for number in range(params.staves)]
-    parts = [part for piece in pieces for part in piece.decompose()]
-    return [np.array(part.to_mesh64().vert_properties, dtype=np.float64)[:, :3] for part in parts if part.num_tri() > 0]
+    hulls = [part.hull() for part in solid.trim_by_plane((0.0, 0.0, -1.0), -floor).decompose()]
+    rings = [
+        solid.trim_by_plane((0.0, 0.0, 1.0), low).trim_by_plane((0.0, 0.0, -1.0), -high)
+        for low, high in pairwise(np.linspace(floor, top, params.rings + 1))
+    ]
+    for number in range(params.staves):
+        hulls += _joined([part for ring in rings for part in _sector(ring, centre, number).decompose()])
+    return [np.array(hull.to_mesh64().vert_properties, dtype=np.float64)[:, :3] for hull in hulls if hull.num_tri() > 0]
+
+
+def _joined(parts: list[Any]) -> list[Any]:
+    """Hulls of one sector's parts from below; two join where that fills no more space than the lesser of them does already.
+
+    Straight walls then need one piece a sector: GPU engines compile or store a function for each pair of collider meshes.
+    """
+    joined: list[tuple[Any, float]] = []  # hull, and the space in m^3 that it fills beyond its parts
+    for part in parts:
+        own, filled = part.hull(), part.hull().volume() - part.volume()
+        for k, (hull, before) in enumerate(joined):
+            both = (hull + own).hull()
+            more = both.volume() - hull.volume() - own.volume()
+            if more <= min(before, filled):
+                joined[k] = both, before + filled + more
+                break
+        else:
+            joined.append((own, filled))
+    return [hull for hull, _ in joined]
 
 
 def _sector(ring: Any, centre: np.ndarray, number: int) -> Any:

@@ -40,6 +40,12 @@ def test_colliders_of_a_mug_and_a_bowl_keep_the_cavity_open(height_m: float, rad
     assert share_filled(hollow.points, [piece.vertices_link for piece in pieces]) < 0.05
 
 
+def test_a_straight_wall_has_one_collider_for_each_stave() -> None:
+    pieces = staves(*mug())
+    assert pieces is not None
+    assert len(pieces) <= 24  # 16 staves, the floor, and the handle in parts
+
+
 def test_the_hole_of_a_mug_handle_stays_open() -> None:
     vertices, faces = mug()
     pieces = staves(vertices, faces)
