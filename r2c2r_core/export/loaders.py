@@ -20,12 +20,14 @@ from typing import Any
 from r2c2r_core.export.omniverse import validated
 from r2c2r_core.export.readback import Readback, differences, expected_readback, readback_of
 from r2c2r_core.export.reading import Urdf
+from r2c2r_core.limits import free_memory
 from r2c2r_core.model.report import LoaderResult
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.threads import in_threads
 
 _PROBES = Path(__file__).parent / "probes"
 _SECONDS = 180
+_MEMORY_SHARE = 0.8  # of the free memory, for one loader
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,17 +162,23 @@ def _usd(scene: Path) -> dict[str, Any]:
 
 
 def _probe(command: list[str], scene: Path, seconds: int = _SECONDS) -> dict[str, Any]:
-    """Run a loader in a separate process and folder, as it may crash, print, and write logs."""
+    """Run a loader in a separate process and folder, as it may crash, print, write logs, and fill the memory."""
+    memory = free_memory(_MEMORY_SHARE)
     with tempfile.TemporaryDirectory() as scratch:
         answer = Path(scratch) / "answer.json"
-        words = [*command, str(scene.resolve()), str(answer)]
+        words = [*_limited(memory), *command, str(scene.resolve()), str(answer)]
         run = subprocess.run(words, capture_output=True, timeout=seconds, check=False, cwd=scratch)
         if run.returncode != 0 or not answer.is_file():
             said = run.stderr.decode(errors="replace").strip().splitlines()
             died = f"killed by {signal.Signals(-run.returncode).name}" if run.returncode < 0 else "failed"
-            raise RuntimeError(f"{died}: {said[-1] if said else 'no output'}")
+            raise RuntimeError(f"{died} (limited to {memory / 1e9:.1f} GB): {said[-1] if said else 'no output'}")
         document: dict[str, Any] = json.loads(answer.read_text())
     return document
+
+
+def _limited(memory_bytes: int) -> list[str]:
+    """Words before a command that limit its memory: MJX compiled for 55 collider meshes takes over 24 GB."""
+    return ["sh", "-c", f'ulimit -d {memory_bytes // 1024} && exec "$0" "$@"']
 
 
 def _said(error: Exception) -> str:

@@ -52,10 +52,12 @@ def _joint(kitchen: Any, joint: Any) -> dict[str, Any]:
 
 
 def _body(kitchen: Any, link: Any) -> dict[str, Any]:
+    from genesis.utils.geom import quat_to_R  # type: ignore[import-not-found]
+
     own = [link.idx_local]
-    turn = _matrix(_array(link.get_quat()))
+    turn = quat_to_R(_array(link.get_quat()))
     position = _array(link.get_pos())
-    principal = turn @ _matrix(np.asarray(link.desc.inertial_quat, dtype=np.float64))
+    principal = turn @ quat_to_R(np.asarray(link.desc.inertial_quat))
     return {
         "mass_kg": float(_array(kitchen.get_links_mass(own))[0]),
         "com_world": (position + turn @ _array(kitchen.get_links_COM(own))[0]).tolist(),
@@ -84,17 +86,6 @@ def _swept(world: Any, kitchen: Any, moving: list[Any], closed: np.ndarray) -> s
 
 def _array(tensor: Any) -> np.ndarray:
     return np.asarray(tensor.cpu(), dtype=np.float64)
-
-
-def _matrix(quat_wxyz: np.ndarray) -> np.ndarray:
-    w, x, y, z = quat_wxyz / np.linalg.norm(quat_wxyz)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 if __name__ == "__main__":

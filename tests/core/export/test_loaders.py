@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from r2c2r_core.export import loaders
 from r2c2r_core.export.loaders import APART, EVERY_LOADER, try_loaders
 from r2c2r_core.export.reading import read_urdf
 from r2c2r_core.model.report import LoaderResult
@@ -129,6 +130,24 @@ def test_an_invalid_sapien_python_is_reported_as_not_tried(good_folder: Path, py
     result = verdicts(good_folder, python)["SAPIEN"]
     assert result.state == "not tried"
     assert python in result.detail
+
+
+@pytest.mark.parametrize(
+    ("code", "says"),
+    [
+        ("bytearray(1 << 30)", "failed (limited to 0.5 GB): MemoryError"),
+        ("import os; os.kill(os.getpid(), 9)", "killed by SIGKILL (limited to 0.5 GB): no output"),
+    ],
+)
+def test_a_loader_that_needs_too_much_memory_fails_alone(
+    good_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, says: str
+) -> None:
+    monkeypatch.setattr(loaders, "free_memory", lambda share: 1 << 29)
+    python = tmp_path / "python"
+    python.write_text(f"#!/bin/sh\n[ $1 = -c ] || exec {sys.executable} -c '{code}'\n")
+    python.chmod(0o755)
+    result = verdicts(good_folder, str(python))["SAPIEN"]
+    assert (result.state, result.detail) == ("failed", f"RuntimeError: {says}")
 
 
 @own_environment("SAPIEN")
