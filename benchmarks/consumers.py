@@ -71,21 +71,30 @@ def held_counts(bundle: Path, dataset: Path) -> dict[str, int]:
 
 def tried(name: str, bundle: Path, dataset: Path, environment: Path, held: dict[str, int]) -> dict[str, Any]:
     """The version of a program and its outcome: "read", or the error in one line."""
-    python = environment / "bin" / "python"
     packages = REQUIRES.get(name, [name.replace("_", "-")])
-    if not python.exists():
-        venv.create(environment, with_pip=True)
-    installed = _run([str(python), "-m", "pip", "install", "--quiet", *packages])
-    if installed.returncode:
-        return {"version": "", "result": f"not installed: {_last_line(installed)}"}
+    try:
+        python = environment_python(environment, packages)
+    except RuntimeError as error:
+        return {"version": "", "result": f"not installed: {error}"}
     shown = _run([str(python), "-m", "pip", "show", packages[0]]).stdout
     version = next((line.split(": ")[1] for line in shown.splitlines() if line.startswith("Version: ")), "")
     ran = _run([str(python), str(PROBE), name, str(bundle.resolve()), str(dataset.resolve())])
     if ran.returncode:
-        return {"version": version, "result": f"failed: {_last_line(ran)}"}
+        return {"version": version, "result": f"failed: {last_line(ran)}"}
     counted: dict[str, int] = json.loads(ran.stdout.strip().splitlines()[-1])
     off = [f"{count} {kind}, the files hold {held[kind]}" for kind, count in counted.items() if held.get(kind, count) != count]
     return {"version": version, "result": "; ".join(off) or "read", **counted}
+
+
+def environment_python(environment: Path, packages: Sequence[str]) -> Path:
+    """Python of a virtual environment with the packages, created where missing; raises RuntimeError where pip fails."""
+    python = environment.absolute() / "bin" / "python"  # not resolved: it is a link out of the environment
+    if not python.exists():
+        venv.create(environment, with_pip=True)
+    installed = _run([str(python), "-m", "pip", "install", "--quiet", *packages])
+    if installed.returncode:
+        raise RuntimeError(last_line(installed))
+    return python
 
 
 def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
@@ -95,7 +104,8 @@ def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
         return subprocess.CompletedProcess(command, 124, "", f"took more than {MINUTES} minutes")
 
 
-def _last_line(ran: subprocess.CompletedProcess[str]) -> str:
+def last_line(ran: subprocess.CompletedProcess[str]) -> str:
+    """The last non-empty line of a command's errors, or else of its output."""
     lines = [line for line in (ran.stderr or ran.stdout).splitlines() if line.strip()]
     return lines[-1].strip()[:200] if lines else f"exit status {ran.returncode}"
 

@@ -1,6 +1,7 @@
-"""Tables generated at build time: all settings of a run, all options of all commands."""
+"""Tables generated at build time: all settings of a run, all options of all commands, all simulators."""
 
 import argparse
+import json
 from collections.abc import Iterator
 from dataclasses import Field, fields, is_dataclass
 from pathlib import Path
@@ -10,6 +11,8 @@ from r2c2r_core.tuning import modules_with_numbers, params_of
 
 _BOUNDS = {"ge": "from {}", "gt": "above {}", "le": "to {}", "lt": "below {}"}
 _SETTINGS, _COMMANDS = "<!-- every setting -->", "<!-- every command -->"
+_SIMULATORS, _ENGINES = "<!-- every simulator -->", "<!-- every engine -->"
+_RESULTS = Path(__file__).resolve().parents[1] / "benchmarks" / "engines.json"
 
 
 def on_config(config: Any) -> Any:
@@ -23,7 +26,7 @@ def on_config(config: Any) -> Any:
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Replace the page's markers by the generated tables."""
-    for mark, made in ((_SETTINGS, tables), (_COMMANDS, commands)):
+    for mark, made in ((_SETTINGS, tables), (_COMMANDS, commands), (_SIMULATORS, simulators), (_ENGINES, engines)):
         if mark in markdown:
             markdown = markdown.replace(mark, made())
     return markdown
@@ -42,6 +45,45 @@ def commands() -> str:
     from r2c2r_core.cli import build_parser
 
     return "\n".join(line for parser in _commands_of(build_parser()) for line in _command(parser))
+
+
+def simulators() -> str:
+    """A heading, the installation and the code of each simulator's recipe."""
+    from r2c2r_core.export.loaders import APART
+    from r2c2r_core.export.simulators import recipes
+
+    lines = []
+    for recipe in recipes("kitchen", "drawer_1"):
+        tested = (
+            f"the certificate reads this file with {recipe.loader}" if recipe.loader else "not tested: needs its own system"
+        )
+        if recipe.loader in APART:
+            tested += f" where `{APART[recipe.loader].variable}` names its Python"
+        lines += [f"### {recipe.simulator}", "", f"`{recipe.install}`; {tested}.", ""]
+        lines += [f"```{recipe.language}", recipe.code, "```", "", recipe.note, ""]
+    return "\n".join(lines)
+
+
+def engines() -> str:
+    """A row for each engine of benchmarks/engines.json: bundles passed, joint values it does not keep, steps a second."""
+    rows = json.loads(_RESULTS.read_text(encoding="utf-8"))
+    lines = [
+        "| engine | bundles passed | joint values not kept | steps/s, 1 world | steps/s, 256 worlds |",
+        "|---|---|---|---|---|",
+    ]
+    for name in dict.fromkeys(name for row in rows.values() for name in row["loaders"]):
+        said = [row["loaders"][name] for row in rows.values() if name in row["loaders"]]
+        speeds = (_spread([entry["steps_per_s"].get(worlds) for entry in said]) for worlds in ("1", "256"))
+        lost = next((part for entry in said if (part := entry["detail"].partition("it does not keep joint ")[2])), "")
+        passed = sum(entry["state"] == "passed" for entry in said)
+        lines.append(f"| {' | '.join([name, f'{passed} of {len(said)}', lost, *speeds])} |")
+    return "\n".join(lines)
+
+
+def _spread(values: list[float | None]) -> str:
+    """Least to most of the values that are there, as whole numbers."""
+    found = [value for value in values if value is not None]
+    return f"{min(found):.0f}-{max(found):.0f}" if found else ""
 
 
 def _commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:

@@ -2,6 +2,7 @@
 
 import html
 import importlib.util
+import json
 import os
 import re
 import subprocess
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from r2c2r_core.config import ReconstructConfig
+from r2c2r_core.export.simulators import recipes
 from r2c2r_core.tuning import modules_with_numbers, params_of
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -81,6 +83,15 @@ def test_included_files_appear_in_their_pages(site: Path) -> None:
             first = (ROOT / name).read_text().partition("\n")[0]
             assert html.unescape(built).count(first) == 1, f"{page} lacks {name}"
     assert "def main" in re.sub(r"<[^>]*>", "", (site / "how-to" / "python.html").read_text())
+
+
+@pytest.mark.slow
+@without_mkdocs
+def test_every_simulator_and_tried_engine_is_documented(site: Path) -> None:
+    page = html.unescape(re.sub(r"<[^>]*>", "", (site / "how-to" / "simulators.html").read_text()))
+    assert [recipe.simulator for recipe in recipes("kitchen", "drawer_1") if recipe.code.splitlines()[0] not in page] == []
+    rows = json.loads((ROOT / "benchmarks" / "engines.json").read_text()).values()
+    assert {name for row in rows for name in row["loaders"]} - {line.strip() for line in page.splitlines()} == set()
 
 
 @pytest.mark.slow
