@@ -177,8 +177,11 @@ def _probe(command: list[str], scene: Path, seconds: int = _SECONDS) -> dict[str
 
 
 def _limited(memory_bytes: int) -> list[str]:
-    """Words before a command that limit its memory: MJX compiled for 55 collider meshes takes over 24 GB."""
-    return ["sh", "-c", f'ulimit -d {memory_bytes // 1024} && exec "$0" "$@"']
+    """Words before a command that limit its memory, unless a lower limit holds already.
+
+    MJX compiled for 55 collider meshes takes over 24 GB.
+    """
+    return ["sh", "-c", f'ulimit -d {memory_bytes // 1024} 2>/dev/null; exec "$0" "$@"']
 
 
 def _said(error: Exception) -> str:

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from releasing import STEP_S, STEPS, release_everywhere  # type: ignore[import-not-found]  # the file beside this one
 
 
@@ -43,7 +44,8 @@ def read_back(scene: Path) -> dict[str, Any]:
         state = plant.GetMyMutableContextFromRoot(fresh)
         _set(by_name[name], state, position)
         Simulator(diagram, fresh).AdvanceTo(STEPS * STEP_S)
-        return float(by_name[name].GetOnePosition(state))
+        finite = np.isfinite(plant.GetPositionsAndVelocities(state)).all()
+        return float(by_name[name].GetOnePosition(state)) if finite else np.nan
 
     return answer | {"problem": release_everywhere({name: _limits(joint) for name, joint in by_name.items()}, released)}
 

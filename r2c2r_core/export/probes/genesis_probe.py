@@ -78,7 +78,8 @@ def _swept(world: Any, kitchen: Any, moving: list[Any], closed: np.ndarray) -> s
         kitchen.set_qpos(qpos, zero_velocity=True)
         for _ in range(STEPS):
             world.step()
-        return float(_array(kitchen.get_qpos())[number[name]])
+        qpos = _array(kitchen.get_qpos())
+        return float(qpos[number[name]]) if np.isfinite(qpos).all() else np.nan
 
     limits = {joint.name: tuple(_joint(kitchen, joint)[end] for end in ("lower", "upper")) for joint in moving}
     return str(release_everywhere(limits, released))

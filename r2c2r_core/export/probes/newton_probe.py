@@ -97,7 +97,8 @@ def _swept(newton: Any, model: Any, moving: list[int]) -> str:
             now.clear_forces()
             solver.step(now, after, control, None, STEP_S)
             now, after = after, now
-        return float(now.joint_q.numpy()[starts[number[name]]])
+        q = now.joint_q.numpy()
+        return float(q[starts[number[name]]]) if np.isfinite(q).all() else np.nan
 
     limits = {name: (float(lower[dofs[joint]]), float(upper[dofs[joint]])) for name, joint in number.items()}
     return str(release_everywhere(limits, released))

@@ -13,7 +13,7 @@ def release_everywhere(ranges: Mapping[str, tuple[float, float]], released: Call
     """Description of the first joint that diverges or moves away; empty where none does.
 
     `ranges` are the limits in rad or m by joint. `released(joint, position)` returns the joint's position STEPS steps of
-    STEP_S after it was set to `position` at rest, with the other joints closed and gravity on.
+    STEP_S after it was set to `position` at rest, with the other joints closed and gravity on; NaN where anything diverges.
     """
     for joint, (low, high) in ranges.items():
         for share in _SHARES:

@@ -50,7 +50,8 @@ def _swept(scene: Any, robot: Any) -> str:
         robot.set_qvel(np.zeros(robot.dof))
         for _ in range(STEPS):
             scene.step()
-        return float(robot.get_qpos()[number[name]])
+        qpos = robot.get_qpos()
+        return float(qpos[number[name]]) if np.isfinite(qpos).all() else np.nan
 
     return str(release_everywhere({joint.name: tuple(map(float, joint.get_limits()[0])) for joint in joints}, released))
 
