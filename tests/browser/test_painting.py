@@ -6,7 +6,7 @@ from typing import Any
 from playwright.sync_api import Page, expect
 
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.test_together import sample
+from tests.browser.test_together import ready, sample
 from tests.browser.together import Server, signed_in
 
 
@@ -24,7 +24,7 @@ def test_a_mask_is_painted_confirmed_and_marked_absent(new_context: NewContext, 
     sample(page)
     page.get_by_role("link", name="Annotate").click()
     canvas = page.locator("r2c2r-frame-canvas canvas")
-    page.get_by_role("button", name="Brush").wait_for()
+    ready(page)
     page.get_by_role("button", name="drawer_1", exact=True).first.wait_for()
     page.keyboard.press("1")
     page.keyboard.press("b")
@@ -54,6 +54,7 @@ def test_eraser_lasso_polygon_and_keep_each_correct_the_mask(new_context: NewCon
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
+    ready(page)
     page.get_by_role("button", name="drawer_1", exact=True).first.wait_for()
     page.keyboard.press("1")
     box = box_of(page.locator("r2c2r-frame-canvas canvas"))
