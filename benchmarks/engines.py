@@ -54,8 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for path in options.bundles:
         with opened_bundle(path) as folder:
             row = tried(folder)
-        kept = rows.get(path.stem, {}).get("loaders", {})
-        row["loaders"] = {**kept, **{name: said for name, said in row["loaders"].items() if said["state"] != "not tried"}}
+        kept = rows.get(path.stem, {"loaders": {}, "alone": {}})
+        row["loaders"] = {**kept["loaders"], **{n: said for n, said in row["loaders"].items() if said["state"] != "not tried"}}
+        row["alone"] = {**row["alone"], **kept["alone"], **{n: said for n, said in row["alone"].items() if not _not_run(said)}}
         rows[path.stem] = row
         faults += faults_of(path.stem, row)
         print(f"| {path.stem} | {row['joints']} joints | {', '.join(_words(row))} |", flush=True)
@@ -106,8 +107,12 @@ def faults_of(kitchen: str, row: dict[str, Any]) -> list[str]:
     return lines + [
         f"{kitchen}: {row['alone']['object']} alone in {kind}: {share}"
         for kind, share in shares.items()
-        if not (isinstance(share, float) and abs(share - 1) <= 0.05) and not str(share).startswith("not run")
+        if not (isinstance(share, float) and abs(share - 1) <= 0.05) and not _not_run(share)
     ]
+
+
+def _not_run(share: float | str) -> bool:
+    return str(share).startswith("not run")
 
 
 def _name_environments(engines: Sequence[str], folder: Path | None) -> None:
