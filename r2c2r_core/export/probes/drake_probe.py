@@ -37,33 +37,28 @@ def read_back(scene: Path) -> dict[str, Any]:
         "joints": {joint.name(): _joint(joint, own) for joint in moving},
         "bodies": {body.name(): _body(plant, body, own) for body in links if body.name() != "floor_link"},
     }
-    by_name = {joint.name(): joint for joint in moving}
+    number = {joint.name(): joint.position_start() for joint in moving}
 
     def released(name: str, position: float) -> float:
         fresh = diagram.CreateDefaultContext()
         state = plant.GetMyMutableContextFromRoot(fresh)
-        _set(by_name[name], state, position)
+        q = plant.GetPositions(state)
+        q[number[name]] = position
+        plant.SetPositions(state, q)
         Simulator(diagram, fresh).AdvanceTo(STEPS * STEP_S)
-        finite = np.isfinite(plant.GetPositionsAndVelocities(state)).all()
-        return float(by_name[name].GetOnePosition(state)) if finite else np.nan
+        q = plant.GetPositions(state)
+        return float(q[number[name]]) if np.isfinite(q).all() else np.nan
 
-    return answer | {"problem": release_everywhere({name: _limits(joint) for name, joint in by_name.items()}, released)}
+    return answer | {"problem": release_everywhere({joint.name(): _limits(joint) for joint in moving}, released)}
 
 
-_KINDS = {"revolute": "revolute", "prismatic": "prismatic"}
+_KINDS = {"revolute", "prismatic"}
 
 
 def _models(plant: Any) -> list[Any]:
     from pydrake.multibody.tree import ModelInstanceIndex  # type: ignore[import-not-found]
 
     return [ModelInstanceIndex(number) for number in range(2, plant.num_model_instances())]  # 0 and 1: world and default
-
-
-def _set(joint: Any, context: Any, position: float) -> None:
-    if joint.type_name() == "revolute":
-        joint.set_angle(context, position)
-    else:
-        joint.set_translation(context, position)
 
 
 def _limits(joint: Any) -> tuple[float, float]:
@@ -75,7 +70,7 @@ def _joint(joint: Any, context: Any) -> dict[str, Any]:
     frame = joint.frame_on_child().CalcPoseInWorld(context)
     axis = joint.revolute_axis() if kind == "revolute" else joint.translation_axis()
     return {
-        "type": _KINDS[kind],
+        "type": kind,
         "axis_world": (frame.rotation().matrix() @ axis).tolist(),
         "origin_world": frame.translation().tolist(),
         "lower": _limits(joint)[0],
