@@ -105,13 +105,14 @@ def main() -> int:
         say(error={"kind": "Cancelled", "message": f"{stage}: cancelled", "hint": ""})
         return 130
     if stage == "export":
+        stored = workdir / "nouns" / stage / "stand-in.noun"
         files = {
             "scene.glb": b"glTF" + json.dumps(json.loads((request.parent / "prompts.json").read_text())).encode(),
             "scene.urdf": URDF,
             "scene.xml": "<mujoco/>",
             "manifest.json": json.dumps({"stages": [{"name": "segment", "backend": "fake"}]}),
             "preview.png": b"png",
-            "report.html": "<h1>report</h1>",
+            "report.html": f"<h1>report</h1>{stored.read_text() if stored.is_file() else ''}",  # as a bundle shows its nouns
             "review.html": "<script>1</script>",
             "report.json": json.dumps({"certificate": {"passed": True, "findings": [], "drift_m": 0.001}}),
         }
