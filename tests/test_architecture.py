@@ -134,6 +134,20 @@ def test_importing_loads_no_heavy_dependencies(module: str) -> None:
     assert done.stdout.strip() == "[]"
 
 
+def test_the_default_server_loads_no_library_of_a_shared_deployment(tmp_path: Path) -> None:
+    code = """
+import sys
+from pathlib import Path
+from tests.app.conftest import running
+with running(Path(sys.argv[1])) as web:
+    web.sample()
+    print([name for name in ("psycopg", "obstore", "ray") if name in sys.modules])
+"""
+    command = [sys.executable, "-c", code, str(tmp_path / "data")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "[]", done.stderr
+
+
 def test_base_install_needs_no_torch() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert not any("torch" in requirement or "transformers" in requirement for requirement in project["dependencies"])
