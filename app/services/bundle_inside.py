@@ -14,7 +14,7 @@ from app.services.bundles import BundleFile, file, kept_part, root_of
 from app.services.context import Context
 from app.services.scenes import manifest
 from r2c2r_core.export.simulators import recipes
-from r2c2r_core.robot.arm_certificate import MAP
+from r2c2r_core.robot.arms import MAP
 
 
 def inside(context: Context, project_id: str, version: int) -> schemas.BundleInside:

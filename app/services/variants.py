@@ -19,7 +19,7 @@ from app.services.bundles import BundleFile, root_of
 from app.services.context import Context
 from app.services.imports import queue_job
 from r2c2r_core.errors import BundleError
-from r2c2r_core.variants.stage import NOT_VARIED
+from r2c2r_core.variants.draw import NOT_VARIED
 
 _SURFACES_BYTES = 900_000  # of the procedural textures, compressed or not (benchmarks/variants.json)
 _TOLD = 1.1  # size of a variant including its entry in variants.json, relative to its scene (ibid.: 4.1 MB beside 53)

@@ -13,7 +13,7 @@ from r2c2r_core.export.seen import unseen_words
 from r2c2r_core.export.sweeps import NEEDED_CAVITY, NEEDED_TRAVEL
 from r2c2r_core.export.writers.table import formats
 from r2c2r_core.model.report import Certificate
-from r2c2r_core.robot.arm_certificate import MAP
+from r2c2r_core.robot.arms import MAP
 from r2c2r_core.texts import shown
 
 REPORT_VERSION = 1

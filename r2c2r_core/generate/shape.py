@@ -20,9 +20,7 @@ class Shape:
     maskable: np.ndarray  # per face: whether the track's mask covers it when visible (a front's mask excludes its carcass)
     parameters: dict[str, float]
     warnings: tuple[str, ...]
-    unseen_error_m: float | None = (
-        None  # distance of an unobserved side from its position by scan or category; None: all observed
-    )
+    unseen_error_m: float | None = None  # of an unobserved side from its position by scan or category; None: all observed
 
     @property
     def vertices_world(self) -> Points:

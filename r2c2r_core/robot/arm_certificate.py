@@ -8,6 +8,7 @@ from typing import Any
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.robot import panda
 from r2c2r_core.robot.arm import Arm, Stand, arm_in
+from r2c2r_core.robot.arms import MAP
 from r2c2r_core.robot.certificate import Grip, film_of_joint, filmed_to, grip_to_json, tried
 from r2c2r_core.robot.film import Film
 from r2c2r_core.robot.grasps import Way, clear_ways
@@ -19,7 +20,6 @@ from r2c2r_core.robot.standing_map import standing_svg
 from r2c2r_core.robot.view import Surfaces, surfaces_of
 
 ARM_VERSION = 1
-MAP = "standing.svg"
 _WAYS = 4  # maximum grasps tested per joint until one is reachable
 _SEEN_M = 0.8  # margin around a front, so that the arm is in the picture
 

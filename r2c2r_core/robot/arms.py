@@ -5,6 +5,7 @@ from typing import Any
 from r2c2r_core.registry import Backend, Registry
 
 NO_ARM = "none"
+MAP = "standing.svg"  # floor plan of an arm's base positions, beside its films
 
 ARMS: Registry[Any] = Registry(
     seam="arm",

@@ -8,6 +8,7 @@ import numpy as np
 
 from r2c2r_core.variants.textures import TEXTURES
 
+NOT_VARIED = ("arm", "gripper", "pictures")  # result folders of a bundle that its variants do not have
 GUESSED = 0.02
 """Standard deviation, share of a side, where it was inferred or a category's default: own choice, 12 mm of 0.6 m."""
 LEAST_MEASURED = 0.001  # where the bundle gives no spread

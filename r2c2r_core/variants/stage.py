@@ -18,7 +18,7 @@ from r2c2r_core.export.rules.table import UNSAFE
 from r2c2r_core.export.simulate import simulate
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.texts import fault_of
-from r2c2r_core.variants.draw import Variation, draw
+from r2c2r_core.variants.draw import NOT_VARIED, Variation, draw
 from r2c2r_core.variants.judge import colliders_of, start_of, unfit
 from r2c2r_core.variants.overlay import add_start, varied
 from r2c2r_core.variants.textures import write_textures
@@ -26,7 +26,6 @@ from r2c2r_core.variants.wall import WALL, write_wall
 
 VARIANTS_VERSION = 1
 CERTIFIED = 20  # number of random variants that undergo the complete simulation tests
-NOT_VARIED = ("arm", "gripper", "pictures")  # result folders of the bundle that are not copied
 _ATTEMPTS = 40  # maximum draws per variant
 
 

@@ -34,9 +34,9 @@ def printed_again(address: str) -> str:
 
 
 @contextmanager
-def served(data: Path) -> Iterator[str]:
+def served(data: Path, heavy_jobs: int = 1) -> Iterator[str]:
     """The app on a free port over a data folder; the address it prints."""
-    with forked(serve, host="127.0.0.1", port=0, data_dir=data) as server:
+    with forked(serve, host="127.0.0.1", port=0, data_dir=data, heavy_jobs=heavy_jobs) as server:
         line = server.readline()
         found = re.search(r"(http://\S+?/)\S*", line)
         assert found, line

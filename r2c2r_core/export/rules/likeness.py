@@ -11,9 +11,7 @@ from r2c2r_core.export.rules.table import LIKENESS_RULES, finding
 from r2c2r_core.model.handle import Room
 from r2c2r_core.model.report import Finding, Likeness
 
-_SURE_HINGE = (
-    0.8  # certainty of a hinge side; doors without an informative handle have 0.75 (as a pair) or their category's frequency
-)
+_SURE_HINGE = 0.8  # certainty of a hinge side; without an informative handle it is 0.75 (a pair) or the category's frequency
 _LEAST_TRAVEL = 0.5  # of the category's travel: below, the unit or its neighbour is misplaced
 
 
