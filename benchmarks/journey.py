@@ -1,6 +1,6 @@
 """Time and clicks of a practised person from upload to an approved bundle, in a real Chromium.
 
-    python benchmarks/journey.py SAMPLE [--json benchmarks/app.json]
+    python benchmarks/journey.py SAMPLE [--lab [--ray]] [--json benchmarks/app.json]
 
 SAMPLE is a folder that `r2c2r sample` writes (180 frames, 14-15 objects). The simulated person knows the room's ground truth:
 after all proposals from 80 % confidence up are confirmed with one key, each missing object gets a click where a person would
@@ -9,17 +9,20 @@ approve, download.
 
 Clicks are counted by the app (GET …/figures): each point, each proposal confirmed (also when one key confirms them all),
 dismissed or deleted, each new name or category, and each undo is one. Key and mouse presses on the whole way are counted here
-as well, and so is computing time. Exit status 1: more than 10 minutes, or 1.2 clicks per object.
+as well, and so is computing time. Exit status 1: more than 10 minutes, or 1.2 clicks per object. With --lab rows are in a
+Postgres, files in an S3 server, the server computes nothing and a seat does, with --ray on a Ray node.
 """
 
 import argparse
 import json
+import os
 import re
+import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -33,7 +36,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from kept import add_options, report
 
 from app.jobs.mask_wire import bits_mask
-from tests.browser.conftest import CHROMIUM, QUIET, served
+from tests.app import postgres
+from tests.app.object_server import BUCKET, object_server
+from tests.app.ray_cluster import ray_node
+from tests.browser.conftest import CHROMIUM, QUIET
+from tests.browser.serving import served
 
 MOST_MINUTES, MOST_CLICKS = 10.0, 1.2
 SAME = 0.5  # minimum IoU for a mask to count as that object
@@ -96,9 +103,22 @@ class Person:
         self.minutes[name] = round((time.monotonic() - began) / 60, 2)
 
 
-def journey(sample: Path, data: Path) -> dict[str, Any]:
+@contextmanager
+def laboratory(folder: Path, *, ray: bool) -> Iterator[None]:
+    """Settings of a laboratory in the environment, and a seat that computes, on this machine or on a Ray node."""
+    with ExitStack() as parts:
+        rows, store = parts.enter_context(postgres.server()), parts.enter_context(object_server())
+        os.environ.update(store.environment, R2C2R_DATABASE=rows.of_folder(folder), R2C2R_STORE=f"s3://{BUCKET}/journey")
+        node = {"R2C2R_COMPUTE": "ray", **parts.enter_context(ray_node()).environment} if ray else {}
+        command = [sys.executable, "-m", "r2c2r_core.cli", "work", "--data", str(folder / "seat")]
+        seat = parts.enter_context(subprocess.Popen(command, env={**os.environ, **node}))
+        parts.callback(seat.terminate)
+        yield
+
+
+def journey(sample: Path, data: Path, *, heavy_jobs: int) -> dict[str, Any]:
     """The figures of one journey."""
-    with served(data) as address, sync_playwright() as playwright:
+    with served(data, heavy_jobs=heavy_jobs) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
         context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
         context.set_default_timeout(LONG_MS)
@@ -276,11 +296,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sample", type=Path)
     add_options(parser)
+    parser.add_argument("--lab", action="store_true", help="Postgres, an S3 server, a seat that computes")
+    parser.add_argument("--ray", action="store_true", help="with --lab: the seat computes on Ray")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="r2c2r-journey-") as folder:
-        figures = journey(options.sample, Path(folder))
+    with tempfile.TemporaryDirectory(prefix="r2c2r-journey-") as folder, ExitStack() as parts:
+        if options.lab:
+            parts.enter_context(laboratory(Path(folder), ray=options.ray))
+        figures = journey(options.sample, Path(folder) / "data", heavy_jobs=0 if options.lab else 1)
     slow = figures["upload_to_approval_minutes"] > MOST_MINUTES
-    return report("journey", figures, options.json, failed=slow or figures["clicks_per_object"] > MOST_CLICKS)
+    part = "_".join(["journey", *["lab"] * options.lab, *["ray"] * options.ray])
+    return report(part, figures, options.json, failed=slow or figures["clicks_per_object"] > MOST_CLICKS)
 
 
 if __name__ == "__main__":
