@@ -90,7 +90,7 @@ def _no_frame(name: str, frame: int, kept: list[int]) -> PromptError:
     expected = f"a frame of {kept[0]}..{kept[-1]}"
     hint = f"the nearest frame is {min(kept, key=lambda number: abs(number - frame))}"
     if kept[0] < frame < kept[-1]:
-        expected, hint = f"one of the {len(kept)} frames kept", f"{hint}; a larger ingest.most_frames keeps more"
+        expected, hint = f"one of the {len(kept)} frames kept", f"{hint}; others were damaged or above ingest.most_frames"
     return PromptError(f"{name}: click on frame {frame} found, {expected} expected", hint=hint)
 
 

@@ -113,7 +113,7 @@ def test_a_missing_prompt_file_is_rejected(tmp_path: Path) -> None:
         (PromptPoint(frame=60, x=10.0, y=-1.0, label=1), "0 <= y < 360 expected"),
         (
             PromptPoint(frame=61, x=10.0, y=10.0, label=1),
-            r"click on frame 61 found, one of the \d+ frames kept expected; the nearest frame is 60; a larger",
+            r"click on frame 61 found, one of the \d+ frames kept expected; the nearest frame is 60; others were damaged",
         ),
         (
             PromptPoint(frame=140, x=10.0, y=10.0, label=1),
