@@ -116,8 +116,8 @@ function release() {
 }
 
 /**
- * Replace the children of an element. Focus moves to the child with the same `data-at`, "what:which"; keyboard focus, or any
- * in a field, else to the next one of the same "what". A text selection is restored. While a button in the parent is held
+ * Replace the children of an element. Keyboard focus, or any focus in a field, moves to the child with the same `data-at`,
+ * "what:which", else to the next one of the same "what"; a text selection is restored. While a button in the parent is held
  * down, the replacement waits: a browser fires a click only on an element that is present from press to release.
  * @param {HTMLElement} parent
  * @param {...(Node | string)} children
@@ -128,8 +128,7 @@ export function renew(parent, ...children) {
     return;
   }
   waiting.delete(parent);
-  const at = parent.querySelector("[data-at]:focus");
-  const moves = at?.matches(":focus-visible, input");
+  const at = parent.querySelector("[data-at]:is(:focus-visible, input:focus)");
   const old = at instanceof HTMLElement ? (at.dataset.at ?? "") : "";
   const alike = `[data-at^="${CSS.escape(old.split(":")[0] ?? "")}:"]`;
   const place = at ? [...parent.querySelectorAll(alike)].indexOf(at) : -1;
@@ -138,7 +137,7 @@ export function renew(parent, ...children) {
   parent.replaceChildren(...children);
   if (!at) return;
   const now = /** @type {HTMLElement[]} */ ([...parent.querySelectorAll(alike)]);
-  const next = now.find((one) => one.dataset.at === old) ?? (moves ? now[Math.min(place, now.length - 1)] : null);
+  const next = now.find((one) => one.dataset.at === old) ?? now[Math.min(place, now.length - 1)];
   next?.focus({ preventScroll: true });
   const [from, to] = selected;
   if (next instanceof HTMLInputElement && next.selectionStart !== null && from !== undefined)

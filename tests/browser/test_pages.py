@@ -181,26 +181,6 @@ def test_a_button_pressed_while_its_list_rerenders_is_still_clicked(new_context:
     assert page.evaluate("clicked") == "Held down"
 
 
-def test_a_clicked_button_keeps_the_focus_when_its_list_rerenders(new_context: NewContext, finished: tuple[str, str]) -> None:
-    page = signed_in(new_context, finished[0])
-    page.evaluate("""import("/static/js/dom.js").then(({ h, renew }) => {
-        const list = h("div"), button = (at) => h("button", { "data-at": at }, at);
-        document.body.prepend(list);
-        window.show = (...places) => renew(list, ...places.map(button));
-        show("copy:one", "copy:two");
-    })""")
-    one, two = (page.get_by_role("button", name=f"copy:{which}") for which in ("one", "two"))
-    one.click()
-    page.evaluate("show('copy:one', 'copy:two')")
-    expect(one).to_be_focused()
-    page.evaluate("show('copy:two')")  # a click must not move on to another object's button
-    expect(two).not_to_be_focused()
-    two.click()
-    page.keyboard.press("Shift")  # keyboard focus does
-    page.evaluate("show('copy:one')")
-    expect(one).to_be_focused()
-
-
 def test_an_error_stays_until_another_page_is_opened(new_context: NewContext, finished: tuple[str, str]) -> None:
     page = signed_in(new_context, finished[0])
     page.get_by_role("link", name="kitchen").wait_for()
