@@ -24,8 +24,8 @@ def test_a_mask_is_painted_confirmed_and_marked_absent(new_context: NewContext, 
     sample(page)
     page.get_by_role("link", name="Annotate").click()
     canvas = page.locator("r2c2r-frame-canvas canvas")
-    ready(page)
     page.get_by_role("button", name="drawer_1", exact=True).first.wait_for()
+    ready(page)  # while masks of listed objects are loading, painting is refused
     page.keyboard.press("1")
     page.keyboard.press("b")
     expect(page.get_by_role("button", name="Brush")).to_have_attribute("aria-pressed", "true")
@@ -54,8 +54,8 @@ def test_eraser_lasso_polygon_and_keep_each_correct_the_mask(new_context: NewCon
     page = signed_in(context, server, "ann")
     sample(page)
     page.get_by_role("link", name="Annotate").click()
-    ready(page)
     page.get_by_role("button", name="drawer_1", exact=True).first.wait_for()
+    ready(page)  # while masks of listed objects are loading, painting is refused
     page.keyboard.press("1")
     box = box_of(page.locator("r2c2r-frame-canvas canvas"))
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
