@@ -299,6 +299,8 @@ def main() -> int:
     parser.add_argument("--lab", action="store_true", help="Postgres, an S3 server, a seat that computes")
     parser.add_argument("--ray", action="store_true", help="with --lab: the seat computes on Ray")
     options = parser.parse_args()
+    if options.ray and not options.lab:
+        parser.error("--ray needs --lab")
     with tempfile.TemporaryDirectory(prefix="r2c2r-journey-") as folder, ExitStack() as parts:
         if options.lab:
             parts.enter_context(laboratory(Path(folder), ray=options.ray))

@@ -127,6 +127,8 @@ def main() -> int:
     parser.add_argument("--lab", action="store_true", help="Postgres, an S3 server, two servers, two seats")
     parser.add_argument("--ray", action="store_true", help="with --lab: one of the seats computes on Ray")
     options = parser.parse_args()
+    if options.ray and not options.lab:
+        parser.error("--ray needs --lab")
     real = options.real is not None
     with tempfile.TemporaryDirectory(prefix="r2c2r-kills-") as folder:
         set_up = (
