@@ -69,6 +69,7 @@ BARS = {
     "depth_seen": Bar(title="drawers whose inner depth is known", limit=100, unit="%", at_least=True),
     "masks_open": Bar(title="masks in open frames", limit=0.85, unit="IoU", at_least=True),
     "false": Bar(title="joints said to move that did not", limit=0, unit=""),
+    "hinges_filmed": Bar(title="hinge sides of what was filmed while it opened", limit=100, unit="%", at_least=True),
     "joints": Bar(title="joints opened", limit=40, unit="", at_least=True),
 }
 
@@ -145,11 +146,15 @@ def measured(folder: Path, *, again: bool) -> dict[str, Any]:
         ]
     evaluation = json.loads((work / "evaluation.json").read_text(encoding="utf-8")) if bundle.exists() else {"objects": []}
     masks = [entry["metrics"].get("mask_iou_open", {}).get("value") for entry in evaluation["objects"]]
+    sides = {entry["name"]: entry["metrics"].get("hinge_side", {}).get("value") for entry in evaluation["objects"]}
+    filmed = {true.name for true in truths if any(joint.motion is not None and joint.motion.opens for joint in true.joints)}
     return {
         "bundle": bundle.exists(),
         "scores": scores,
         "masks_open": [value for value in masks if value is not None],
         "false": false,
+        "hinges_filmed": [value for name, value in sides.items() if value is not None and name in filmed],
+        "hinges_closed": [value for name, value in sides.items() if value is not None and name not in filmed],
         "others": others,
     }
 
@@ -178,6 +183,7 @@ def figures(rows: Sequence[dict[str, Any]]) -> dict[str, float | None]:
         "depth_seen": _ratio(len(depths), len(drawers)),
         "masks_open": float(np.mean(masks)) if masks else None,
         "false": sum(row["false"] for row in rows),
+        **{key: _percent([side for row in rows for side in row[key]]) for key in ("hinges_filmed", "hinges_closed")},
     }
 
 
@@ -187,7 +193,8 @@ def tables(rows: Rows) -> str:
     body = [line(name, row) for name, row in rows.items()]
     total = figures(list(rows.values()))
     bars = ["| of all joints | found | bar | met |", "|---|---|---|---|", *(bar.line(total[key]) for key, bar in BARS.items())]
-    return "\n".join([head, *body, line("total", *rows.values()), "", *bars, "", *_others(rows), ""])
+    sides = f"Hinge sides of what stayed closed, from handles that lie beside the hinge in places: {_cell(total['hinges_closed'])} %."
+    return "\n".join([head, *body, line("total", *rows.values()), "", *bars, "", sides, "", *_others(rows), ""])
 
 
 def line(name: str, *rows: dict[str, Any]) -> str:
@@ -210,7 +217,7 @@ def _others(rows: Rows) -> list[str]:
     return lines
 
 
-def _percent(values: Sequence[bool | None]) -> float | None:
+def _percent(values: Sequence[float | None]) -> float | None:
     return 100 * float(np.mean(np.array(values, float))) if values else None
 
 

@@ -4,7 +4,8 @@
 
 PATH/make_kitchen.py is that generator, deliberately independent of the project; its layouts, paints, light and shading are used
 unchanged, and nothing of the project's own generator is used. The moving parts, the space behind them, the camera path and the
-hands are drawn here: hinges inside their boards, motion with a pause, drawers and shelves of other sizes. OUT has capture.r3d,
+hands are drawn here: hinges inside their boards, motion with a pause, drawers and shelves of other sizes, and a quarter of the
+cabinets' doors with their handle on the hinge's side, so that only filming shows the hinge. OUT has capture.r3d,
 prompts.json, truth.json and truth_masks/, laid out as `r2c2r sample --opened` writes them.
 """
 
@@ -32,6 +33,7 @@ _CAPTURE_FROM_WORLD = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0,
 _WALK = 0.42  # fraction of the film at which the walk past all fronts ends; fronts open at the start are closed before
 _START = 0.09
 _FRAMES_EACH, _MOST = 36, 6
+_MISPLACED_SHARE = 0.25  # of cabinets' doors that have their handle on the hinge's side
 _MIN_SEEN_PX, _MIN_SEEN_SHARE = 400, 0.25
 _DEPTH_SIZE = (256, 192)
 
@@ -153,6 +155,7 @@ def _load(path: Path) -> ModuleType:
 def _units(plain: Callable[..., None], leaves: list[Leaf], rng: np.random.Generator) -> Callable[..., None]:
     """The generator's `unit`, made hollow, with its leaves recorded; some hinged below or above, in pairs, or over a drawer."""
     given: dict[str, int] = {}
+    handles = rng.spawn(1)[0]
 
     def unit(
         scene: Any,
@@ -189,7 +192,9 @@ def _units(plain: Callable[..., None], leaves: list[Leaf], rng: np.random.Genera
             _board(cell.span(0, middle), "left", "_left", inside, leaves, rng)
             _board(cell.span(middle, width), "right", "_right", inside, leaves, rng)
         else:
-            _leaf(cell, way, "", leaves, rng)
+            is_door = way in ("left", "right") and category in ("cabinet", "wall_cabinet")
+            misplaced = is_door and handles.random() < _MISPLACED_SHARE
+            _leaf(cell, way, "", leaves, rng, misplaced=misplaced)
 
     return unit
 
@@ -234,9 +239,9 @@ class Cell:
         return len(self.scene.parts) - 1
 
 
-def _leaf(cell: Cell, way: str, suffix: str, leaves: list[Leaf], rng: np.random.Generator) -> None:
+def _leaf(cell: Cell, way: str, suffix: str, leaves: list[Leaf], rng: np.random.Generator, *, misplaced: bool = False) -> None:
     inside = _carcass(cell, rng, drawer=way == "drawer")
-    _board(cell, way, suffix, inside, leaves, rng)
+    _board(cell, way, suffix, inside, leaves, rng, misplaced=misplaced)
 
 
 def _carcass(cell: Cell, rng: np.random.Generator, *, drawer: bool) -> dict[str, Any]:
@@ -274,11 +279,21 @@ def _carcass(cell: Cell, rng: np.random.Generator, *, drawer: bool) -> dict[str,
     }
 
 
-def _board(cell: Cell, way: str, suffix: str, inside: dict[str, Any], leaves: list[Leaf], rng: np.random.Generator) -> None:
-    """Add the front with its handle, a drawer's box, and the joint that moves them."""
+def _board(
+    cell: Cell,
+    way: str,
+    suffix: str,
+    inside: dict[str, Any],
+    leaves: list[Leaf],
+    rng: np.random.Generator,
+    *,
+    misplaced: bool = False,
+) -> None:
+    """Add the front with its handle, a drawer's box, and the joint that moves them; `misplaced`: handle beside the hinge."""
     x0, x1, z0, z1 = cell.x + _GAP_M, cell.x + cell.width - _GAP_M, cell.z + _GAP_M, cell.z + cell.height - _GAP_M
     front = [cell.box((x0, 0, z0), (x1, _FRONT_M, z1), cell.colour, cell.texture)]
-    front.append(cell.box(*_handle(way, x0, x1, z0, z1, cell.name), (0.75, 0.75, 0.78), "metal"))
+    grip = {"left": "right", "right": "left"}[way] if misplaced else way
+    front.append(cell.box(*_handle(grip, x0, x1, z0, z1, cell.name), (0.75, 0.75, 0.78), "metal"))
     body: list[int] = []
     axis, origin, upper = _joint(cell, way, rng)
     if way == "drawer":

@@ -24,6 +24,7 @@ _RARE = ("lateral", "appliance drawer", "bottom", "top", "pair")  # kinds that a
 _CLEAR_M = 0.01  # clearance from the room's walls
 _HELD_SHARE = 0.6
 _TOGETHER_M = 1.4  # maximum distance between two fronts in one view
+_MISPLACED_SHARE = 0.25  # of doors that have their handle on the hinge's side, so that only filming shows the hinge
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,7 +97,7 @@ def share_of(frame: int, frames: int) -> float:
 
 def plan_film(kitchen: Kitchen, frames: int, rng: np.random.Generator) -> Film:
     """Film of a kitchen with that many frames: more frames, more fronts."""
-    kitchen = _with_lift(kitchen, rng)
+    kitchen = _with_misplaced_handles(_with_lift(kitchen, rng), rng.spawn(1)[0])
     fronts = {front.joint.name: front for front in _fronts(kitchen)}
     free = [front for front in fronts.values() if _is_free(front, kitchen)]
     chosen = _choose(free, int(np.clip(frames // _FRAMES_EACH, 2, _MOST)), rng)
@@ -139,6 +140,21 @@ def _with_lift(kitchen: Kitchen, rng: np.random.Generator) -> Kitchen:
     lifted = replace(chosen, leaves=(replace(leaf, hinge="top", handle=handle, open_limit=limit),))
     upper = tuple(lifted if unit is chosen else unit for unit in run.upper)
     return replace(kitchen, runs=(replace(run, upper=upper), *kitchen.runs[1:]))
+
+
+def _with_misplaced_handles(kitchen: Kitchen, rng: np.random.Generator) -> Kitchen:
+    """The kitchen with the handles of some of its single doors on the hinge's side."""
+
+    def again(unit: Furniture) -> Furniture:
+        leaf = unit.leaves[0]
+        is_door = len(unit.leaves) == 1 and leaf.hinge in ("left", "right")
+        if not is_door or leaf.handle is None or rng.random() >= _MISPLACED_SHARE:
+            return unit
+        handle = replace(leaf.handle, x=leaf.width_m - leaf.handle.x)
+        return replace(unit, leaves=(replace(leaf, handle=handle),))
+
+    runs = (replace(run, base=tuple(map(again, run.base)), upper=tuple(map(again, run.upper))) for run in kitchen.runs)
+    return replace(kitchen, runs=tuple(runs))
 
 
 def _fronts(kitchen: Kitchen) -> list[Front]:
