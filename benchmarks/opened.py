@@ -193,7 +193,7 @@ def tables(rows: Rows) -> str:
     body = [line(name, row) for name, row in rows.items()]
     total = figures(list(rows.values()))
     bars = ["| of all joints | found | bar | met |", "|---|---|---|---|", *(bar.line(total[key]) for key, bar in BARS.items())]
-    sides = f"Hinge sides of what stayed closed, from handles that lie beside the hinge in places: {_cell(total['hinges_closed'])} %."
+    sides = f"Hinge sides of what stayed closed, a quarter with its handle beside the hinge: {_cell(total['hinges_closed'])} %."
     return "\n".join([head, *body, line("total", *rows.values()), "", *bars, "", sides, "", *_others(rows), ""])
 
 

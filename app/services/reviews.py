@@ -231,6 +231,8 @@ def _in_words(key: str, value: Any) -> str:
     if key == "states":
         frames = sum(len(marks) for marks in value.values())
         return f"{name} in {frames} frame{'' if frames == 1 else 's'}"
+    if key == "joints":
+        return f"limits of {', '.join(value)}" if value else "limits computed again"
     if key.startswith("joint_"):
         return f"{name} {value:.3f}"  # radians or metres
     return f"{name} {value}"

@@ -90,6 +90,17 @@ def test_marking_a_leaf_open_or_closed_updates_its_overlay_at_once(new_context: 
     page.keyboard.press("Control+Shift+z")
     expect(said).to_have_text("opening, 3 cm")
 
+    # a stop is stored and undone together with its mark
+    override = f"{server.address}/api/projects/{project.split('/p/')[1]}/objects/{number}/override"
+    page.keyboard.press("Shift+s")
+    expect(page.get_by_role("button", name="Compute it again")).to_be_visible()
+    assert page.request.get(override).json()["joint_upper"] == pytest.approx(0.03)
+    picture(page, "opening-marks-stop")
+    page.keyboard.press("Control+z")
+    expect(page.get_by_role("button", name="Compute it again")).to_have_count(0)
+    assert page.request.get(override).json()["joint_upper"] is None
+    expect(said).to_have_text("opening, 3 cm")
+
     # dragged by its edge: in this picture a drawer opens upwards
     hold = box_of(page.locator("r2c2r-photo-check .hold"))
     x, y = hold["x"] + hold["width"] / 2, hold["y"] + hold["height"] / 2
@@ -109,7 +120,7 @@ def test_marking_a_leaf_open_or_closed_updates_its_overlay_at_once(new_context: 
     expect(page.locator(".opening-marks .chip.person")).to_be_visible()
     page.get_by_role("button", name="Remove this mark").click()
     expect(page.get_by_role("img", name="marked in 2")).to_be_visible()
-    stored = page.request.get(f"{server.address}/api/projects/{project.split('/p/')[1]}/objects/{number}/override").json()
+    stored = page.request.get(override).json()
     assert stored["states"] == {"front": [{"frame": 0, "state": 0.0}, {"frame": 3, "state": 0.0}]}
 
     # the lane of the annotate page shows the same

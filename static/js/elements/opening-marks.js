@@ -1,7 +1,7 @@
 /**
  * Opening of each leaf of an object in a photo: the measured or marked value, and controls to mark another.
- * Emits "turn" while a leaf is dragged, before anything is stored, "mark" {leaf, value} to store a value (null removes the
- * mark), and "seek" {frame} when its plot is pressed.
+ * Emits "turn" while a leaf is dragged, before anything is stored, "mark" {leaf, value, stops, alone} to store a value (null
+ * removes the mark) and, with `stops`, the limit of the joint, and "seek" {frame} when its plot is pressed.
  */
 
 import { h, renew } from "../dom.js";
@@ -96,6 +96,11 @@ export class OpeningMarks extends EventTarget {
     if (this.#chosen) this.mark(this.#chosen, this.#value(this.#chosen));
   }
 
+  /** Mark it as open by what is shown, and as unable to open further. */
+  stops() {
+    if (this.#chosen && this.#value(this.#chosen) > 0) this.mark(this.#chosen, this.#value(this.#chosen), true);
+  }
+
   remove() {
     if (this.#chosen && isMarked(this.#state(this.#chosen))) this.mark(this.#chosen, null);
   }
@@ -104,9 +109,9 @@ export class OpeningMarks extends EventTarget {
     if (this.#rows.length) this.#choose((this.#at + 1) % this.#rows.length);
   }
 
-  /** @param {Leaf} leaf @param {number | null} value */
-  mark(leaf, value) {
-    this.dispatchEvent(new CustomEvent("mark", { detail: { leaf, value } }));
+  /** @param {Leaf} leaf @param {number | null} value @param {boolean} [stops] */
+  mark(leaf, value, stops = false) {
+    this.dispatchEvent(new CustomEvent("mark", { detail: { leaf, value, stops, alone: this.#rows.length === 1 } }));
   }
 
   get #chosen() {
@@ -149,6 +154,7 @@ export class OpeningMarks extends EventTarget {
     };
     const closed = button("Closed here", () => this.closed(), "closed");
     const open = button("", () => this.open(), "open");
+    const stops = button("Stops here", () => this.stops(), "stops");
     const remove = button("Remove this mark", () => this.remove(), "unmark");
     remove.hidden = !isMarked(this.#state(leaf));
     const slider = h("input", {
@@ -168,6 +174,7 @@ export class OpeningMarks extends EventTarget {
       slider.setAttribute("aria-valuetext", jointValue(leaf.type, value));
       open.textContent = `Open here: ${jointValue(leaf.type, value)}`;
       if (about) open.setAttribute("aria-label", open.textContent + about);
+      stops.disabled = this.refusal !== "" || value <= 0;
     };
     set(this.#value(leaf));
     const canvas = this.#plot(leaf, about);
@@ -178,6 +185,7 @@ export class OpeningMarks extends EventTarget {
       closed,
       slider,
       open,
+      stops,
       remove,
       canvas,
     );

@@ -15,6 +15,21 @@ export function motionOf({ type, axis, origin }) {
   return (origin[2] ?? 0) < 0 ? "Hinged below" : "Hinged above";
 }
 
+/**
+ * Correction that sets the upper limit of a joint, and its lower one to closed; null computes them again.
+ * @param {import("../api-types").OverrideData} override
+ * @param {string} joint
+ * @param {boolean} alone whether the object has no other joint
+ * @param {number | null} upper rad or m
+ * @returns {Partial<import("../api-types").OverridePatch>}
+ */
+export function withLimit({ joints }, joint, alone, upper) {
+  const lower = upper === null ? null : 0;
+  if (alone) return { joint_lower: lower, joint_upper: upper };
+  const { [joint]: _, ...others } = joints;
+  return { joints: upper === null ? others : { ...others, [joint]: [0, upper] } };
+}
+
 /** Whether a joint slides along its front, as doors on tracks do. @param {SceneItem["joints"][number]} joint */
 export function slidesSideways(joint) {
   return ["Slides left", "Slides right"].includes(motionOf(joint));

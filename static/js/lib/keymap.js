@@ -193,6 +193,12 @@ export const KEYMAP = [
     page: "review",
   },
   { keys: ["Shift+o"], action: "mark-open", text: "Mark it as that far open in this photo", page: "review" },
+  {
+    keys: ["Shift+s"],
+    action: "mark-stop",
+    text: "Mark it as that far open, and unable to open further",
+    page: "review",
+  },
   { keys: ["Shift+x"], action: "unmark", text: "Remove its mark in this photo", page: "review" },
   { keys: ["Shift+n"], action: "next-leaf", text: "Choose its next leaf for these keys", page: "review" },
   { keys: ["v"], action: "move-object", text: "Move or resize the object", page: "review" },

@@ -1,7 +1,7 @@
 /** Actions of the review page for keys and the command palette, by their names in the keymap. */
 
 /** Actions that do not repeat while a key is held down. */
-export const ONE_A_PRESS = ["comment", "more", "accept", "reject", "mark-closed", "mark-open", "unmark"];
+export const ONE_A_PRESS = ["comment", "more", "accept", "reject", "mark-closed", "mark-open", "mark-stop", "unmark"];
 
 /**
  * @param {object} doers
@@ -27,6 +27,7 @@ export function actionsOf({ objects, decisions, centre, comment }) {
     blink: () => photos.blink(true),
     "mark-closed": () => centre.mark((marks) => marks.closed()),
     "mark-open": () => centre.mark((marks) => marks.open()),
+    "mark-stop": () => centre.mark((marks) => marks.stops()),
     unmark: () => centre.mark((marks) => marks.remove()),
     "turn-leaf": (key) => centre.mark((marks) => marks.step(key === "=" ? 1 : -1)),
     "next-leaf": () => centre.mark((marks) => marks.next()),

@@ -2,7 +2,7 @@
 
 import { h, numberField } from "../dom.js";
 import { byOpening, usedFirst } from "../lib/categories.js";
-import { slidesSideways } from "../lib/joints.js";
+import { slidesSideways, withLimit } from "../lib/joints.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").OverridePatch} OverridePatch */
@@ -117,21 +117,19 @@ function side(group, item, change) {
  * @param {(patch: Partial<OverridePatch>) => void} change
  */
 function limits(group, item, change) {
-  const said = group.override.joints;
+  const said = group.override;
   return (item?.joints ?? []).map((joint, _, joints) => {
-    if (joints.length === 1) {
-      return limit(joint, "", group.override.joint_upper !== null, (upper) =>
-        change(upper === null ? { joint_lower: null, joint_upper: null } : { joint_lower: 0, joint_upper: upper }),
-      );
-    }
+    const alone = joints.length === 1;
     const part = joint.name
       .slice(group.run_name.length + 1)
       .replace(/_joint$/, "")
       .replaceAll("_", " ");
-    return limit(joint, `${part}: `, joint.name in said, (upper) => {
-      const others = Object.fromEntries(Object.entries(said).filter(([name]) => name !== joint.name));
-      change({ joints: upper === null ? others : { ...others, [joint.name]: [0, upper] } });
-    });
+    return limit(
+      joint,
+      alone ? "" : `${part}: `,
+      alone ? said.joint_upper !== null : joint.name in said.joints,
+      (upper) => change(withLimit(said, joint.name, alone, upper)),
+    );
   });
 }
 

@@ -9,6 +9,7 @@ import { askForText } from "../elements/ask-dialog.js";
 import { askToUseMesh } from "../elements/mesh-dialog.js";
 import { say, sayError } from "../elements/toasts.js";
 import { copiedWords } from "../lib/copied.js";
+import { withLimit } from "../lib/joints.js";
 import { withMark } from "../lib/opening-marks.js";
 import { outbox } from "../outbox.js";
 
@@ -74,10 +75,11 @@ export class Decisions extends EventTarget {
   }
 
   /**
-   * Mark how far a leaf is open in a frame; null removes the mark. Marks are stored one at a time, as each adds to the others.
-   * @param {{ leaf: import("../api-types").Leaf, frame: number, value: number | null }} mark
+   * Mark how far a leaf is open in a frame; null removes the mark. With `stops` it opens no further: `value` is also its limit.
+   * Marks are stored one at a time, as each adds to the others.
+   * @param {{ leaf: import("../api-types").Leaf, frame: number, value: number | null, stops: boolean, alone: boolean }} mark
    */
-  mark({ leaf, frame, value }) {
+  mark({ leaf, frame, value, stops, alone }) {
     const { object } = this.#objects;
     if (!this.#may()) return;
     this.#marking = this.#marking.then(async () => {
@@ -85,7 +87,8 @@ export class Decisions extends EventTarget {
       const group = this.#objects.groups.find((one) => one.object === object);
       if (!group) return;
       const states = withMark(group.override.states, leaf, frame, value);
-      await this.#report(outbox.send(changeOverride(this.#project, group, { states })));
+      const limit = stops ? withLimit(group.override, leaf.joint, alone, value) : {};
+      await this.#report(outbox.send(changeOverride(this.#project, group, { states, ...limit })));
     });
   }
 
