@@ -24,6 +24,12 @@ class Params:
     scales_m: tuple[float, float] = param((0.005, 0.0075), "m", "Widths of the ridge and of the colour step")
     noise_floor: float = param(0.35, "grey", "Noise added to the spread of line strengths", gt=0)
     max_shift_m: float = param(0.03, "m", "Maximum pose error between frames", source="30 mm on a KinectFusion trajectory")
+    roll_cost: float = param(
+        5.0,
+        "1/deg²",
+        "Profile energy (squared z-scores) that a roll must add, times its square: scans are level to a degree",
+        source="one standard deviation of 1°, and ten correlated z-scores that count as one",
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,10 +196,11 @@ def frame_slide(tile: ScoredTile, axis: int, cell_m: float, evidence: Evidence) 
 
 
 def find_roll(vertical: Evidence, horizontal: Evidence, most_rad: float = np.radians(5.0)) -> float:
-    """In-plane roll of the lines: the rotation of the axes that maximises the energy of the line profiles."""
+    """In-plane roll of the lines: the rotation of the axes that maximises the energy of the line profiles, and a prior."""
     best, best_angle = 1.05 * (_sheared_energy(vertical, 0.0) + _sheared_energy(horizontal, 0.0)), 0.0  # a roll must pay
     for angle in np.radians(np.arange(-np.degrees(most_rad), np.degrees(most_rad) + 0.01, 0.25)):
         energy = _sheared_energy(vertical, angle) + _sheared_energy(horizontal, -angle)
+        energy -= tuned(Params).roll_cost * np.degrees(angle) ** 2
         if energy > best * (1 + 1e-9):
             best, best_angle = energy, float(angle)
     return -best_angle

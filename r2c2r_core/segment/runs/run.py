@@ -40,7 +40,6 @@ class Params:
     """Tuned parameters of the preparation of a run."""
 
     allowed_m: float = param(0.08, "m", "Maximum distance of line evidence beyond the observed part of the plane")
-    roll_worth_rad: float = param(float(np.radians(0.2)), "rad", "Minimum roll that is corrected")
     relief_frames: int = param(60, "count", "Maximum number of frames used for the relief", ge=1)
 
 
@@ -94,10 +93,8 @@ def make_run(region: PlaneRegion, scene: Scene, cell_m: float, frame_count: int,
     if not views.tiles(few):
         return None
     roll = find_roll(*views.evidence(few))
-    if abs(roll) > params.roll_worth_rad:
+    if roll != 0.0:
         views = _Views(make_grid(region, cell_m, roll, margin_m), region, scene, margin_m)
-    else:
-        roll = 0.0
     grid, tiles = views.grid, [tile for tile, _ in views.tiles(frame_count)]
     if not tiles:
         return None
