@@ -52,6 +52,11 @@ class Size:
         """Whether a size is possible."""
         return self.low <= value_m <= self.high
 
+    def allows(self, values_m: float | np.ndarray) -> np.ndarray:
+        """Mask of the sizes within the range sold, extended by the slack of a segmented size."""
+        slack = np.exp(tuned(Params).slack)
+        return np.asarray((values_m >= self.low / slack) & (values_m <= self.high * slack))
+
     def deviation(self, value_m: float | np.ndarray) -> np.ndarray:
         """Deviation of sizes from the usual one, in standard deviations of their logarithm."""
         return np.asarray(np.log(np.asarray(value_m) / self.usual) / self.spread)

@@ -9,6 +9,7 @@ from scipy import ndimage
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.model.capture import SceneSurface
+from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.segment.surface import face_normals
 from r2c2r_core.tuning import param, tuned
 
@@ -102,6 +103,11 @@ class PlaneRegion:
         x = (column + 0.5) * self.cell_m - self.width_m / 2
         z = self.height_m / 2 - (row + 0.5) * self.cell_m
         return self.world_from_plane.apply(np.stack([x, np.zeros(len(x)), z], axis=1))
+
+    @property
+    def bounds(self) -> Rectangle3:
+        """Rectangle around the observed part."""
+        return Rectangle3(world_from_front=self.world_from_plane, width_m=self.width_m, height_m=self.height_m)
 
     def supports(self, points_world: Points, reach_m: float) -> np.ndarray:
         """Mask of the points (n, 3) within `reach_m` of the observed part, measured in the plane."""

@@ -7,8 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.kitchen.category import Category, Size
-from r2c2r_core.kitchen.category import Params as SizeParams
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.rectangle import TOWARDS
 from r2c2r_core.model.track import ThingBox
@@ -85,12 +84,12 @@ def find_rectangle(
     for left in columns[columns < low[0]]:
         for right in columns[columns > high[0]]:
             width = (right - left) * cell_m
-            if not _possible(kind.width, width):
+            if not kind.width.allows(width):
                 continue
             tops, bottoms = rows[rows < low[1]], rows[rows > high[1]]
             top, bottom = (grid.ravel() for grid in np.meshgrid(tops, bottoms, indexing="ij"))
             tall = (bottom - top) * cell_m
-            fits = _possible(kind.height, tall)
+            fits = kind.height.allows(tall)
             if not fits.any():
                 continue
             top, bottom, tall = top[fits], bottom[fits], tall[fits]
@@ -141,12 +140,6 @@ def appliance_box(front: Front, *, depth_seen: bool) -> ThingBox:
         support_z_m=float(face.centre[2] - face.height_m / 2),
         depth_seen=depth_seen,
     )
-
-
-def _possible(size: Size, values_m: float | np.ndarray) -> np.ndarray:
-    """Mask of the values within a size range, extended by a slack for inexact cuts."""
-    slack = np.exp(tuned(SizeParams).slack)
-    return np.asarray((values_m >= size.low / slack) & (values_m <= size.high * slack))
 
 
 def _component(run: Run, clicks: np.ndarray) -> np.ndarray:

@@ -2,19 +2,23 @@
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Mask, Points, Vector3
+from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.kitchen.categories import every_category
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.box import find_rectangle
 from r2c2r_core.segment.appliances.fit import FittedBox, fit_box
 from r2c2r_core.segment.appliances.looked_past import looked_past
+from r2c2r_core.segment.fronts.clicked_open import closed_place
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, near_plane, nudged
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
+from r2c2r_core.segment.motion.leaf import Leaf, face_points
 from r2c2r_core.segment.planes import PlaneRegion, region_along, regions_at
 from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
@@ -38,6 +42,7 @@ class Params:
     unlikelier: float = param(
         1.0, "log", "Maximum loss in size log-likelihood, against the clicked plane, for a plane to be the front of that side"
     )
+    parallel_cos: float = param(0.95, "cosine", "Minimum cosine between the normals of an appliance's front and its rear board")
     prepared_margin_m: float = param(
         0.45,
         "m",
@@ -146,9 +151,13 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
     origin, ray = scene.ray(click.frame, click.x, click.y)
     point = scene.pick(click.frame, click.x, click.y)
     if scene.has_depth(click.frame, click.x, click.y) and point is not None:
+        closed = closed_place(prepared, point, click.frame, kind)
+        behind = None if closed is point else _region_at(prepared, closed, kind)
+        if behind is not None:
+            return behind, closed
         region = _region_at(prepared, point, kind)
         front = _front_before(prepared, point, kind)
-        if front is not None and (region is None or _is_front_of(scene, front, region, point, kind)):
+        if front is not None and (region is None or _is_front_of(scene, front, region, kind)):
             return front, _support_near(front, point)
         if region is not None:
             return region, point
@@ -158,14 +167,24 @@ def _plane_of(prepared: PreparedCapture, click: PromptPoint, kind: Category) -> 
         planes = tuple(plane for plane in prepared.planes if plane.width_m < widest * kind.width.high)
         met = region_along(planes, origin, ray, farthest, kind.width.high)
         if met is not None:
-            return met
+            return _before_inside(prepared, *met, origin, ray, kind) or met
     return None
 
 
-def _is_front_of(scene: Scene, front: PlaneRegion, clicked: PlaneRegion, point: Vector3, kind: Category) -> bool:
+def _before_inside(
+    prepared: PreparedCapture, inside: PlaneRegion, point: Vector3, origin: Vector3, ray: Vector3, kind: Category
+) -> tuple[PlaneRegion, Vector3] | None:
+    """The front of an appliance filmed open, from a click on its glass: there the other frames' depth shows its rear board."""
+    front = _front_before(prepared, point, kind) if inside.supports(point[None], 0.0)[0] else None
+    if front is None or front.outward @ inside.outward < tuned(Params).parallel_cos:
+        return None
+    return region_along((front,), origin, ray, 10.0, 1.0)
+
+
+def _is_front_of(scene: Scene, front: PlaneRegion, clicked: PlaneRegion, kind: Category) -> bool:
     """Whether a plane in front of the clicked one is more likely the front: faced more squarely, with a plausible size."""
     likelier = _size_likelihood(clicked, kind) - _size_likelihood(front, kind)
-    return likelier < tuned(Params).unlikelier and _faced(scene, front, point) > _faced(scene, clicked, point) + 0.2
+    return likelier < tuned(Params).unlikelier and _faced(scene, front) > _faced(scene, clicked) + 0.2
 
 
 def _size_likelihood(plane: PlaneRegion, kind: Category) -> float:
@@ -173,12 +192,15 @@ def _size_likelihood(plane: PlaneRegion, kind: Category) -> float:
 
 
 def _region_at(prepared: PreparedCapture, point: Vector3, kind: Category) -> PlaneRegion | None:
-    """Plane under a point; beside one much smaller than the category, as on a rounded edge, the one faced most squarely."""
-    near = regions_at(prepared.planes, point)
+    """Plane under a point; beside one much smaller than the category, as on a rounded edge, the one faced most squarely.
+
+    The surface is fused from some of the frames: a corner that only others show is missing from the plane's observed part.
+    """
+    near = regions_at(prepared.planes, point) or regions_at(prepared.planes, point, beside_m=kind.width.low / 2)
     if not near or not _misses_much(near[0], kind):
         return near[0] if near else None
     whole = [plane for plane in near if not _misses_much(plane, kind)]
-    return max(whole, key=lambda plane: _faced(prepared.scene, plane, point), default=near[0])
+    return max(whole, key=lambda plane: _faced(prepared.scene, plane), default=near[0])
 
 
 def _front_before(prepared: PreparedCapture, point: Vector3, kind: Category) -> PlaneRegion | None:
@@ -192,17 +214,23 @@ def _front_before(prepared: PreparedCapture, point: Vector3, kind: Category) -> 
         and params.off_front_m < _behind(plane, point) < kind.depth.usual + 0.1
         and plane.supports(point[None], 0.12)[0]
     ]
-    return max(planes, key=lambda plane: _faced(prepared.scene, plane, point), default=None)
+    return max(planes, key=lambda plane: _faced(prepared.scene, plane), default=None)
 
 
 def _behind(plane: PlaneRegion, point: Vector3) -> float:
     return -float((point - plane.world_from_plane.translation) @ plane.outward)
 
 
-def _faced(scene: Scene, plane: PlaneRegion, point: Vector3) -> float:
-    """Mean cosine between a plane's normal and the directions to the cameras."""
-    towards = np.stack([frame.world_from_camera.translation for frame in scene.frames]) - point
-    return float((towards @ plane.outward / np.linalg.norm(towards, axis=1)).mean())
+def _faced(scene: Scene, plane: PlaneRegion) -> float:
+    """Mean cosine between a plane's normal and the directions to the cameras, over its points that each of them sees."""
+    points = plane.world_from_plane.apply(face_points(Leaf.of(plane.bounds)))
+    total, count = 0.0, 0
+    for frame in scene.frames:
+        z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+        towards = frame.world_from_camera.translation - points[scene.noise.agrees(seen, z, tuned(Params).off_front_m)]
+        total += float((towards @ plane.outward / np.linalg.norm(towards, axis=1)).sum())
+        count += len(towards)
+    return total / max(count, 1)
 
 
 def _support_near(plane: PlaneRegion, point: Vector3) -> Vector3:
@@ -214,12 +242,26 @@ def _support_near(plane: PlaneRegion, point: Vector3) -> Vector3:
 
 def _margin(region: PlaneRegion, kind: Category) -> float:
     """Margin by which the front may extend beyond its observed part, metres."""
-    missing = max(kind.width.usual - region.width_m, kind.height.usual - region.height_m, 0.0)
-    return round(missing + 0.05, 2) if missing > 0.08 else 0.0
+    is_alone = region.width_m < kind.width.high and region.height_m < kind.height.high
+    return _beyond(max(_missing_m(region, kind), _hollow_m(region) if is_alone else 0.0))
+
+
+def _missing_m(region: PlaneRegion, kind: Category) -> float:
+    """Length that a plane lacks of the category's usual size."""
+    return max(kind.width.usual - region.width_m, kind.height.usual - region.height_m, 0.0)
+
+
+def _hollow_m(region: PlaneRegion) -> float:
+    """Largest distance of a place within a plane's bounds from its observed part: glass that no depth shows."""
+    return float(cv2.distanceTransform((~region.support).astype(np.uint8), cv2.DIST_L2, 5).max()) * region.cell_m
+
+
+def _beyond(missing_m: float) -> float:
+    return round(missing_m + 0.05, 2) if missing_m > 0.08 else 0.0
 
 
 def _misses_much(region: PlaneRegion, kind: Category) -> bool:
-    return _margin(region, kind) > tuned(Params).prepared_margin_m
+    return _beyond(_missing_m(region, kind)) > tuned(Params).prepared_margin_m
 
 
 def appliance_margins(region: PlaneRegion) -> tuple[float, ...]:

@@ -6,10 +6,11 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.visibility import look_up
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.motion.hypotheses import Hypothesis, hypotheses
-from r2c2r_core.segment.motion.leaf import Leaf
+from r2c2r_core.segment.motion.leaf import Leaf, face_points
 from r2c2r_core.segment.motion.likelihood import evidence, lay_out
 from r2c2r_core.segment.motion.track import Params as TrackParams
 from r2c2r_core.segment.planes import regions_at
@@ -33,6 +34,12 @@ class Params:
     least_m: float = param(
         0.1, "m", "Minimum side of a leaf: narrower panels belong to a frame", source="makers' narrowest fronts: 150 mm"
     )
+    hollow_share: float = param(
+        0.5,
+        "share",
+        "Minimum fraction of rays through a vacated place that end behind it",
+        source="opened kitchens: 1.0 of a refrigerator's closed front, 0.0-0.1 of its open door's place",
+    )
     off_m: float = param(0.03, "m", "Maximum distance of a click from a leaf in one of the tested states")
     gain: float = param(20.0, "log", "Minimum log-likelihood ratio of the open over the closed leaf in the clicked frame")
     near_steps: int = param(
@@ -51,7 +58,7 @@ class Params:
     unknown: float = param(0.1, "share", "Fraction of frames that carry no information: hands, gloss, wrong camera pose")
 
 
-def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int) -> Vector3:
+def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int, category: Category) -> Vector3:
     """Closed position of a clicked point (world) on an open front; the point itself where nothing moved there.
 
     An open front uncovers the sides and back of its unit, which are boards too; an open drawer looks like one outside; and a
@@ -61,7 +68,8 @@ def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int) ->
     params, scene = tuned(Params), prepared.scene
     if not _moved(point, scene):
         return point
-    frame, leaves = scene.frame(frame_index), _leaves_near(prepared, point)
+    frame = scene.frame(frame_index)
+    leaves = [leaf for leaf in _leaves_near(prepared, point, category) if _is_before_hollow(leaf, scene, category)]
     opened: list[tuple[Leaf, Hypothesis, int, Vector3]] = []
     for leaf in leaves:
         if _in_a_row(prepared, point, leaf):
@@ -92,8 +100,8 @@ def _moved(point: Vector3, scene: Scene) -> bool:
     return past >= params.least_frames and past > params.past_share * (past + there)
 
 
-def _leaves_near(prepared: PreparedCapture, point: Vector3) -> list[Leaf]:
-    """Panels of the runs within reach that a point lies on or in front of."""
+def _leaves_near(prepared: PreparedCapture, point: Vector3, category: Category) -> list[Leaf]:
+    """Panels of the runs within reach that a point lies on or in front of; for an appliance, faces of its size."""
     found = []
     for region in prepared.planes:
         local = region.world_from_plane.inverse.apply(point)
@@ -102,9 +110,28 @@ def _leaves_near(prepared: PreparedCapture, point: Vector3) -> list[Leaf]:
             continue
         run = prepared.run_of(region)
         leaves = [] if run is None else [Leaf.of(Front(run, cell, None, 0.0).rectangle) for cell in run.cells]
+        if category.kind == "appliance":
+            faces = (Leaf.of(region.bounds), *leaves)
+            leaves = [leaf for leaf in faces if category.width.allows(leaf.width_m) and category.height.allows(leaf.height_m)]
         leaves = [leaf for leaf in leaves if min(leaf.width_m, leaf.height_m) > tuned(Params).least_m]
         found += [leaf for leaf in leaves if np.linalg.norm(leaf.centre - point) < reach]
     return found
+
+
+def _is_before_hollow(leaf: Leaf, scene: Scene, category: Category) -> bool:
+    """Whether most rays through a vacated leaf's place end in the compartment behind it; past an open door, few do."""
+    params, points = tuned(Params), leaf.world_from_front.apply(face_points(leaf))
+    through, within = 0, 0
+    for frame in scene.frames:
+        eye = frame.world_from_camera.translation
+        if leaf.world_from_front.inverse.apply(eye)[1] > 0:
+            continue
+        z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+        past = scene.noise.seen_through(seen, z, params.past_m)
+        ends = leaf.world_from_front.inverse.apply(eye + (points[past] - eye) * (seen[past] / z[past])[:, None])
+        through += len(ends)
+        within += int(np.count_nonzero(leaf.covers(ends) & (ends[:, 1] < category.depth.high)))
+    return through < tuned(TrackParams).least_known or within > params.hollow_share * through
 
 
 def _holds(leaf: Leaf, point: Vector3) -> bool:

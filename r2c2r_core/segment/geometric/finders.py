@@ -45,7 +45,7 @@ def find_object(
     `others` (n, 3) are points clicked on other objects.
     """
     if category.kind == "front":
-        closed = [closed_place(prepared, p, c.frame) for p, c in zip(positives.points, positives.clicks, strict=True)]
+        closed = [closed_place(prepared, p, c.frame, category) for p, c in zip(positives.points, positives.clicks, strict=True)]
         first = positives.clicks[0]
         glass = None if dark_place(prepared.scene, prepared.planes, first) is None else first
         found = _front(prepared, category, np.array(closed), negatives.points, others, glass)
