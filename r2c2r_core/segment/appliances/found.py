@@ -41,9 +41,8 @@ class FoundAppliance:
 
     def __post_init__(self) -> None:
         seams_m = drawer_seams(self.front) if self.category.over_drawer is not None else ()
-        object.__setattr__(
-            self, "_leaves", FilmedLeaves(Leaf.of(self.front.rectangle), self.category, self.scene, self.front.depth_m, seams_m)
-        )
+        leaf = Leaf.of_appliance(self.front.rectangle)
+        object.__setattr__(self, "_leaves", FilmedLeaves(leaf, self.category, self.scene, self.front.depth_m, seams_m))
 
     def see(self, frame: Frame) -> View:
         """Visible pixels of the box and of its doors where they stand open, with their confidence."""

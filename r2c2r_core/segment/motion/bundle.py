@@ -27,9 +27,6 @@ class Params:
         "Standard deviation of a hinge relative to its front's edge",
         source="concealed hinges turn 5-20 mm inside the edge",
     )
-    thickness_m: float = param(
-        0.003, "m", "Standard deviation of a board's thickness", source="manufacturers' lists: fronts of 16-22 mm"
-    )
     free_state: float = param(1.0, "ratio", "Prior standard deviation of a state: radians or metres", gt=0)
     outlier: float = param(2.0, "σ", "Residual of a frame's plane above which its weight falls (Huber 1964)", gt=0)
 
@@ -43,6 +40,7 @@ class FittedJoint:
     turns: bool
     across: np.ndarray  # (2, 3) unit directions perpendicular to the axis: of its rotations, and of the pivot's shifts
     covariance: np.ndarray  # (4, 4): two rotations of the axis (rad), two shifts of the pivot (m)
+    thicker_m: float = 0.0  # than the leaf was assumed to be
 
     def pose(self, state: float) -> Rigid3:
         """Pose of the leaf in a state: front_from_leaf, the identity where closed."""
@@ -68,12 +66,15 @@ def as_supposed(hypothesis: Hypothesis) -> FittedJoint:
 
 
 def fit_joint(
-    hypothesis: Hypothesis, fixes: Sequence[PlaneFix], states: np.ndarray
+    hypothesis: Hypothesis, fixes: Sequence[PlaneFix], states: np.ndarray, sigma_thickness_m: float
 ) -> tuple[FittedJoint, np.ndarray, np.ndarray]:
-    """Maximum-a-posteriori joint near a hypothesis, given the planes, and each frame's state with its standard deviation."""
+    """Maximum-a-posteriori joint near a hypothesis, given the planes, and each frame's state with its standard deviation.
+
+    Planes of the front and of the back tell how thick the leaf is, within `sigma_thickness_m` of what was assumed.
+    """
     params = tuned(Params)
     across, seen = _across(hypothesis), _stacked(fixes)
-    prior = np.concatenate([np.full(2, params.axis_rad), np.full(2, params.pivot_m), [params.thickness_m]])
+    prior = np.concatenate([np.full(2, params.axis_rad), np.full(2, params.pivot_m), [sigma_thickness_m]])
 
     def residuals(x: np.ndarray) -> np.ndarray:
         off = seen.planes - _predicted(seen, hypothesis, across, x)
@@ -88,7 +89,14 @@ def fit_joint(
     fitted = least_squares(residuals, start, jac=jacobian, loss="huber", f_scale=params.outlier, x_scale=scales)
     covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
     axis, pivot = _joint_at(hypothesis, across, fitted.x)
-    joint = FittedJoint(axis=axis, pivot=pivot, turns=hypothesis.turns, across=across, covariance=covariance[:4, :4])
+    joint = FittedJoint(
+        axis=axis,
+        pivot=pivot,
+        turns=hypothesis.turns,
+        across=across,
+        covariance=covariance[:4, :4],
+        thicker_m=float(fitted.x[4]),
+    )
     return joint, fitted.x[5:], np.sqrt(np.diag(covariance)[5:])
 
 

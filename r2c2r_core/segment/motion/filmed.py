@@ -90,14 +90,19 @@ class FilmedLeaves:
         return []
 
     def _looked_for(self, part: str, leaf: Leaf, ways: tuple[Way, ...]) -> tuple[Leaf, JointMotion | None]:
-        """Leaf with its motion; a leaf measured to be thicker than a board is estimated again with that thickness."""
+        """Leaf with its motion, which is estimated again where its edge shows another thickness.
+
+        A hinge's fit tells a thin door's thickness better than its edge; a drawer's tells nothing of it.
+        """
         usual = dict.fromkeys(ways, tuned(Params).usual)
-        motion = find_motion(leaf, self.scene, usual, part, only=bool(part))
+        leaf, motion = find_motion(leaf, self.scene, usual, part, only=bool(part))
         thickness_m = motion and front_thickness(leaf, _places(leaf, motion), self.scene)
-        if not thickness_m:
+        if motion is None or thickness_m is None or np.isclose(thickness_m, leaf.thickness_m):
+            return leaf, motion
+        if motion.kind == "revolute" and thickness_m < leaf.thickness_m + leaf.sigma_thickness_m:
             return leaf, motion
         thick = replace(leaf, thickness_m=thickness_m)
-        return thick, find_motion(thick, self.scene, usual, part, only=bool(part))
+        return find_motion(thick, self.scene, usual, part, only=bool(part))
 
 
 def _state(motion: JointMotion, frame_index: int) -> float:

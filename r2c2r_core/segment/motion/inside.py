@@ -11,6 +11,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.motion import Inside
 from r2c2r_core.segment.motion.leaf import Leaf
+from r2c2r_core.segment.motion.leaf import Params as LeafParams
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -110,9 +111,9 @@ def measure_inside(
 
 
 def front_thickness(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -> float | None:
-    """Thickness of a front, by how far its free edges extend behind its outer face; None where none is thicker than a board.
+    """Thickness of a front, by how far its free edges extend behind its outer face; None where no edge shows its end.
 
-    `place` is world_from_leaf in the frames that show it open. At its hinge and beyond, the unit lies behind the leaf.
+    Depth blurs edges by a pixel: one that ends within it is a board's, of usual thickness. `place` is world_from_leaf in the frames that show it open. At its hinge and beyond, the unit lies behind the leaf.
     """
     params, (half_w, half_h) = tuned(Params), leaf.half_m
     cloud = _behind(leaf, place, scene, params.thickest_m + params.edge_m)
@@ -124,9 +125,12 @@ def front_thickness(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: 
         count, _ = np.histogram(y[along > half - params.edge_m], edges)
         thin = count[edges[:-1] < params.thin_m[1]]
         ended = np.flatnonzero(count < params.ends * thin.mean())
-        if thin.sum() >= params.least_points and len(ended) > 0 and edges[ended[0]] > params.thick_m:
+        if thin.sum() >= params.least_points and len(ended) > 0:
             found.append((int(thin.sum()), float(edges[ended[0]])))
-    return max(found)[1] if found else None
+    thick = [each for each in found if each[1] > params.thick_m]
+    if thick:
+        return max(thick)[1]
+    return tuned(LeafParams).thickness_m if found else None
 
 
 def _free(cloud: _Cloud, leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -> np.ndarray:

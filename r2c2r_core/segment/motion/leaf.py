@@ -22,6 +22,13 @@ class Params:
         "Thickness of a front's board where it was not measured",
         source="European manufacturers' lists: fronts of 16-22 mm",
     )
+    sigma_thickness_m: float = param(
+        0.003, "m", "Standard deviation of a board's thickness", source="manufacturers' lists: fronts of 16-22 mm"
+    )
+    appliance_m: float = param(
+        0.045, "m", "Thickness of an appliance's door where it was not measured", source="microwaves 30 mm, refrigerators 60 mm"
+    )
+    sigma_appliance_m: float = param(0.02, "m", "Standard deviation of the thickness of an appliance's door")
     across: int = param(9, "count", "Number of sample points along each side of the grid on a leaf", ge=3)
     inside: float = param(
         0.9, "share", "Fraction of a leaf's half width and height that the grid spans: its rim is half a depth pixel"
@@ -36,6 +43,7 @@ class Leaf(Rectangle3):
     """A board: the rectangle of its outer face, closed or open, and its thickness."""
 
     thickness_m: float = field(default_factory=lambda: tuned(Params).thickness_m)
+    sigma_thickness_m: float = field(default_factory=lambda: tuned(Params).sigma_thickness_m)
 
     @property
     def behind(self) -> Vector3:
@@ -46,6 +54,12 @@ class Leaf(Rectangle3):
     def of(face: Rectangle3) -> "Leaf":
         """Board of usual thickness with that outer face."""
         return Leaf(world_from_front=face.world_from_front, width_m=face.width_m, height_m=face.height_m)
+
+    @staticmethod
+    def of_appliance(face: Rectangle3) -> "Leaf":
+        """Door of an appliance with that outer face: thicker than a board, by an amount that motion shows."""
+        params = tuned(Params)
+        return replace(Leaf.of(face), thickness_m=params.appliance_m, sigma_thickness_m=params.sigma_appliance_m)
 
     def part(self, x_m: tuple[float, float], z_m: tuple[float, float]) -> "Leaf":
         """Part between two places across and two heights, in the front frame."""

@@ -75,8 +75,8 @@ NO_PRIOR: Mapping[Way, float] = MappingProxyType({})
 
 def find_motion(
     leaf: Leaf, scene: Scene, prior: Mapping[Way, float] = NO_PRIOR, part: str = "", *, only: bool = False
-) -> JointMotion | None:
-    """Joint on which a leaf was observed to move; None where it was never observed away from its closed place.
+) -> tuple[Leaf, JointMotion | None]:
+    """Leaf as thick as its motion shows, and the joint on which it moved; None where it was never seen off its closed place.
 
     `prior` gives the log prior odds of each way of opening over the others. With `only`, motion in a way that `prior` does not
     name is rejected: half a front is a leaf only where it opens as one of a pair.
@@ -86,7 +86,7 @@ def find_motion(
     known = counts[:, :3].sum(axis=1)
     agrees = counts[:, 0] / np.maximum(known, 1)
     if ((agrees < params.vacated_share) & (known >= params.least_known)).sum() < params.least_frames:
-        return None
+        return leaf, None
     closed = (agrees > params.closed_share) & (known >= params.least_closed)
     silent = (counts[:, 3] > params.closed_share * counts.sum(axis=1)) & (counts.sum(axis=1) >= params.least_known)
     silent &= closed.sum() < params.least_frames  # black glass, which never shows its closed face
@@ -102,10 +102,10 @@ def find_motion(
         empty = (through & (course.values > 0) & (course.log > params.told)).sum() >= params.least_frames
         if course.hypothesis.way == "out":  # a drawer hides its own place: the space where it stands was seen through before
             empty |= _was_free(leaf, course, scene, closed)
-        motion = _measured(leaf, course, scene, closed, silent, part) if empty and course.support > params.support else None
-        if motion is not None:
-            return None if only and course.hypothesis.way not in prior else motion
-    return None
+        found = _measured(leaf, course, scene, closed, silent, part) if empty and course.support > params.support else None
+        if found is not None:
+            return (leaf, None) if only and course.hypothesis.way not in prior else found
+    return leaf, None
 
 
 def _course(states: States, scene: Scene, closed: np.ndarray, silent: np.ndarray, prior: float) -> Course:
@@ -139,8 +139,8 @@ def _filled(leaf: Leaf, frames: Sequence[Frame], scene: Scene) -> bool:
 
 def _measured(
     leaf: Leaf, course: Course, scene: Scene, closed: np.ndarray, silent: np.ndarray, part: str
-) -> JointMotion | None:
-    """Joint fitted to the frames that show the leaf; None where too few of them show it in one piece."""
+) -> tuple[Leaf, JointMotion] | None:
+    """Leaf and joint fitted to the frames that show the leaf; None where too few of them show it in one piece."""
     params, step = tuned(Params), float(course.hypothesis.states[1])
     joint, seen = _fitted(leaf, course, scene)
     seen |= {int(k): (0.0, params.closed_rad) for k in np.flatnonzero(silent & (course.values == 0)) if k not in seen}
@@ -150,14 +150,14 @@ def _measured(
     moves = shut >= params.least_frames or (len(opened) > 0 and np.ptp(opened) > params.moves_steps * step)
     if len(opened) < params.least_frames or not moves:
         return None
-    turns = course.hypothesis.turns
+    turns, leaf = course.hypothesis.turns, replace(leaf, thickness_m=leaf.thickness_m + joint.thicker_m)
     states = _states(leaf, course, joint, seen, scene, closed)
     values = np.array([state.value for state in states.values()], dtype=np.float64)
     largest = widest(np.array([value for value, _ in seen.values()]), values, turns=turns)
     times = [scene.frames[k].timestamp_s for k in states]
     pivot = joint.pivot - joint.axis * float(joint.axis @ joint.pivot) if turns else np.zeros(3)
     place = leaf.world_from_front
-    return JointMotion(
+    return leaf, JointMotion(
         part=part,
         kind="revolute" if turns else "prismatic",
         axis_world=place.turn(joint.axis),
@@ -183,7 +183,8 @@ def _fitted(leaf: Leaf, course: Course, scene: Scene) -> tuple[FittedJoint, Seen
     }
     if not fixes:
         return as_supposed(course.hypothesis), {}
-    joint, states, sigmas = fit_joint(course.hypothesis, list(fixes.values()), course.values[list(fixes)])
+    planes, expected = list(fixes.values()), course.values[list(fixes)]
+    joint, states, sigmas = fit_joint(course.hypothesis, planes, expected, leaf.sigma_thickness_m)
     return joint, {k: (float(states[n]), float(sigmas[n])) for n, k in enumerate(fixes)}
 
 

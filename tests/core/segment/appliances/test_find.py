@@ -1,5 +1,6 @@
 """Choice of the plane for a click on an appliance."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -7,11 +8,15 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
+from r2c2r_core.geometry.visibility import DepthNoise
 from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.find import appliance_front
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.prepared import PreparedCapture
+from tests.core.segment.motion.boards import CAMERA, cast_rays
+from tests.core.segment.scenes import look_at
 
 
 def plane(centre: tuple[float, float, float], outward: tuple[float, float], width_m: float, height_m: float) -> PlaneRegion:
@@ -27,18 +32,38 @@ SIDE = plane((-0.32, 0.33, 0.87), (-1.0, 0.0), 0.60, 1.74)
 ROUNDED = plane((-0.30, 0.02, 0.87), (-0.5, -1.0), 0.06, 1.60)  # from fusion of the edge between them
 
 
+WIDE = plane((0.0, 0.0, 0.87), (0.0, -1.0), 0.91, 1.74)
+BESIDE = plane((-0.46, 0.33, 0.87), (-1.0, 0.0), 0.68, 1.74)
+
+
 def asked_for(
-    point: Vector3, kind: str = "refrigerator", planes: tuple[PlaneRegion, ...] = (FRONT, SIDE, ROUNDED)
+    point: Vector3,
+    kind: str = "refrigerator",
+    planes: tuple[PlaneRegion, ...] = (FRONT, SIDE, ROUNDED),
+    *,
+    eye: tuple[float, float, float] = (-1.2, -1.6, 1.4),
+    elsewhere: tuple[float, float, float] | None = None,
 ) -> PlaneRegion:
-    """The plane whose run a click on a refrigerator at a world point requests."""
+    """The plane whose run a click on a refrigerator at a world point requests.
+
+    One camera sees it, with its eye at `eye`; five others at `elsewhere` look away from it.
+    """
     asked: list[PlaneRegion] = []
-    camera = SimpleNamespace(world_from_camera=Rigid3(np.eye(3), np.array([-1.2, -1.6, 1.4])))
-    centre = camera.world_from_camera.translation
+    half = planes[0].width_m / 2
+    box = (Rigid3(np.eye(3), np.zeros(3)), (-half, 0.0, 0.0), (half, 0.66, 1.74))
+    looks = [look_at(np.array(eye), np.array([0.0, 0.2, 0.8]))]
+    looks += [] if elsewhere is None else [look_at(np.array(elsewhere), 3 * np.array(elsewhere))] * 5
+    frames = tuple(
+        Frame(index=k, timestamp_s=0.1 * k, rgb_camera=CAMERA, depth_camera=CAMERA, world_from_camera=look, sharpness=1.0)
+        for k, look in enumerate(looks)
+    )
     scene = SimpleNamespace(
-        frames=(camera,),
-        ray=lambda *_: (centre, (point - centre) / np.linalg.norm(point - centre)),
+        frames=frames,
+        ray=lambda *_: (np.array(eye), (point - eye) / np.linalg.norm(point - eye)),
         pick=lambda *_: point,
         has_depth=lambda *_: True,
+        depth=lambda k: cast_rays([box], looks[k]),
+        noise=DepthNoise(floor_m=0.002, per_m=0.002),
     )
 
     def run_of(region: PlaneRegion, margin_m: float = 0.0) -> None:
@@ -63,7 +88,19 @@ def test_a_click_on_the_rounded_edge_selects_the_front() -> None:
 
 
 def test_a_wide_clicked_plane_wins_over_a_side_viewed_more_squarely() -> None:
-    wide = plane((0.0, 0.0, 0.87), (0.0, -1.0), 0.91, 1.74)
-    beside = plane((-0.46, 0.33, 0.87), (-1.0, 0.0), 0.68, 1.74)
     clicked = np.array([-0.3, 0.0, 1.0])
-    assert asked_for(clicked, "french_door_refrigerator", (wide, beside)) is wide
+    assert asked_for(clicked, "french_door_refrigerator", (WIDE, BESIDE), eye=(-2.4, -0.5, 1.4)) is WIDE
+
+
+def test_cameras_that_look_elsewhere_do_not_decide_which_side_is_the_front() -> None:
+    wide = plane((0.0, 0.0, 0.87), (0.0, -1.0), 0.88, 1.66)
+    beside = plane((-0.44, 0.33, 0.91), (-1.0, 0.0), 0.70, 1.82)
+    clicked = np.array([-0.3, 0.0, 1.0])
+    assert asked_for(clicked, "french_door_refrigerator", (wide, beside), elsewhere=(-2.5, 0.4, 1.4)) is wide
+
+
+def test_a_corner_of_the_front_that_was_not_fused_selects_the_front() -> None:
+    observed = np.ones((83, 44), bool)
+    observed[:20, :12] = False
+    front = replace(plane((0.0, 0.0, 0.83), (0.0, -1.0), 0.88, 1.66), support=observed)
+    assert asked_for(np.array([-0.35, 0.0, 1.5]), "french_door_refrigerator", (front, BESIDE)) is front

@@ -26,6 +26,10 @@ def scene(*args: Any, **more: Any) -> Any:
     return filmed(*args, **more)
 
 
+def motion_of(*args: Any, **more: Any) -> Any:
+    return find_motion(*args, **more)[1]
+
+
 def quick(ways: tuple[str, ...], few: tuple[str, ...]) -> list[Any]:
     """The few kinds of motion that differ; their mirror images are slow."""
     return [pytest.param(way, marks=() if way in few else pytest.mark.slow) for way in ways]
@@ -34,7 +38,7 @@ def quick(ways: tuple[str, ...], few: tuple[str, ...]) -> list[Any]:
 @pytest.mark.parametrize("way", quick(RAD + M, ("left", "bottom", "out", "slides_left")))
 def test_each_joint_type_is_classified_and_measured(way: str) -> None:
     states = opened_and_held(np.deg2rad(75) if way in RAD else 0.33)
-    motion = find_motion(LEAF, scene(way, states))
+    motion = motion_of(LEAF, scene(way, states))
     assert motion is not None
     assert motion.kind == ("revolute" if way in RAD else "prismatic")
     axis = LEAF.world_from_front.turn(joint(way).axis)
@@ -49,7 +53,7 @@ def test_each_joint_type_is_classified_and_measured(way: str) -> None:
 def test_a_leaf_resting_almost_closed_counts_as_closed() -> None:
     """Pose errors rotate all depth of a closed leaf by more than the noise of a single frame."""
     states = np.maximum(opened_and_held(np.deg2rad(75)), np.deg2rad(2.6))
-    motion = find_motion(LEAF, scene("left", states))
+    motion = motion_of(LEAF, scene("left", states))
     assert motion is not None
     assert [motion.states[k].value for k in range(7)] == [0.0] * 7
     assert motion.states[9].value == pytest.approx(states[9], abs=np.deg2rad(2))  # while moving it is where it was observed
@@ -64,7 +68,7 @@ def test_a_concealed_hinge_is_located_behind_the_edge(way: str) -> None:
     """A concealed hinge turns about a line inside the unit, far from the usual one; three ranges of angles determine it."""
     off = (0.012, 0.015, 0.0) if way in ("left", "right") else (0.0, 0.015, 0.012)
     states = np.concatenate([np.zeros(4), np.linspace(0, np.deg2rad(95), 45)])
-    motion = find_motion(LEAF, scene(way, states, pivot_off=off, noise_m=0.003))
+    motion = motion_of(LEAF, scene(way, states, pivot_off=off, noise_m=0.003))
     assert motion is not None
     assert motion.pivot_world is not None
     assert motion.covariance is not None
@@ -78,16 +82,16 @@ def test_a_concealed_hinge_is_located_behind_the_edge(way: str) -> None:
 
 
 def test_a_static_leaf_has_no_motion() -> None:
-    assert find_motion(LEAF, scene("left", np.zeros(30))) is None
+    assert motion_of(LEAF, scene("left", np.zeros(30))) is None
 
 
 def test_an_arm_before_a_closed_leaf_is_not_reported_as_motion() -> None:
-    assert find_motion(LEAF, scene("left", np.zeros(30), hands=range(5, 20))) is None
+    assert motion_of(LEAF, scene("left", np.zeros(30), hands=range(5, 20))) is None
 
 
 def test_an_arm_before_an_open_leaf_does_not_change_its_joint() -> None:
     states = opened_and_held(np.deg2rad(60))
-    motion = find_motion(LEAF, scene("right", states, hands=range(8, 24, 2)))
+    motion = motion_of(LEAF, scene("right", states, hands=range(8, 24, 2)))
     assert motion is not None
     assert motion.largest == pytest.approx(np.deg2rad(60), abs=np.deg2rad(1))
     values = np.array([motion.states[k].value for k in range(len(states))], dtype=float)
@@ -101,7 +105,7 @@ HELD_THEN_CLOSED = np.concatenate([np.full(12, 1.2), np.linspace(1.2, 0, 12), np
     "states", [np.linspace(1.2, 0, 30), np.linspace(0, 1.2, 30), np.repeat([0.0, 1.2], 15), HELD_THEN_CLOSED]
 )
 def test_partly_filmed_openings_are_tracked_without_a_stop(states: np.ndarray) -> None:
-    motion = find_motion(LEAF, scene("left", states))
+    motion = motion_of(LEAF, scene("left", states))
     assert motion is not None
     values = np.array([motion.states[k].value for k in range(len(states))], dtype=float)
     assert np.quantile(np.abs(values - states), 0.9) < np.deg2rad(2)
@@ -109,7 +113,7 @@ def test_partly_filmed_openings_are_tracked_without_a_stop(states: np.ndarray) -
 
 
 def test_evidence_overrides_a_wrong_prior() -> None:
-    motion = find_motion(LEAF, scene("left", opened_and_held(1.0)), {"out": 8.0})
+    motion = motion_of(LEAF, scene("left", opened_and_held(1.0)), {"out": 8.0})
     assert motion is not None
     assert motion.kind == "revolute"
 
@@ -117,29 +121,29 @@ def test_evidence_overrides_a_wrong_prior() -> None:
 @pytest.mark.parametrize("way", ["left", "slides_left"])
 def test_a_constant_open_state_is_not_reported_as_motion(way: str) -> None:
     """A rectangle drawn too wide looks like a leaf that is half slid away: only a change of state is evidence of a joint."""
-    assert find_motion(LEAF, scene(way, np.full(30, 0.3))) is None
+    assert motion_of(LEAF, scene(way, np.full(30, 0.3))) is None
 
 
 def test_a_leaf_of_a_pair_must_open_about_the_given_side() -> None:
     states = opened_and_held(1.0)
-    assert find_motion(LEAF, scene("bottom", states), {"left": 8.0}, "left", only=True) is None
-    assert find_motion(LEAF, scene("left", states), {"left": 8.0}, "left", only=True) is not None
+    assert motion_of(LEAF, scene("bottom", states), {"left": 8.0}, "left", only=True) is None
+    assert motion_of(LEAF, scene("left", states), {"left": 8.0}, "left", only=True) is not None
 
 
 def test_another_leaf_in_the_opened_position_is_not_reported_as_motion() -> None:
     """The other leaf only hides the front; an open door would reveal the inside of its unit."""
-    assert find_motion(LEAF, scene("left", np.zeros(36), other=range(10, 26))) is None
+    assert motion_of(LEAF, scene("left", np.zeros(36), other=range(10, 26))) is None
 
 
 def test_static_appliances_beside_a_leaf_are_not_reported_as_motion() -> None:
     """One appliance stands where an open door would be, the other hides the closed door, both in every frame."""
-    assert find_motion(LEAF, scene("left", np.zeros(36), niche=True)) is None
+    assert motion_of(LEAF, scene("left", np.zeros(36), niche=True)) is None
 
 
 def test_a_leaf_open_at_the_start_has_no_observed_stop() -> None:
     """The first frames have small errors, but no frame shows the leaf arriving at a stop."""
     states = np.concatenate([[1.15], np.full(14, 1.2), np.linspace(1.2, 0, 12), np.zeros(6)])
-    motion = find_motion(LEAF, scene("left", states))
+    motion = motion_of(LEAF, scene("left", states))
     assert motion is not None
     assert not motion.stop_seen
 
@@ -147,7 +151,7 @@ def test_a_leaf_open_at_the_start_has_no_observed_stop() -> None:
 def test_black_glass_counts_as_closed_where_it_has_no_depth() -> None:
     """The outer face of an oven door has no depth returns, its inner face has."""
     states = opened_and_held(1.4)
-    motion = find_motion(LEAF, scene("bottom", states, glass=True))
+    motion = motion_of(LEAF, scene("bottom", states, glass=True))
     assert motion is not None
     assert [motion.states[k].value for k in range(8)] == [0.0] * 8
     held = np.array([motion.states[k].value for k in range(20, 30)], dtype=float)
