@@ -317,6 +317,7 @@ _APPLIANCES = (
         hinge="left",
         hinge_share=0.98,  # keypad and latch are on the right of all but a few of them
         fixture="microwave",
+        beside_panel=True,
         width=Size(0.36, 0.49, 0.77, _MICROWAVES),
         depth=Size(0.25, 0.38, 0.50, f"{_MICROWAVES}; 0.30-0.48 m deep: a wall behind it may be farther"),
         height=Size(0.21, 0.28, 0.46, _MICROWAVES),

@@ -117,6 +117,7 @@ class Category:
     dark: bool = False  # its front is dark glass
     flap: bool = False  # hinged at its upper edge if it is wider than high with its handle at the lower edge
     place: Place | None = None  # where it is proposed; None: it is never proposed
+    beside_panel: bool = False  # its door leaves room for a control panel
     over_drawer: str | None = None  # its fixture if a drawer was filmed below its doors
     wider: tuple[float, str] | None = None  # from this width (metres) on it is that category
 

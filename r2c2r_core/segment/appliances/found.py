@@ -7,7 +7,7 @@ from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances.box import appliance_box, appliance_mask
-from r2c2r_core.segment.appliances.seams import drawer_seams
+from r2c2r_core.segment.appliances.seams import drawer_seams, panel_seams
 from r2c2r_core.segment.expected_iou import expected_iou
 from r2c2r_core.segment.found import View
 from r2c2r_core.segment.fronts.front import Front, front_panel
@@ -42,7 +42,9 @@ class FoundAppliance:
     def __post_init__(self) -> None:
         seams_m = drawer_seams(self.front) if self.category.over_drawer is not None else ()
         leaf = Leaf.of_appliance(self.front.rectangle)
-        object.__setattr__(self, "_leaves", FilmedLeaves(leaf, self.category, self.scene, self.front.depth_m, seams_m))
+        panels_m = panel_seams(self.front) if self.category.beside_panel else ()
+        leaves = FilmedLeaves(leaf, self.category, self.scene, self.front.depth_m, seams_m, panels_m)
+        object.__setattr__(self, "_leaves", leaves)
 
     def see(self, frame: Frame) -> View:
         """Visible pixels of the box and of its doors where they stand open, with their confidence."""

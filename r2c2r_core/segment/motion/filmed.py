@@ -49,6 +49,7 @@ class FilmedLeaves:
     scene: Scene
     depth_m: float  # of its unit: to the wall behind it, or the usual depth of its category
     seams_m: tuple[float, ...] = ()  # heights in the front frame at which a drawer below its doors may end, likeliest first
+    panels_m: tuple[float, ...] = ()  # places across it at which its door may end, beside a control panel, likeliest first
     _filmed: tuple[tuple[Leaf, JointMotion | None], ...] | None = field(default=None, init=False, repr=False)
 
     @property
@@ -70,7 +71,11 @@ class FilmedLeaves:
 
     def _all(self) -> tuple[tuple[Leaf, JointMotion | None], ...]:
         if self._filmed is None:
-            found = self._over_drawer() or [self._looked_for(*leaf) for leaf in _leaves(self.whole, self.category)]
+            found = (
+                self._over_drawer()
+                or self._beside_panel()
+                or [self._looked_for(*leaf) for leaf in _leaves(self.whole, self.category)]
+            )
             self._filmed = tuple(
                 (leaf, motion and _with_inside(leaf, motion, self.scene, self.depth_m)) for leaf, motion in found
             )
@@ -89,6 +94,16 @@ class FilmedLeaves:
                 ]
         return []
 
+    def _beside_panel(self) -> list[tuple[Leaf, JointMotion | None]]:
+        """A door observed to move beside a control panel; none where no part of the front up to a seam moved."""
+        half_w, half_h = self.whole.half_m
+        for x in self.panels_m:
+            ends = (-half_w, x) if x > 0 else (x, half_w)
+            door = self._looked_for("", self.whole.part(ends, (-half_h, half_h)), ("left",) if x > 0 else ("right",))
+            if door[1] is not None:
+                return [door]
+        return []
+
     def _looked_for(self, part: str, leaf: Leaf, ways: tuple[Way, ...]) -> tuple[Leaf, JointMotion | None]:
         """Leaf with its motion, which is estimated again where its edge shows another thickness.
 
@@ -96,7 +111,7 @@ class FilmedLeaves:
         """
         usual = dict.fromkeys(ways, tuned(Params).usual)
         leaf, motion = find_motion(leaf, self.scene, usual, part, only=bool(part))
-        thickness_m = motion and front_thickness(leaf, _places(leaf, motion), self.scene)
+        thickness_m = None if motion is None else front_thickness(leaf, _places(leaf, motion), self.scene)
         if motion is None or thickness_m is None or np.isclose(thickness_m, leaf.thickness_m):
             return leaf, motion
         if motion.kind == "revolute" and thickness_m < leaf.thickness_m + leaf.sigma_thickness_m:

@@ -113,7 +113,8 @@ def measure_inside(
 def front_thickness(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -> float | None:
     """Thickness of a front, by how far its free edges extend behind its outer face; None where no edge shows its end.
 
-    Depth blurs edges by a pixel: one that ends within it is a board's, of usual thickness. `place` is world_from_leaf in the frames that show it open. At its hinge and beyond, the unit lies behind the leaf.
+    Depth blurs edges by a pixel: one that ends within it is a board's, of usual thickness. `place` is world_from_leaf in the
+    frames that show it open. At its hinge and beyond, the unit lies behind the leaf.
     """
     params, (half_w, half_h) = tuned(Params), leaf.half_m
     cloud = _behind(leaf, place, scene, params.thickest_m + params.edge_m)
