@@ -34,12 +34,6 @@ class Params:
     least_m: float = param(
         0.1, "m", "Minimum side of a leaf: narrower panels belong to a frame", source="makers' narrowest fronts: 150 mm"
     )
-    hollow_share: float = param(
-        0.5,
-        "share",
-        "Minimum fraction of rays through a vacated place that end behind it",
-        source="opened kitchens: 1.0 of a refrigerator's closed front, 0.0-0.1 of its open door's place",
-    )
     off_m: float = param(0.03, "m", "Maximum distance of a click from a leaf in one of the tested states")
     gain: float = param(20.0, "log", "Minimum log-likelihood ratio of the open over the closed leaf in the clicked frame")
     near_steps: int = param(
@@ -69,7 +63,7 @@ def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int, ca
     if not _moved(point, scene):
         return point
     frame = scene.frame(frame_index)
-    leaves = [leaf for leaf in _leaves_near(prepared, point, category) if _is_before_hollow(leaf, scene, category)]
+    leaves = [leaf for leaf in _leaves_near(prepared, point, category) if _has_unit(leaf, scene, category)]
     opened: list[tuple[Leaf, Hypothesis, int, Vector3]] = []
     for leaf in leaves:
         if _in_a_row(prepared, point, leaf):
@@ -118,20 +112,21 @@ def _leaves_near(prepared: PreparedCapture, point: Vector3, category: Category) 
     return found
 
 
-def _is_before_hollow(leaf: Leaf, scene: Scene, category: Category) -> bool:
-    """Whether most rays through a vacated leaf's place end in the compartment behind it; past an open door, few do."""
-    params, points = tuned(Params), leaf.world_from_front.apply(face_points(leaf))
-    through, within = 0, 0
+def _has_unit(leaf: Leaf, scene: Scene, category: Category) -> bool:
+    """Whether a unit may stand behind a leaf: few frames look through its place except through the leaf's own.
+
+    Behind an open door there is none: the same motion seen in reverse, open where it is closed, is told apart by that.
+    """
+    params = tuned(Params)
+    points = leaf.world_from_front.apply(face_points(leaf) + np.array([0.0, category.depth.low / 2, 0.0]))
+    local, free = leaf.world_from_front.inverse.apply(points), np.zeros(len(points), int)
     for frame in scene.frames:
-        eye = frame.world_from_camera.translation
-        if leaf.world_from_front.inverse.apply(eye)[1] > 0:
-            continue
         z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
-        past = scene.noise.seen_through(seen, z, params.past_m)
-        ends = leaf.world_from_front.inverse.apply(eye + (points[past] - eye) * (seen[past] / z[past])[:, None])
-        through += len(ends)
-        within += int(np.count_nonzero(leaf.covers(ends) & (ends[:, 1] < category.depth.high)))
-    return through < tuned(TrackParams).least_known or within > params.hollow_share * through
+        eye = leaf.world_from_front.inverse.apply(frame.world_from_camera.translation[None])[0]
+        crossing = eye + (local - eye) * (eye[1] / (eye[1] - local[:, 1]))[:, None]
+        by_the_leaf = (eye[1] < 0) & leaf.covers(crossing)
+        free += scene.noise.seen_through(seen, z, params.past_m) & ~by_the_leaf
+    return bool((free >= params.least_frames).mean() < tuned(TrackParams).free_share)
 
 
 def _holds(leaf: Leaf, point: Vector3) -> bool:

@@ -48,7 +48,20 @@ def asked_for(
 
     One camera sees it, with its eye at `eye`; five others at `elsewhere` look away from it.
     """
-    asked: list[PlaneRegion] = []
+    return run_for(point, kind, planes, eye=eye, elsewhere=elsewhere)[0]
+
+
+def run_for(
+    point: Vector3,
+    kind: str,
+    planes: tuple[PlaneRegion, ...],
+    *,
+    eye: tuple[float, float, float] = (-1.2, -1.6, 1.4),
+    elsewhere: tuple[float, float, float] | None = None,
+    has_depth: bool = True,
+) -> tuple[PlaneRegion, float]:
+    """The plane of the requested run, and its margin."""
+    asked: list[tuple[PlaneRegion, float]] = []
     half = planes[0].width_m / 2
     box = (Rigid3(np.eye(3), np.zeros(3)), (-half, 0.0, 0.0), (half, 0.66, 1.74))
     looks = [look_at(np.array(eye), np.array([0.0, 0.2, 0.8]))]
@@ -61,13 +74,13 @@ def asked_for(
         frames=frames,
         ray=lambda *_: (np.array(eye), (point - eye) / np.linalg.norm(point - eye)),
         pick=lambda *_: point,
-        has_depth=lambda *_: True,
+        has_depth=lambda *_: has_depth,
         depth=lambda k: cast_rays([box], looks[k]),
         noise=DepthNoise(floor_m=0.002, per_m=0.002),
     )
 
     def run_of(region: PlaneRegion, margin_m: float = 0.0) -> None:
-        asked.append(region)
+        asked.append((region, margin_m))
 
     prepared = cast(PreparedCapture, cast(Any, SimpleNamespace(scene=scene, planes=planes, run_of=run_of)))
     prompt = ObjectPrompt(name="it", category=kind, points=(PromptPoint(frame=0, x=1.0, y=1.0, label=1),))
@@ -104,3 +117,19 @@ def test_a_corner_of_the_front_that_was_not_fused_selects_the_front() -> None:
     observed[:20, :12] = False
     front = replace(plane((0.0, 0.0, 0.83), (0.0, -1.0), 0.88, 1.66), support=observed)
     assert asked_for(np.array([-0.35, 0.0, 1.5]), "french_door_refrigerator", (front, BESIDE)) is front
+
+
+def test_a_front_that_is_glass_but_for_its_rim_and_keypad_is_searched_beyond_them() -> None:
+    observed = np.zeros((15, 26), bool)
+    observed[:, 17:] = observed[13:] = True
+    keypad = replace(plane((0.0, 0.0, 1.05), (0.0, -1.0), 0.52, 0.30), support=observed)
+    assert run_for(np.array([0.2, 0.0, 1.05]), "microwave", (keypad,))[1] > 0.25
+    whole = plane((0.0, 0.0, 1.05), (0.0, -1.0), 0.52, 0.30)
+    assert run_for(np.array([0.2, 0.0, 1.05]), "microwave", (whole,))[1] == 0.0
+
+
+def test_a_click_on_glass_selects_the_front_and_not_the_rear_board_that_other_frames_show_behind_it() -> None:
+    keypad = plane((0.16, 0.0, 1.05), (0.0, -1.0), 0.18, 0.28)
+    rear = plane((-0.02, 0.33, 1.05), (0.0, -1.0), 0.32, 0.20)
+    clicked = np.array([-0.02, 0.33, 1.05])
+    assert run_for(clicked, "microwave", (keypad, rear), eye=(-0.1, -1.2, 1.3), has_depth=False)[0] is keypad

@@ -1,4 +1,4 @@
-"""Candidate seams between an appliance's doors and a drawer below: the likeliest level line of its run first, each once."""
+"""Candidate seams of a drawer below an appliance's doors or a panel beside them: the likeliest line first, each once."""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from r2c2r_core.segment.appliances.seams import drawer_seams
+from r2c2r_core.segment.appliances.seams import drawer_seams, panel_seams
 from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
@@ -39,3 +39,11 @@ def test_adjacent_lines_are_merged_into_one_seam() -> None:
 
 def test_lines_too_low_or_too_high_for_a_drawer_are_ignored() -> None:
     assert drawer_seams(front(30, 340)) == ()
+
+
+@pytest.mark.parametrize(("column", "found"), [(96, [(96 - 60) * CELL_M]), (114, []), (60, [])])
+def test_a_panel_beside_a_door_takes_a_tenth_to_nearly_half_of_the_front(column: int, found: list[float]) -> None:
+    faint = np.full((360 // STEP, 120 // STEP), -4, np.float32)
+    cells = (Cell(0, 0, column, 360), Cell(column, 0, 120, 360))
+    run = SimpleNamespace(odds=PanelOdds(faint, faint, faint, faint), cells=cells, grid=SimpleNamespace(cell_m=CELL_M))
+    assert panel_seams(Front(cast(Run, run), FRONT, None, 0.0)) == pytest.approx(found)
