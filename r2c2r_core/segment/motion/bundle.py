@@ -40,7 +40,8 @@ class FittedJoint:
     turns: bool
     across: np.ndarray  # (2, 3) unit directions perpendicular to the axis: of its rotations, and of the pivot's shifts
     covariance: np.ndarray  # (4, 4): two rotations of the axis (rad), two shifts of the pivot (m)
-    thicker_m: float = 0.0  # than the leaf was assumed to be
+    thicker_m: float = 0.0  # than the leaf was assumed to be, and
+    sigma_thicker_m: float = np.inf  # its standard deviation
 
     def pose(self, state: float) -> Rigid3:
         """Pose of the leaf in a state: front_from_leaf, the identity where closed."""
@@ -96,6 +97,7 @@ def fit_joint(
         across=across,
         covariance=covariance[:4, :4],
         thicker_m=float(fitted.x[4]),
+        sigma_thicker_m=float(np.sqrt(covariance[4, 4])),
     )
     return joint, fitted.x[5:], np.sqrt(np.diag(covariance)[5:])
 

@@ -12,6 +12,7 @@ from r2c2r_core.model.motion import DOOR, DRAWER, JointMotion
 from r2c2r_core.segment.motion.hypotheses import Way, moved
 from r2c2r_core.segment.motion.inside import front_thickness, measure_inside
 from r2c2r_core.segment.motion.leaf import Leaf, OpenLeaf
+from r2c2r_core.segment.motion.leaf import Params as LeafParams
 from r2c2r_core.segment.motion.track import find_motion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -105,19 +106,23 @@ class FilmedLeaves:
         return []
 
     def _looked_for(self, part: str, leaf: Leaf, ways: tuple[Way, ...]) -> tuple[Leaf, JointMotion | None]:
-        """Leaf with its motion, which is estimated again where its edge shows another thickness.
+        """Leaf with its motion, which is estimated again where its edge shows a thickness that the motion did not.
 
-        A hinge's fit tells a thin door's thickness better than its edge; a drawer's tells nothing of it.
+        A motion that shows both faces tells a thin door's thickness better than its edge; a drawer's tells nothing of it.
         """
         usual = dict.fromkeys(ways, tuned(Params).usual)
-        leaf, motion = find_motion(leaf, self.scene, usual, part, only=bool(part))
-        thickness_m = None if motion is None else front_thickness(leaf, _places(leaf, motion), self.scene)
-        if motion is None or thickness_m is None or np.isclose(thickness_m, leaf.thickness_m):
-            return leaf, motion
-        if motion.kind == "revolute" and thickness_m < leaf.thickness_m + leaf.sigma_thickness_m:
-            return leaf, motion
-        thick = replace(leaf, thickness_m=thickness_m)
-        return find_motion(thick, self.scene, usual, part, only=bool(part))
+        moved_leaf, motion = find_motion(leaf, self.scene, usual, part, only=bool(part))
+        edge_m = None if motion is None else front_thickness(moved_leaf, _places(moved_leaf, motion), self.scene)
+        if edge_m is None or _is_known(moved_leaf, edge_m):
+            return moved_leaf, motion
+        return find_motion(replace(leaf, thickness_m=edge_m), self.scene, usual, part, only=bool(part))
+
+
+def _is_known(leaf: Leaf, edge_m: float) -> bool:
+    """Whether a leaf's thickness need not be corrected to that of its edge."""
+    sigma_m = leaf.sigma_thickness_m
+    is_sure = sigma_m <= tuned(LeafParams).sigma_thickness_m
+    return bool(np.isclose(edge_m, leaf.thickness_m)) or (is_sure and edge_m < leaf.thickness_m + 3 * sigma_m)
 
 
 def _state(motion: JointMotion, frame_index: int) -> float:

@@ -150,7 +150,9 @@ def _measured(
     moves = shut >= params.least_frames or (len(opened) > 0 and np.ptp(opened) > params.moves_steps * step)
     if len(opened) < params.least_frames or not moves:
         return None
-    turns, leaf = course.hypothesis.turns, replace(leaf, thickness_m=leaf.thickness_m + joint.thicker_m)
+    turns = course.hypothesis.turns
+    sigma_m = min(leaf.sigma_thickness_m, joint.sigma_thicker_m)
+    leaf = replace(leaf, thickness_m=leaf.thickness_m + joint.thicker_m, sigma_thickness_m=sigma_m)
     states = _states(leaf, course, joint, seen, scene, closed)
     values = np.array([state.value for state in states.values()], dtype=np.float64)
     largest = widest(np.array([value for value, _ in seen.values()]), values, turns=turns)

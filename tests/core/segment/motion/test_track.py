@@ -183,3 +183,14 @@ def test_a_bottom_hinged_leaf_opens_at_most_to_the_floor() -> None:
     assert widest(None) == pytest.approx(np.deg2rad(117.0))  # the last of the tested steps
     bottom = float(LEAF.world_from_front.translation[2]) - LEAF.half_m[1]
     assert np.pi / 2 < widest(bottom - 0.1) < widest(bottom - 0.2) < widest(None)
+
+
+@pytest.mark.parametrize("thickness_m", [0.03, 0.06])
+def test_motion_shows_the_thickness_of_an_appliance_door(thickness_m: float) -> None:
+    film: Any = filmed("left", opened_and_held(np.deg2rad(110)), thickness_m=thickness_m)
+    leaf, motion = find_motion(Leaf.of_appliance(LEAF), film)
+    assert motion is not None
+    assert leaf.thickness_m == pytest.approx(thickness_m, abs=0.005)
+    assert leaf.sigma_thickness_m < Leaf.of_appliance(LEAF).sigma_thickness_m / 2
+    hinge = LEAF.world_from_front.inverse.apply(motion.pivot_world)
+    assert hinge[:2] == pytest.approx([-LEAF.half_m[0], 0.0], abs=0.006)
