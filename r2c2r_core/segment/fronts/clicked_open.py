@@ -74,12 +74,12 @@ def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int, ca
                 opened.append((leaf, hypothesis, state, closed_point))
     if not opened:
         return point
-    held = [_opens_by(_in_all(leaf, each, scene)) for leaf in leaves if _holds(leaf, point) for each in _ways(leaf)]
-    best, place = max([*held, tuned(TrackParams).gain]), point
+    held = [_explained(_in_all(leaf, each, scene)) for leaf in leaves if _holds(leaf, point) for each in _ways(leaf)]
+    best, place = max(held, default=0.0), point
     for leaf, hypothesis, state, closed_point in opened:
         log = _in_all(leaf, hypothesis, scene)
-        if _opens_by(log) > best and _is_free(log, state):
-            best, place = _opens_by(log), closed_point
+        if _explained(log) > best and _opens_by(log) > tuned(TrackParams).gain and _is_free(log, state):
+            best, place = _explained(log), closed_point
     return place
 
 
@@ -154,6 +154,11 @@ def _in_all(leaf: Leaf, hypothesis: Hypothesis, scene: Scene) -> np.ndarray:
     states, unknown = lay_out(leaf, hypothesis), tuned(Params).unknown
     log = np.stack([evidence(states, scene, frame) for frame in scene.frames])
     return np.logaddexp(np.log(unknown), np.log1p(-unknown) + log)
+
+
+def _explained(log: np.ndarray) -> float:
+    """Log-likelihood ratio over all frames of a leaf on a joint, at its best state in each, to nothing being known there."""
+    return float(log.max(axis=1).sum())
 
 
 def _opens_by(log: np.ndarray) -> float:
