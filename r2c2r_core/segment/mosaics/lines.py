@@ -26,8 +26,8 @@ class Params:
     max_shift_m: float = param(0.03, "m", "Maximum pose error between frames", source="30 mm on a KinectFusion trajectory")
     roll_cost: float = param(
         1.0,
-        "1/deg²",
-        "Profile energy (squared z-scores) that a roll must add, relative to its square: scans are level to a few degrees",
+        "score",
+        "Profile energy (sum of squared z-scores) that a roll must add per squared degree: scans are nearly level",
         source="fused poses of a 7-Scenes kitchen roll fronts by 2.5°; faint lines of a small plane favour up to 5° by chance",
     )
 
