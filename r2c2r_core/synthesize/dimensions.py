@@ -87,6 +87,7 @@ class MeasuredObject:
     support_z_m: float | None
     front_measured: bool  # the front plane and its rectangle come from all frames, not from the mesh
     confidence: float
+    edges: tuple[float, ...] = ()  # probability that each edge of its front is right: left, right, top, bottom
     fixed_by_person: bool  # a person gave pose or size: the layout leaves it where it is
     laps: tuple[Lap, ...] = ()  # with the leaves that it slides past, set after the layout
     placed_pose: Rigid3  # world_from_object as the mesh was placed, before person and layout
@@ -155,6 +156,7 @@ def measure_object(
         support_z_m=track.box.support_z_m if track.box is not None else None,
         front_measured=front is not None,
         confidence=front.confidence if front is not None else 0.3,
+        edges=front.edges if front is not None else (),
         fixed_by_person=False,
         placed_pose=pose,
         warnings=tuple(warnings),

@@ -16,6 +16,7 @@ from r2c2r_core.failing import spared
 from r2c2r_core.geometry.least_change import least_change
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.synthesize.dimensions import MeasuredObject
+from r2c2r_core.synthesize.filmed import side_filmed
 from r2c2r_core.tuning import param, tuned
 
 _FIXED_M = 1e-6
@@ -33,6 +34,13 @@ class Params:
         "m",
         "Standard deviation of a front's edges, measured over all frames",
     )
+    wrong_edge_m: float = param(
+        0.05,
+        "m",
+        "Standard deviation of a front's edge that was found in a wrong place",
+        source="rails, strips: 3-10 cm",
+    )
+    hinged_edge: float = param(0.98, "share", "Probability of an edge at which the front was filmed to turn", ge=0, le=1)
     mesh_edge_m: float = param(0.012, "m", "Standard deviation of a front's edges, measured on the mesh alone")
     plane_m: float = param(0.003, "m", "Standard deviation of a front's plane")
     unseen_m: float = param(0.15, "m", "Standard deviation of an unobserved back")
@@ -157,7 +165,21 @@ def _measured_sigmas(item: MeasuredObject) -> np.ndarray:
         return np.full(6, params.thing_m)
     edge = params.measured_edge_m if item.front_measured else params.mesh_edge_m
     back = params.unseen_m if _unseen_back(item) else edge
-    return np.array([edge, edge, params.plane_m, back, edge, edge])
+    left, right, top, bottom = _edge_sigmas(item) if item.edges else np.full(4, edge)
+    return np.array([left, right, params.plane_m, back, bottom, top])
+
+
+def _edge_sigmas(item: MeasuredObject) -> np.ndarray:
+    """Standard deviations (4,) of a front's left, right, top and bottom edge: each is right or in a wrong place."""
+    params, hinged = tuned(Params), side_filmed(item)
+    turns = any(motion.kind == "revolute" for motion in item.motions)
+    right = np.array(
+        [
+            max(p, params.hinged_edge) if turns and side == hinged else p
+            for side, p in zip(("left", "right", "top", "bottom"), item.edges, strict=True)
+        ]
+    )
+    return np.asarray(np.sqrt(right * params.measured_edge_m**2 + (1 - right) * params.wrong_edge_m**2))
 
 
 def _size_bounds(index: int, item: MeasuredObject, unknowns: int) -> list[tuple[np.ndarray, float]]:
@@ -186,9 +208,13 @@ def _trim(item: MeasuredObject, axis: int) -> float:
     params = tuned(Params)
     if item.spec.opens == "rigid" or item.fixed_by_person:
         return 0.0
-    return min(
+    usual = min(
         params.appliance_trim_m if item.spec.stands else params.trim_m, params.trim_share * float(item.dimensions_m[axis])
     )
+    if not item.edges or axis == 1:
+        return usual
+    variances = _measured_sigmas(item)[2 * axis : 2 * axis + 2] ** 2
+    return usual + float(np.sqrt(max(variances.sum() - 2 * params.measured_edge_m**2, 0.0)))
 
 
 def _shrink(item: MeasuredObject, axis: int) -> float:

@@ -10,6 +10,7 @@ from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.solve import Face, Tie, solved
+from tests.core.motions import motion
 
 GAP_M = 0.002
 ATOL = 1e-5  # tolerance of a bound
@@ -122,3 +123,22 @@ def test_the_solution_does_not_depend_on_object_order() -> None:
     there = solved(items[::-1], [], [(2, 1), (1, 0)], GAP_M)[::-1]
     for one, other in zip(here, there, strict=True):
         np.testing.assert_allclose(other.world_from_object.translation, one.world_from_object.translation, atol=1e-4)
+
+
+def test_an_overlap_is_resolved_where_an_edge_is_unsure() -> None:
+    """The lower unit was measured 33 mm too high: its top edge was not seen, those of the upper unit were."""
+    lower = replace(item("lower", (0, 0, 0.5)), edges=(0.98, 0.98, 0.1, 0.98))
+    upper = replace(item("upper", (0, 0, 1.22 - 0.033)), edges=(0.98, 0.98, 0.98, 0.98))
+    first, second = solved([lower, upper], [], [(0, 1)], GAP_M)
+    assert low(second, 2) == pytest.approx(low(upper, 2), abs=0.002)
+    assert high(first, 2) == pytest.approx(low(second, 2) - GAP_M, abs=2e-4)
+    assert low(first, 2) == pytest.approx(low(lower, 2), abs=0.002)
+
+
+def test_an_edge_at_which_a_front_was_filmed_to_turn_is_sure() -> None:
+    """Both edges were found alike; the flap's hinge is filmed at its own."""
+    turned = motion({0: 1.0}, "bottom", world_from_front=Rigid3(translation=np.array([0.0, -0.29, 1.22 - 0.033])))
+    lower = replace(item("lower", (0, 0, 0.5)), edges=(0.98, 0.98, 0.4, 0.98))
+    upper = replace(item("upper", (0, 0, 1.22 - 0.033)), edges=(0.98, 0.98, 0.98, 0.4), motions=(turned,))
+    first, second = solved([lower, upper], [], [(0, 1)], GAP_M)
+    assert abs(low(second, 2) - low(upper, 2)) < 0.1 * abs(high(first, 2) - high(lower, 2))
