@@ -16,7 +16,7 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.export.plan import WORLD, Body, Plan, facing, plan_bundle
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.raster import subdivide_long_edges
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, joint_transform
 from r2c2r_core.model.mesh import TexturedMesh
 from r2c2r_core.model.scene import ArticulatedScene, Link
 
@@ -179,8 +179,8 @@ class Assembly:
     def _motion(self, body: Body) -> Rigid3:
         if body.joint is None or body.axis_body is None:
             return Rigid3()
-        along = self.joints[body.joint_name].value * body.axis_body
-        return Rigid3(np.eye(3), along) if body.joint.type == "prismatic" else Rigid3(vtf.SO3.exp(along).as_matrix())
+        value = self.joints[body.joint_name].value
+        return joint_transform(body.axis_body, np.zeros(3), value, turns=body.joint.type == "revolute")
 
 
 def assemble(

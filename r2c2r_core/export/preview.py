@@ -1,6 +1,7 @@
 """preview.png: the scene closed and open, drawn on the CPU with a sun, its shadow and a floor."""
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ from r2c2r_core.export.writers.meshes import box_mesh, png_bytes
 from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, pixel_rays
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.texels import texture_colours
-from r2c2r_core.geometry.transforms import Rigid3, rotation_between
+from r2c2r_core.geometry.transforms import Rigid3, joint_transform, rotation_between
 from r2c2r_core.threads import in_threads
 
 OPEN_FRACTION = 0.75
@@ -135,6 +136,12 @@ def draw(soup: Soup, floor_z_m: float, camera: Intrinsics, camera_from_world: Ri
     return np.asarray(cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
+def alone(soup: Soup, bodies: Collection[int]) -> Soup:
+    """The triangles of these bodies (numbers from 1) only."""
+    own = np.isin(np.rint(soup.ids), [*bodies])
+    return replace(soup, corners=soup.corners[own], uv=soup.uv[own], normals=soup.normals[own], ids=soup.ids[own])
+
+
 def soup_faces(soup: Soup) -> np.ndarray:
     """Triangles over the soup's corners."""
     return np.arange(len(soup.corners)).reshape(-1, 3)
@@ -144,11 +151,7 @@ def _motion(body: Body, fraction: float) -> Rigid3:
     joint, axis = body.joint, body.axis_body
     if joint is None or axis is None:
         return Rigid3()
-    position = fraction * joint.upper
-    if joint.type == "prismatic":
-        return Rigid3(np.eye(3), axis * position)
-    rotation, _ = cv2.Rodrigues(axis * position)
-    return Rigid3(np.asarray(rotation, dtype=np.float64), np.zeros(3))
+    return joint_transform(axis, np.zeros(3), fraction * joint.upper, turns=joint.type == "revolute")
 
 
 def _view_from(plan: Plan, seen_from: Vector3 | None) -> Vector3:

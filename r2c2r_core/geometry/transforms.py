@@ -133,6 +133,16 @@ def rotation_between(source: Vector3, target: Vector3) -> Matrix3:
     return np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross  # Rodrigues
 
 
+def joint_transform(axis: Vector3, pivot: Vector3, state: float, *, turns: bool) -> Rigid3:
+    """Motion of a body from its joint's zero to a state: about the line through `pivot` along unit `axis`, or along it."""
+    if not turns:
+        return Rigid3(np.eye(3), axis * state)
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    rotation = np.eye(3) + np.sin(state) * cross + (1.0 - np.cos(state)) * cross @ cross  # Rodrigues
+    return Rigid3(rotation, pivot - rotation @ pivot)
+
+
 def front_rotation(outward: Vector3) -> Matrix3:
     """Rotation world_from_front (or world_from_object) of a vertical front that faces `outward`.
 

@@ -19,6 +19,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.transforms import Rigid3, joint_transform
 
 Source = Literal["measured", "at_least", "inferred", "default", "person"]
 """Source of a number. `at_least` is used for limits only: the largest observed opening, without a stop."""
@@ -76,6 +77,17 @@ class JointMotion:
     stop_seen: bool  # whether it rested at the end of its motion, so that `largest` is its limit
     source: Source  # of axis and pivot: measured, inferred or person
     inside: Inside | None = None
+
+    def state_in(self, frame_index: int) -> float:
+        """State in a frame; 0 where it is unknown."""
+        state = self.states.get(frame_index)
+        return 0.0 if state is None or state.value is None else state.value
+
+    def opening(self, state: float) -> Rigid3:
+        """World motion of the front from closed to a state."""
+        if self.axis_world is None or self.pivot_world is None:
+            return Rigid3()
+        return joint_transform(self.axis_world, self.pivot_world, state, turns=self.kind == "revolute")
 
     def movement(self, front_normal: Vector3) -> Movement:
         """How the front, whose plane has that normal (world, unit), moves."""

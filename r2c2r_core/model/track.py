@@ -6,6 +6,8 @@ from typing import Literal
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.carrier import Carrier
 from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.rectangle import Rectangle3
 
@@ -53,6 +55,7 @@ class ThingBox:
     dimensions_m: Vector3  # width, depth, height
     support_z_m: float  # world height of its support
     depth_seen: bool = False  # whether an appliance's depth was observed, not assumed
+    carrier: Carrier | None = None  # the drawer that it lies in; it is measured where that drawer is closed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,7 +76,15 @@ class MaskTrack:
 
     @property
     def opened_frames(self) -> frozenset[int]:
-        """Frames in which its front is not closed."""
+        """Frames in which its front, or the drawer that carries it, is not closed."""
+        carrier = None if self.box is None else self.box.carrier
+        moved = self.motions if carrier is None else (carrier.motion,)
         return frozenset(
-            frame for motion in self.motions for frame, state in motion.states.items() if state.value is None or state.value > 0
+            frame for motion in moved for frame, state in motion.states.items() if state.value is None or state.value > 0
         )
+
+
+def at_rest(capture: Capture, track: MaskTrack) -> Capture:
+    """Capture in which an object stands still: of one in a drawer, the frames that show it, seen from that drawer."""
+    carrier = None if track.box is None else track.box.carrier
+    return capture if carrier is None else carrier.capture(capture, track.masks)

@@ -8,8 +8,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from r2c2r_core.arrays import Matrix3, Vector3
-from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.segment.motion.hypotheses import Hypothesis, moved
+from r2c2r_core.geometry.transforms import Rigid3, joint_transform
+from r2c2r_core.segment.motion.hypotheses import Hypothesis
 from r2c2r_core.segment.motion.pose import PlaneFix
 from r2c2r_core.tuning import param, tuned
 
@@ -45,7 +45,7 @@ class FittedJoint:
 
     def pose(self, state: float) -> Rigid3:
         """Pose of the leaf in a state: front_from_leaf, the identity where closed."""
-        return moved(self.axis, self.pivot, self.turns, state)
+        return joint_transform(self.axis, self.pivot, state, turns=self.turns)
 
     def covariance_in(self, rotation: Matrix3) -> np.ndarray:
         """Covariance (6, 6) of a small rotation of the axis (rad) and of the pivot (m), in the frame `rotation` maps into."""

@@ -9,7 +9,8 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.category import Category, Opening
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.motion import DOOR, DRAWER, JointMotion
-from r2c2r_core.segment.motion.hypotheses import Way, moved
+from r2c2r_core.segment.motion.hypotheses import Way
+from r2c2r_core.segment.motion.inside import Params as InsideParams
 from r2c2r_core.segment.motion.inside import front_thickness, measure_inside
 from r2c2r_core.segment.motion.leaf import Leaf, OpenLeaf
 from r2c2r_core.segment.motion.leaf import Params as LeafParams
@@ -28,9 +29,7 @@ class Params:
         "Log prior odds of the category's own way of opening",
         source="few frames overrule it: each carries up to 80",
     )
-    ajar_rad: float = param(float(np.deg2rad(25.0)), "rad", "Minimum opening angle of a door to see behind it")
     beyond_m: float = param(0.05, "m", "Maximum excess of a unit's depth over the expected one: usual depths differ by as much")
-    ajar_m: float = param(0.08, "m", "Minimum opening of a sliding leaf to see behind it")
 
 
 _USUAL: Mapping[Opening, tuple[Way, ...]] = {
@@ -63,12 +62,12 @@ class FilmedLeaves:
         return tuple(
             _opened(leaf, motion, state)
             for leaf, motion in self._all()
-            if motion is not None and (state := _state(motion, frame_index))
+            if motion is not None and (state := motion.state_in(frame_index))
         )
 
     def closed_in(self, frame_index: int) -> tuple[Leaf, ...]:
         """Leaves that are closed in a frame."""
-        return tuple(leaf for leaf, motion in self._all() if motion is None or not _state(motion, frame_index))
+        return tuple(leaf for leaf, motion in self._all() if motion is None or not motion.state_in(frame_index))
 
     def _all(self) -> tuple[tuple[Leaf, JointMotion | None], ...]:
         if self._filmed is None:
@@ -125,11 +124,6 @@ def _is_known(leaf: Leaf, edge_m: float) -> bool:
     return bool(np.isclose(edge_m, leaf.thickness_m)) or (is_sure and edge_m < leaf.thickness_m + 3 * sigma_m)
 
 
-def _state(motion: JointMotion, frame_index: int) -> float:
-    state = motion.states.get(frame_index)
-    return 0.0 if state is None or state.value is None else state.value
-
-
 def _with_inside(leaf: Leaf, motion: JointMotion, scene: Scene, depth_m: float) -> JointMotion:
     """Motion with the inside measured behind the leaf, from frames where it is open far enough to see behind it."""
     params, places = tuned(Params), _places(leaf, motion)
@@ -146,23 +140,20 @@ def _with_inside(leaf: Leaf, motion: JointMotion, scene: Scene, depth_m: float) 
 
 def _places(leaf: Leaf, motion: JointMotion) -> Callable[[Frame], Rigid3 | None]:
     """Pose function (world_from_leaf) for frames in which a leaf is open far enough to see behind it; None in others."""
-    params = tuned(Params)
+    params = tuned(InsideParams)
     ajar = params.ajar_rad if motion.kind == "revolute" else params.ajar_m
 
     def place(frame: Frame) -> Rigid3 | None:
-        state = _state(motion, frame.index)
+        state = motion.state_in(frame.index)
         return _opened(leaf, motion, state).leaf.world_from_front if state >= ajar else None
 
     return place
 
 
 def _opened(leaf: Leaf, motion: JointMotion, state: float) -> OpenLeaf:
-    assert motion.axis_world is not None  # a fixed leaf is never open
-    assert motion.pivot_world is not None
-    opening = moved(motion.axis_world, motion.pivot_world, motion.kind == "revolute", state)
     depth_m = None if motion.inside is None else motion.inside.depth_m
     rear_m = None if depth_m is None else depth_m + leaf.thickness_m
-    moved_leaf = replace(leaf, world_from_front=opening @ leaf.world_from_front)
+    moved_leaf = replace(leaf, world_from_front=motion.opening(state) @ leaf.world_from_front)
     return OpenLeaf(leaf=moved_leaf, movement=motion.movement(leaf.outward), out_m=state, rear_m=rear_m)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from r2c2r_core.arrays import Vector3
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, joint_transform
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.rectangle import HINGE_AXES, TOWARDS
 from r2c2r_core.segment.motion.leaf import Leaf
@@ -57,7 +57,7 @@ class Hypothesis:
 
     def pose(self, state: float) -> Rigid3:
         """Pose of the leaf in a state: front_from_leaf, the identity where closed."""
-        return moved(self.axis, self.pivot, self.turns, state)
+        return joint_transform(self.axis, self.pivot, state, turns=self.turns)
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Poses in all of `states`: rotations (q, 3, 3) and translations (q, 3)."""
@@ -65,14 +65,6 @@ class Hypothesis:
             return np.tile(np.eye(3), (len(self.states), 1, 1)), self.states[:, None] * self.axis
         rotations = Rotation.from_rotvec(self.states[:, None] * self.axis).as_matrix()
         return rotations, self.pivot - rotations @ self.pivot
-
-
-def moved(axis: Vector3, pivot: Vector3, turns: bool, state: float) -> Rigid3:
-    """Rigid motion of a joint at a state."""
-    if not turns:
-        return Rigid3(np.eye(3), axis * state)
-    rotation = Rotation.from_rotvec(axis * state).as_matrix()
-    return Rigid3(rotation, pivot - rotation @ pivot)
 
 
 def hypotheses(leaf: Leaf, floor_m: float | None = None) -> tuple[Hypothesis, ...]:
