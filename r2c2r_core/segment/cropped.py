@@ -16,7 +16,7 @@ from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.found import Found, View
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.things.found import FoundStanding, FoundThing
+from r2c2r_core.segment.things.found import FoundCarried, FoundStanding, FoundThing
 from r2c2r_core.segment.things.thing import Thing
 from r2c2r_core.tuning import param, tuned
 
@@ -65,6 +65,8 @@ def world_crop(crop: CropBox, world_from_capture: Rigid3) -> Crop:
 
 def cropped(found: Found, crop: Crop, scene: Scene, name: str) -> Found:
     """Part of an object that lies in the box; raises ObjectNotSeen where hardly any does."""
+    if isinstance(found, FoundCarried):  # the box is where it is with its drawer closed, like the thing
+        return replace(found, thing=cropped(found.thing, crop, found.scene, name))
     assert isinstance(found, FoundThing | FoundStanding), found  # check_prompt refuses others
     thing = found.thing if isinstance(found, FoundThing) else found.standing.thing
     within, least = crop.holds(thing.points), tuned(Params).least_points

@@ -60,7 +60,7 @@ def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int, ca
     click, the click is on a closed leaf that was opened itself, or nothing moved.
     """
     params, scene = tuned(Params), prepared.scene
-    if not _moved(point, scene):
+    if not was_moved(point, scene):
         return point
     frame = scene.frame(frame_index)
     leaves = [leaf for leaf in _leaves_near(prepared, point, category) if _has_unit(leaf, scene, category)]
@@ -83,7 +83,7 @@ def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int, ca
     return place
 
 
-def _moved(point: Vector3, scene: Scene) -> bool:
+def was_moved(point: Vector3, scene: Scene) -> bool:
     """Whether enough of the frames observing a point look past it."""
     params = tuned(Params)
     past = there = 0

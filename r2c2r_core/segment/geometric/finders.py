@@ -13,15 +13,17 @@ from r2c2r_core.segment.appliances.fit import FittedBox, fit_box
 from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.clicked_dark import dark_beyond, dark_place
-from r2c2r_core.segment.fronts.clicked_open import closed_place
+from r2c2r_core.segment.fronts.clicked_open import closed_place, was_moved
+from r2c2r_core.segment.fronts.drawer_at import drawer_at
 from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, find_front, seen_sides
 from r2c2r_core.segment.fronts.sliding import sliding_chance
+from r2c2r_core.segment.motion.carried import drawer_boards, drawer_floor, seen_from_drawer
 from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
 from r2c2r_core.segment.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.things.found import FoundStanding, FoundThing
+from r2c2r_core.segment.things.found import FoundCarried, FoundStanding, FoundThing
 from r2c2r_core.segment.things.revolution import Sight, find_round
 from r2c2r_core.segment.things.standing import find_standing
 from r2c2r_core.segment.things.standing_mask import standing_colours
@@ -55,7 +57,7 @@ def find_object(
         appliance = _appliance(prepared, prompt, category, negatives.points, others)
         if appliance is not None:
             return appliance
-    thing = _thing(prepared, prompt, category, positives, negatives.points) if positives.clicks else None
+    thing = _loose(prepared, prompt, category, positives, negatives.points) if positives.clicks else None
     if thing is not None:
         warnings = (
             ()
@@ -101,9 +103,10 @@ def glimpse_object(
     config = sized_as(category)
     if category.kind != "thing" or config.radius_m >= tuned(Params).small_m or not positives.clicks:
         return None
-    small = glimpse_small(
-        prepared.scene, positives.points, negatives.points, config, _structure_off(prepared, positives.points[0])
-    )
+    if was_moved(positives.points[0], prepared.scene):  # in a drawer, perhaps, which takes as long to find as the thing
+        return None
+    structure = _structure_off(prepared.planes, positives.points[0])
+    small = glimpse_small(prepared.scene, positives.points, negatives.points, config, structure)
     return FoundThing(small, prepared.scene, small=True, round=config.round) if small is not None else None
 
 
@@ -161,31 +164,67 @@ def _found_appliance(fitted: FittedBox, scene: Scene, prompt: ObjectPrompt, cate
     return FoundAppliance(fitted.front, scene, category, fitted.depth_seen, warnings=fitted.warnings(prompt.category))
 
 
-def _thing(
+def _loose(
     prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, hits: Hits, negatives: Points
+) -> FoundThing | FoundStanding | FoundCarried | None:
+    """Free-standing object; one in a drawer that stands open at the first click is found in the scene seen from that drawer."""
+    drawer = drawer_at(prepared, hits.points[0], hits.clicks[0].frame) if category.kind == "thing" else None
+    if drawer is None:
+        config = sized_as(category)
+        config = config if category.kind == "thing" else replace(config, on_floor=False)
+        return _thing(prepared.scene, _structure_off(prepared.planes, hits.points[0]), prompt, config, hits, negatives)
+    scene = seen_from_drawer(drawer, prepared.scene)
+    clicks = tuple(click for click in prompt.points if click.frame in scene.rendered_mm)
+    on, off = (_picked(scene, [click for click in clicks if click.label == label]) for label in (1, 0))
+    if not on.clicks:
+        return None
+    config = replace(sized_as(category), on_floor=False, support_z_m=drawer_floor(drawer.front, scene))
+    boards = drawer_boards(drawer, prepared.scene)
+    thing = _small_thing(scene, boards, replace(prompt, points=clicks), config, on, off.points)
+    return FoundCarried(thing, scene, drawer) if thing is not None else None
+
+
+def _picked(scene: Scene, clicks: list[PromptPoint]) -> Hits:
+    """The clicks that hit a surface, and where."""
+    hits = [(click, point) for click in clicks if (point := scene.pick(click.frame, click.x, click.y)) is not None]
+    return Hits(tuple(click for click, _ in hits), np.array([point for _, point in hits]).reshape(-1, 3))
+
+
+def _thing(
+    scene: Scene, structure: tuple[PlaneRegion, ...], prompt: ObjectPrompt, config: ThingConfig, hits: Hits, negatives: Points
 ) -> FoundThing | FoundStanding | None:
-    config = sized_as(category)
-    positives = _on_thing(prepared, hits, config)
-    if config.on_floor and category.kind == "thing":
-        standing = find_standing(prepared.scene, positives, negatives, config, _structure_off(prepared, positives[0]))
+    """Object under the clicks; `structure` are flat parts that it may touch but does not contain."""
+    positives = _on_thing(scene, hits, config)
+    if config.on_floor:
+        standing = find_standing(scene, positives, negatives, config, structure)
         if standing is not None:
-            colours = standing_colours(standing, prepared.scene, prepared.scene.frames)
-            coloured = replace(standing, thing=replace(standing.thing, colours=colours))
-            return FoundStanding(coloured, prepared.scene)
+            colours = standing_colours(standing, scene, scene.frames)
+            return FoundStanding(replace(standing, thing=replace(standing.thing, colours=colours)), scene)
+    thing = _small_thing(scene, structure, prompt, config, hits, negatives)
+    if thing is not None:
+        return thing
+    cut_out = find_thing(scene, positives, negatives, config)
+    return FoundThing(cut_out, scene) if cut_out is not None else None
+
+
+def _small_thing(
+    scene: Scene, structure: tuple[PlaneRegion, ...], prompt: ObjectPrompt, config: ThingConfig, hits: Hits, negatives: Points
+) -> FoundThing | None:
+    """Body of revolution, or object small enough for silhouettes; None where neither is found."""
+    positives = _on_thing(scene, hits, config)
     if config.round:
-        on, off = ([Sight(*prepared.scene.ray(c.frame, c.x, c.y)) for c in prompt.points if c.label == sign] for sign in (1, 0))
-        body = find_round(prepared.scene, on, off, positives[0], config, _structure_off(prepared, positives[0]))
+        on, off = ([Sight(*scene.ray(c.frame, c.x, c.y)) for c in prompt.points if c.label == sign] for sign in (1, 0))
+        body = find_round(scene, on, off, positives[0], config, structure)
         if body is not None:
-            return FoundThing(replace(body, clicks=prompt.points), prepared.scene, small=True, round=True)
-    if config.radius_m < tuned(Params).small_m:
-        small = find_small(prepared.scene, positives, negatives, config, _structure_off(prepared, positives[0]))
+            return FoundThing(replace(body, clicks=prompt.points), scene, small=True, round=True)
+    if config.support_z_m is not None or config.radius_m < tuned(Params).small_m:  # drawers hold nothing larger
+        small = find_small(scene, positives, negatives, config, structure)
         if small is not None:
-            return FoundThing(replace(small, clicks=prompt.points), prepared.scene, small=True, round=config.round)
-    thing = find_thing(prepared.scene, positives, negatives, config)
-    return FoundThing(thing, prepared.scene) if thing is not None else None
+            return FoundThing(replace(small, clicks=prompt.points), scene, small=True, round=config.round)
+    return None
 
 
-def _on_thing(prepared: PreparedCapture, hits: Hits, config: ThingConfig) -> Points:
+def _on_thing(scene: Scene, hits: Hits, config: ThingConfig) -> Points:
     """Points of the clicks; those that hit the background are moved forward to the object; farther ones are left out."""
     first = hits.points[0]
     points = [first]
@@ -193,15 +232,15 @@ def _on_thing(prepared: PreparedCapture, hits: Hits, config: ThingConfig) -> Poi
     for click, seen in zip(hits.clicks[1:], hits.points[1:], strict=True):
         point = seen
         if np.linalg.norm((point - first)[:2]) > across:
-            origin, ray = prepared.scene.ray(click.frame, click.x, click.y)
+            origin, ray = scene.ray(click.frame, click.x, click.y)
             point = origin + ray * float((first - origin)[:2] @ ray[:2]) / max(float(ray[:2] @ ray[:2]), 1e-6)
         if np.linalg.norm((point - first)[:2]) <= across:
             points.append(point)
     return np.array(points)
 
 
-def _structure_off(prepared: PreparedCapture, point: Vector3) -> tuple[PlaneRegion, ...]:
+def _structure_off(planes: tuple[PlaneRegion, ...], point: Vector3) -> tuple[PlaneRegion, ...]:
     """Walls and runs that an object may touch, except the plane that it lies on itself."""
-    structure = tuple(plane for plane in prepared.planes if plane.area_m2 > 0.4)
+    structure = tuple(plane for plane in planes if plane.area_m2 > 0.4)
     own = region_at(structure, point, 0.02)
     return tuple(plane for plane in structure if plane is not own)

@@ -20,6 +20,8 @@ from r2c2r_core.tuning import param, tuned
 class Params:
     """Tuned parameters of the boards of a compartment."""
 
+    ajar_rad: float = param(float(np.deg2rad(25.0)), "rad", "Minimum opening angle of a door to see behind it")
+    ajar_m: float = param(0.08, "m", "Minimum opening of a drawer or a sliding leaf to see behind it")
     deepest_m: float = param(0.75, "m", "Maximum depth of a compartment behind its front", source="worktops are 600-700 mm")
     shallowest_m: float = param(0.12, "m", "Minimum distance of a rear board behind the front")
     rim_m: float = param(0.03, "m", "Margin inside the front's outline: boards are 16-20 mm, with depth errors at their edges")
@@ -85,29 +87,48 @@ def measure_inside(
     with its front, a carcass does not. `drawn_out_m` is the maximum opening of a drawer: its rear board stays in the unit.
     The unit ends `deepest_m` behind the front.
     """
-    params, half = tuned(Params), np.array(leaf.half_m)
-    cloud = _behind(leaf, place, scene, min(deepest_m, params.deepest_m))
-    within = (np.abs(cloud.points[:, 0]) < half[0] - params.rim_m) & (np.abs(cloud.points[:, 2]) < half[1] - params.rim_m)
-    rear = _rear(cloud.where(within), leaf, drawn_out_m)
-    front = leaf.thickness_m
-    depth_m = None if rear is None else rear - front
-    before = cloud.where((cloud.points[:, 1] > front + params.rim_m) & (cloud.points[:, 1] < (rear or np.inf) - params.rim_m))
+    params = tuned(Params)
+    before, left, right, rear = _between_walls(leaf, place, scene, drawn_out_m, deepest_m)
+    depth_m = None if rear is None else rear - leaf.thickness_m
     if drawn_out_m > 0:
         return None if depth_m is None else Inside(depth_m=depth_m)
-    sides = _ends([at for at, _ in _faces(before, 0, across=1, least_span_m=params.rim_m)], leaf.half_m[0])
     levels = _faces(before, 2, across=0, least_span_m=params.spans * leaf.width_m)
     most = max((count for _, count in levels), default=0)
     level = sorted(at for at, count in levels if count > params.shows * most)
     bottom, top = _ends(level, leaf.half_m[1])
     found = Inside(
         depth_m=depth_m,
-        width_m=_between(*sides),
+        width_m=_between(left, right),
         height_m=_between(bottom, top),
         shelves_m=()
         if bottom is None
         else tuple(at - bottom for at in level if bottom + params.apart_m < at < (top or np.inf)),
     )
     return None if found == Inside() else found
+
+
+def drawer_walls(
+    leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene, drawn_out_m: float
+) -> tuple[float | None, float | None, float | None]:
+    """Inner faces of a drawer's left and right side (x) and rear board (y) in the front frame; None where not observed.
+
+    `place` and `drawn_out_m` as for `measure_inside`.
+    """
+    return _between_walls(leaf, place, scene, drawn_out_m, np.inf)[1:]
+
+
+def _between_walls(
+    leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene, drawn_out_m: float, deepest_m: float
+) -> tuple[_Cloud, float | None, float | None, float | None]:
+    """Points between a compartment's front and rear board; the inner faces of its left and right side, and of that board."""
+    params, half = tuned(Params), np.array(leaf.half_m)
+    cloud = _behind(leaf, place, scene, min(deepest_m, params.deepest_m))
+    within = (np.abs(cloud.points[:, 0]) < half[0] - params.rim_m) & (np.abs(cloud.points[:, 2]) < half[1] - params.rim_m)
+    rear = _rear(cloud.where(within), leaf, drawn_out_m)
+    y = cloud.points[:, 1]
+    between = cloud.where((y > leaf.thickness_m + params.rim_m) & (y < (rear or np.inf) - params.rim_m))
+    left, right = _ends([at for at, _ in _faces(between, 0, across=1, least_span_m=params.rim_m)], leaf.half_m[0])
+    return between, left, right, rear
 
 
 def front_thickness(leaf: Leaf, place: Callable[[Frame], Rigid3 | None], scene: Scene) -> float | None:

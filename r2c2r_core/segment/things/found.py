@@ -1,15 +1,18 @@
 """A clicked free-standing object: its box, and its mask in any frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from r2c2r_core.arrays import Mask
 from r2c2r_core.kitchen.category import Kind
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.carrier import Carrier
 from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.expected_iou import expected_iou
-from r2c2r_core.segment.found import View
+from r2c2r_core.segment.found import Found, View
+from r2c2r_core.segment.occlusion import fill_polygon, project_polygon
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.boxes import box_of
 from r2c2r_core.segment.things.silhouettes import small_mask
@@ -28,8 +31,22 @@ class Params:
     )
 
 
+class _Loose:
+    """Measurements that no free-standing object has: it has no front, and moves as a whole."""
+
+    __slots__ = ()
+
+    def panel(self) -> FrontPanel | None:
+        """None: free-standing objects have no front panel."""
+        return None
+
+    def motions(self) -> tuple[JointMotion, ...]:
+        """No motions: free-standing objects move as a whole."""
+        return ()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class FoundThing:
+class FoundThing(_Loose):
     """A segmented free-standing object."""
 
     thing: Thing
@@ -46,14 +63,6 @@ class FoundThing:
         sample = self.thing.vertices[:: max(1, len(self.thing.vertices) // 50)]
         return View(mask, expected_iou(mask, share, frame, sample, border_m))
 
-    def panel(self) -> FrontPanel | None:
-        """None: free-standing objects have no front panel."""
-        return None
-
-    def motions(self) -> tuple[JointMotion, ...]:
-        """No motions: free-standing objects move as a whole."""
-        return ()
-
     def box(self) -> ThingBox | None:
         """Box of the object on its support."""
         centres = np.stack([frame.world_from_camera.translation for frame in self.scene.frames])
@@ -64,7 +73,40 @@ class FoundThing:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FoundStanding:
+class FoundCarried(_Loose):
+    """A thing in a drawer, segmented in the scene as seen from that drawer (motion/carried.py)."""
+
+    thing: Found
+    scene: Scene  # as seen from the drawer
+    carrier: Carrier
+    kind: Kind = "thing"
+    warnings: tuple[str, ...] = ()
+
+    def see(self, frame: Frame) -> View:
+        """Visible pixels in a frame that shows the drawer open; none in others."""
+        carried = self.carrier.frame(frame) if frame.index in self.scene.rendered_mm else None
+        if carried is None:
+            return View(np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool), 0.0)
+        seen = self.thing.see(carried)
+        return replace(seen, mask=seen.mask & ~self._behind_front(carried))
+
+    def _behind_front(self, carried: Frame) -> Mask:
+        """Pixels of the drawer's front, which hides what lies close behind it: depth cannot tell the two apart."""
+        camera, front = carried.rgb_camera, self.carrier.front
+        outline = project_polygon(front.corners, carried, camera)
+        is_outside = (carried.world_from_camera.translation - front.centre) @ front.outward > 0
+        if outline is None or not is_outside:
+            return np.zeros((camera.height, camera.width), bool)
+        return fill_polygon(outline, (0, 0, camera.width, camera.height))
+
+    def box(self) -> ThingBox | None:
+        """Box of the thing with its drawer closed."""
+        box = self.thing.box()
+        return None if box is None else replace(box, carrier=self.carrier)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundStanding(_Loose):
     """A segmented floor-standing object, such as a chair or a table."""
 
     standing: Standing
@@ -77,14 +119,6 @@ class FoundStanding:
         mask, share = standing_mask(self.standing, self.scene, frame)
         sample = self.standing.thing.vertices[:: max(1, len(self.standing.thing.vertices) // 50)]
         return View(mask, expected_iou(mask, share, frame, sample, tuned(Params).border_m))
-
-    def panel(self) -> FrontPanel | None:
-        """None: free-standing objects have no front panel."""
-        return None
-
-    def motions(self) -> tuple[JointMotion, ...]:
-        """No motions: free-standing objects move as a whole."""
-        return ()
 
     def box(self) -> ThingBox | None:
         """Box of the object on the floor."""

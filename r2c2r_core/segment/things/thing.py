@@ -81,6 +81,7 @@ class ThingConfig:
     on_floor: bool = False
     flat_top: bool = False
     tallest_m: float = 1.1
+    support_z_m: float | None = None  # height of its support (world), where that is known
 
 
 def sized_as(category: Category) -> ThingConfig:
@@ -196,6 +197,8 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
     level one below.
     """
     params = tuned(Params)
+    if config.support_z_m is not None:
+        return config.support_z_m
     if config.on_floor:
         return 0.0 if scene.capture.room.floor_found else None
     lowest = positives[np.argmin(positives[:, 2])]

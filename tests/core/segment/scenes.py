@@ -24,6 +24,8 @@ DRAWERS = {
     "drawer_mid": (1.409, 0.45, 0.36, 0.297),
     "drawer_low": (1.409, 0.45, 0.12, 0.237),
 }
+PARCEL_M = ((1.50, 0.04, 0.39), (1.66, 0.18, 0.63))
+"""Corners of a parcel in the middle drawer, closed: y from the drawer's front."""
 Corners = tuple[tuple[float, float, float], tuple[float, float, float]]
 Named = tuple[tuple[float, ...], tuple[float, ...], tuple[int, int, int], str | None]
 TABLE: Corners = ((-0.6, -0.35, 0.0), (0.6, 0.35, 0.73))
@@ -58,13 +60,14 @@ class Shapes:
 
 @cache
 def kitchen(
-    drawn_out_m: float = 0.0, from_step: int = 0, swung_rad: float = 0.0
+    drawn_out_m: float = 0.0, from_step: int = 0, swung_rad: float = 0.0, raised_m: float = 0.0
 ) -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
     """The capture, and the true mask of each named object in each frame; from a step on, the middle drawer is pulled out.
 
-    Or door_c is swung open on its left edge; the carcass then begins further back.
+    A parcel lies in that drawer, which cameras see into that are raised. Or door_c is swung open on its left edge; the carcass
+    then begins further back.
     """
-    poses = [look_at(np.array([x, y, z]), np.array(target)) for x, y, z, target in _path()]
+    poses = [look_at(np.array([x, y, z + raised_m]), np.array(target)) for x, y, z, target in _path()]
     before, after = (_shapes(*state, bool(swung_rad)) for state in ((0.0, 0.0), (drawn_out_m, swung_rad)))
     wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)
     return _filmed("boxes", poses, [after if step >= from_step else before for step in range(len(poses))], (wall,))
@@ -232,7 +235,7 @@ def _shapes(drawn_out_m: float, swung_rad: float, hollow: bool) -> tuple[Shapes,
         ((-0.02, FRONT_Y - 0.02, 0.865), (1.88, 0.0, 0.90), (70, 74, 80), None),  # worktop
         ((POST[0], FRONT_Y - 0.25, 0.0), (POST[1], FRONT_Y - 0.20, 0.70), (40, 120, 60), None),
     ]
-    names = list(DOORS) + list(DRAWERS) + ["carton"]
+    names = list(DOORS) + list(DRAWERS) + ["carton", "parcel"]
     for name, (x, width) in DOORS.items():
         boxes.append(((x, FRONT_Y, BOTTOM_M), (x + width, FRONT_Y + 0.018, TOP_M), (176, 60, 52), name))
         at = x + width - 0.05 if name != "door_b" else x + 0.05
@@ -249,6 +252,11 @@ def _shapes(drawn_out_m: float, swung_rad: float, hollow: bool) -> tuple[Shapes,
                 name,
             )
         )
+    x, width, z, _ = DRAWERS["drawer_mid"]
+    front = FRONT_Y - drawn_out_m
+    boxes.append(((x + 0.02, front + 0.018, z + 0.02), (x + width - 0.02, front + 0.24, z + 0.03), (200, 198, 190), None))
+    low, high = PARCEL_M
+    boxes.append(((low[0], front + low[1], low[2]), (high[0], front + high[1], high[2]), (60, 150, 90), "parcel"))
     boxes.append(((1.0, -0.36, 0.90), (1.12, -0.26, 1.10), (60, 90, 170), "carton"))
     return _packed(boxes, names, swung_rad)
 

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -5,10 +6,12 @@ import pytest
 
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
 from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import CropBox
+from r2c2r_core.model.track import at_rest
 from r2c2r_core.segment.protocol import SegmentSession
 from r2c2r_core.segment.stage import open_session
 from tests.core.segment.conftest import Truth
-from tests.core.segment.scenes import DOORS, FRONT_Y, click_on, kitchen, prompt
+from tests.core.segment.scenes import DOORS, FRONT_Y, PARCEL_M, click_on, kitchen, prompt
 
 OUT_M = 0.25
 Filmed = tuple[Capture, Truth, SegmentSession]
@@ -19,6 +22,13 @@ def drawn_out(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
     """The middle drawer is pulled out in the last frames."""
     capture, truth = kitchen(OUT_M, from_step=10)
     return capture, truth, open_session(capture, tmp_path_factory.mktemp("drawn_out"))
+
+
+@pytest.fixture(scope="module")
+def looked_into(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
+    """The middle drawer is pulled out, before cameras that see the parcel in it."""
+    capture, truth = kitchen(OUT_M, from_step=10, raised_m=0.6)
+    return capture, truth, open_session(capture, tmp_path_factory.mktemp("looked_into"))
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +53,47 @@ def test_a_drawer_open_in_the_last_frames_is_tracked_and_measured(drawn_out: Fil
     assert np.mean([overlap[f] for f in shown if f >= 100]) > 0.93
     assert track.front is not None
     assert (track.front.width_m, track.front.height_m) == pytest.approx((0.45, 0.297), abs=0.015)
+
+
+def test_a_thing_in_an_open_drawer_is_measured_where_the_drawer_is_closed(looked_into: Filmed) -> None:
+    capture, truth, session = looked_into
+    (left, near, bottom), (right, far, top) = PARCEL_M
+    middle = ((left + right) / 2, FRONT_Y - OUT_M + (near + far) / 2, top)
+    track = session.track(prompt("parcel", "box", click_on(capture, middle, 110)))
+    assert track.box is not None
+    assert track.box.carrier is not None
+    assert track.box.carrier.motion.largest == pytest.approx(OUT_M, abs=0.006)
+    expected = [(left + right) / 2, FRONT_Y + (near + far) / 2, (bottom + top) / 2]
+    np.testing.assert_allclose(track.box.world_from_object.translation, expected, atol=0.02)
+    assert set(track.masks) <= {frame.index for frame in capture.frames if frame.index >= 100}
+    shown = [f for f, mask in truth["parcel"].items() if mask.sum() > 150]
+    assert np.mean([mask_iou(unpack_mask(track.masks[f]), truth["parcel"][f]) for f in shown]) > 0.7
+    resting = at_rest(capture, track)
+    assert {frame.index for frame in resting.frames} == set(track.masks)
+    for frame in resting.frames:  # the camera is as far from the parcel at rest as it was from the parcel drawn out
+        moved = frame.world_from_camera.translation - capture.frame(frame.index).world_from_camera.translation
+        np.testing.assert_allclose(moved, [0.0, OUT_M, 0.0], atol=0.006)
+
+
+def test_a_crop_box_of_a_thing_in_a_drawer_is_where_the_drawer_is_closed(looked_into: Filmed) -> None:
+    capture, _, session = looked_into
+    (left, near, bottom), (right, far, top) = PARCEL_M
+    click = click_on(capture, ((left + right) / 2, FRONT_Y - OUT_M + (near + far) / 2, top), 110)
+    edges = ((0.55 * (right - left), 0.0, 0.0), (0.0, 0.4, 0.0), (0.0, 0.0, 0.4))
+    crop = CropBox(corner_capture=(left - 0.02, FRONT_Y, bottom - 0.05), edges_capture=edges)
+    whole, half = (session.track(replace(prompt("parcel", "box", click), crop=one)) for one in (None, crop))
+    assert whole.box is not None
+    assert half.box is not None
+    assert half.box.carrier is not None
+    assert half.box.dimensions_m[0] < 0.7 * whole.box.dimensions_m[0]
+    assert all(half.masks[f].area_px < whole.masks[f].area_px for f in half.masks)
+
+
+def test_a_thing_beside_an_open_drawer_is_not_carried(looked_into: Filmed) -> None:
+    capture, _, session = looked_into
+    track = session.track(prompt("carton", "carton", click_on(capture, (1.06, -0.36, 1.0), 110)))
+    assert track.box is not None
+    assert track.box.carrier is None
 
 
 def test_hinge_and_angle_are_found_for_a_door_open_in_most_frames(swung: Filmed) -> None:

@@ -73,7 +73,7 @@ def test_each_point_is_checked_with_the_ray_of_its_own_click(
     rays = []
     monkeypatch.setattr(Scene, "ray", lambda self, frame, x, y: rays.append(frame) or (np.zeros(3), np.array([0.0, 1.0, 0.0])))
     _, hits, _ = session._clicked(prompt("oven_1", "microwave", blind, first, second))
-    _on_thing(session, hits, ThingConfig(radius_m=0.05))
+    _on_thing(session.scene, hits, ThingConfig(radius_m=0.05))
     assert hits.clicks == (first, second)
     assert rays == [70]
 
