@@ -24,7 +24,7 @@ from r2c2r_core.geometry.transforms import Similarity3
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.mesh import CandidateSet, MeshAsset, TexturedMesh
 from r2c2r_core.model.placement import Placement
-from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.model.track import MaskTrack, at_rest
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.schema.settings import setting, tuned_numbers
 from r2c2r_core.tuning import Changes
@@ -61,7 +61,7 @@ class Placer:
 
     def __call__(self, capture: Capture, track: MaskTrack, asset: MeshAsset, *, progress: Progress = SILENT) -> Placement:
         """Placement of a candidate with its evidence; raises PlacementFailed."""
-        config = self.config
+        config, capture = self.config, at_rest(capture, track)
         rng = np.random.default_rng(self.seed)
         progress.at(0.0, f"{asset.object_name}: selecting views")
         observation = observe(capture, track, view_count=config.views, size_px=config.view_px, point_count=config.points)

@@ -45,6 +45,7 @@ class Carving(NamedTuple):
     truncation_m: float
     beyond_m: np.ndarray  # distance outside the carved box
     down_rad: float  # the steepest downward viewing angle
+    in_drawer: bool  # whether only its top may be seen, down to where the drawer's front hides it
 
 
 def carve(evidence: Evidence, variation: Variation) -> Carving:
@@ -59,7 +60,8 @@ def carve(evidence: Evidence, variation: Variation) -> Carving:
     truncation = max(params.truncation_ratio * grid.voxel_m, params.least_truncation_m)
     votes = grid_votes(centres, grid.shape, grid.voxel_m, variation, truncation, seen.world_from_local)
     beyond = np.maximum(low - centres, centres - high).max(axis=1)
-    return Carving(seen, grid, votes, truncation, beyond, _look_down(seen, variation))
+    in_drawer = evidence.track.box is not None and evidence.track.box.carrier is not None
+    return Carving(seen, grid, votes, truncation, beyond, _look_down(seen, variation), in_drawer)
 
 
 def solid_field(carving: Carving, revolution: Revolution | None, *, mirror: bool) -> tuple[np.ndarray, bool]:
@@ -86,6 +88,9 @@ def solid_field(carving: Carving, revolution: Revolution | None, *, mirror: bool
         empty = (free | (votes.distance_m > 0)).reshape(shape)
         field[_shadow(field < 0, roof, empty)] = carving.grid.voxel_m
     hidden = (~seen & ~free & (votes.outside_m > 0)).reshape(shape)
+    if carving.in_drawer:  # what is hidden under its observed top reaches down to the drawer's floor
+        under = np.maximum.accumulate((sure & seen.reshape(shape))[..., ::-1], axis=2)[..., ::-1]
+        field[under & hidden & (bounds.reshape(shape) < 0)] = -carving.grid.voxel_m
     mirrored = mirror and _mirror_unseen(field, (seen | free).reshape(shape), free.reshape(shape), hidden)
     solid = field < 0
     slivers = solid & ~ndimage.binary_opening(solid, iterations=2) & ~sure

@@ -95,8 +95,9 @@ def _prior_box(
         if not (eyes[:, axis] < -half[axis]).any():
             low[axis] = min(low[axis], -half[axis] * variation.depth_scale)
     floor = box.support_z_m - float(world_from_local.translation[2])
-    is_legged = category_of(evidence.track.category).on_legs  # often only the top of a table is observed
-    if low[2] - floor > 0.5 * (high[2] - low[2]) and not is_legged:  # hangs or stands on something else
+    # Often only the top is observed of a table, and of a thing in a drawer.
+    reaches_down = category_of(evidence.track.category).on_legs or box.carrier is not None
+    if low[2] - floor > 0.5 * (high[2] - low[2]) and not reaches_down:  # hangs or stands on something else
         return low, high, None
     low[2] = floor
     return low, high, floor

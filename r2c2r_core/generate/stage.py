@@ -16,7 +16,7 @@ from r2c2r_core.generate.protocol import MeshGenerator
 from r2c2r_core.generate.upload import read_upload
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.mesh import CandidateSet, MeshAsset
-from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.model.track import MaskTrack, at_rest
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.registry import Backend, Registry, Weights
 from r2c2r_core.schema.settings import setting, tuned_numbers
@@ -113,7 +113,7 @@ def generate_candidates(
     given = _read_all(uploads, track.name)
     backend = load_generator(generator, config, progress)
     progress.at(0.0, f"{track.name}: loading frames")
-    evidence = gather_evidence(capture, track, config.pool_frames)
+    evidence = gather_evidence(at_rest(capture, track), track, config.pool_frames)
     kept = [] if earlier is None else [c for c in earlier.candidates if c.generator != "upload"]
     numbers = range(0 if earlier is None else batch * config.count, (batch + 1) * config.count)
     made, failures = _make_all(backend, evidence, [f"c{k}" for k in numbers], seed, progress.part(0.1, 1.0))

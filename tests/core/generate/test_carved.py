@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from r2c2r_core.generate.carved import Carving, solid_field
 from r2c2r_core.generate.consistency import self_consistency
 from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.hulls import carved_family
+from r2c2r_core.generate.level_set import Grid
+from r2c2r_core.generate.seen import Seen
 from r2c2r_core.generate.variation import draw_variation, whole_pool
-from r2c2r_core.generate.votes import collect_votes, grid_votes
+from r2c2r_core.generate.votes import Votes, collect_votes, grid_votes
 from r2c2r_core.geometry.camera import unproject
 from r2c2r_core.geometry.meshes import is_manifold, is_watertight, volume
 from r2c2r_core.geometry.transforms import Rigid3
@@ -112,3 +115,24 @@ def test_a_thin_shell_has_an_unseen_error_and_a_carved_solid_has_none():
     assert family["carved from free space"].shape(everything).unseen_error_m is None
     shell = family["as thin as a board where its back was not observed"].shape(everything)
     assert 0.06 < shell.unseen_error_m < 0.2
+
+
+@pytest.mark.parametrize("in_drawer", [True, False])
+def test_a_thing_in_a_drawer_reaches_down_under_its_observed_top(in_drawer: bool) -> None:
+    """The drawer's front hides all of it but the top, in every frame."""
+    grid = Grid(np.zeros(3), (20, 20, 20), 0.01)
+    x, y, z = grid.centres().T
+    over = (np.abs(x - 0.1) < 0.06) & (np.abs(y - 0.1) < 0.06)
+    top = over & (np.abs(z - 0.15) < 0.02)
+    votes = Votes(
+        distance_m=np.where(top, z - 0.15, np.nan),
+        free_m=np.where(over & (z > 0.17), 0.03, -np.inf),
+        surfaces=np.where(top, 5, 0),
+        outside_m=np.full(len(x), 0.03),
+    )
+    seen = Seen(Rigid3(), np.zeros((0, 3)), np.array([0.04, 0.04, 0.02]), np.array([0.16, 0.16, 0.15]), 0.02)
+    beyond = np.maximum(seen.low - grid.centres(), grid.centres() - seen.high).max(axis=1)
+    field, _ = solid_field(Carving(seen, grid, votes, 0.03, beyond, 0.0, in_drawer), None, mirror=False)
+    middle = field[10, 10]
+    assert (middle[5] < 0, middle[18] < 0) == (in_drawer, False)
+    assert field[2, 2, 5] > 0
