@@ -100,6 +100,7 @@ class SceneObject:
     warp_residual_paper_m: float | None = None  # residual of the paper's affine map on its own four corners, for comparison
     final_from_placed: Rigid3 = field(default_factory=Rigid3)  # displacement by layout and person: a world motion
     inside_sources: Mapping[InsidePart, Source] = field(default_factory=dict)  # measured, or the fixture's default
+    carried_by: str | None = None  # link of another object that it lies in and moves with: a drawer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -184,7 +184,8 @@ def _solved_in_rounds(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]
 def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, float]]:
     """Index pairs whose boxes are closer than `gap_m` (`rest_gap_m` vertically on a support), and by how much.
 
-    Leaves that pass each other share one body but have their own tracks: they are not separated.
+    Leaves that pass each other share one body but have their own tracks: they are not separated, nor is a thing that stands in
+    a unit, behind its front.
     """
     if len(items) < 2:
         return []
@@ -197,6 +198,8 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
         if d > 1e-6 and not _rests_on(items[i], items[j]) and not _rests_on(items[j], items[i]):
             if (items[i].fixed_by_person and items[j].fixed_by_person) or lap_of(items[i], items[j]) is not None:
                 continue
+            if _stands_in(items[i], items[j]) or _stands_in(items[j], items[i]):
+                continue
             found.append((i, j, d))
     return found
 
@@ -205,6 +208,13 @@ def _rests_on(top: MeasuredObject, below: MeasuredObject) -> bool:
     """Whether `top` stands on `below` with the specified clearance."""
     gap = top.world_from_object.translation[2] - top.dimensions_m[2] / 2 - _top(below)
     return top.spec.stands and _carries(below, top) and abs(gap - tuned(Params).rest_gap_m) < 1e-4
+
+
+def _stands_in(thing: MeasuredObject, unit: MeasuredObject) -> bool:
+    """Whether a thing's centre lies in a unit that opens."""
+    local = unit.world_from_object.inverse.apply(thing.world_from_object.translation)
+    opens = unit.spec.opens not in ("rigid", "fixed")
+    return thing.spec.kind == "thing" and opens and bool((np.abs(local) < unit.dimensions_m / 2).all())
 
 
 def _carries(below: MeasuredObject, item: MeasuredObject) -> bool:

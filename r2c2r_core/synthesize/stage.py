@@ -21,6 +21,7 @@ from r2c2r_core.model.scene import ArticulatedScene, InsidePart, Joint, Link, Sc
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.schema.settings import setting, tuned_numbers
+from r2c2r_core.synthesize.contents import in_drawers
 from r2c2r_core.synthesize.dimensions import BoxSearch, MeasuredObject, measure_object
 from r2c2r_core.synthesize.filmed import as_filmed, drawer_below, filmed, inside_seen, opened_as, opening, widest
 from r2c2r_core.synthesize.fixtures.boards import Boards
@@ -86,7 +87,10 @@ def build_scene(
     if not measured:
         raise StageError("no object could be measured", hint="; ".join(failures.values()))
     progress.at(0.5, "arranging")
-    measured = with_hidden_edges(measured)
+    carriers = {track.name: carrier.motion for track in tracks if track.box is not None and (carrier := track.box.carrier)}
+    contents = [item for item in measured if item.name in carriers]
+    fixed = {item.name for item in contents if item.fixed_by_person}
+    measured = with_hidden_edges([item for item in measured if item.name not in carriers])
     layout = arrange(measured, capture.room.manhattan_yaw_rad, floor_found=capture.room.floor_found)
     if config.outliers == "keep":
         layout = with_outliers(layout, measured)
@@ -115,6 +119,7 @@ def build_scene(
     found, sized = as_said(made, overrides)
     opened += standing_clear(opened, found, _painted, capture.room.walls, kept, said)
     opened += [_painted(item.measured(item.slab), item.slab) for item in sized]  # as a person specified, even where it collides
+    opened += in_drawers(_built(contents, meshes, config, failures), carriers, opened, fixed, failures)
     return ArticulatedScene(
         name=capture.name,
         objects=tuple(opened),
@@ -202,6 +207,20 @@ def _painted(item: MeasuredObject, slab: Slab) -> SceneObject:
     """A fixture of one board, in its colour in the scan, as it will get no textured mesh."""
     board = _fixture(item, None, ObjectOverride(), Boards())
     return replace(board, links=tuple(replace(link, colour=slab.colour) for link in board.links))
+
+
+def _built(
+    items: Sequence[MeasuredObject],
+    meshes: Mapping[str, tuple[Placement, MeshAsset]],
+    config: SynthesizeConfig,
+    failures: dict[str, str],
+) -> list[SceneObject]:
+    """Free bodies, where they were measured."""
+    built = []
+    for item in items:
+        with apart("synthesize", item.name, failures):
+            built.append(_thing(item, *meshes[item.name], config.seed))
+    return built
 
 
 def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: int) -> SceneObject:
