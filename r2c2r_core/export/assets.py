@@ -42,8 +42,9 @@ def world_from_asset(plan: Plan, object_name: str) -> Rigid3:
 def _asset(plan: Plan, object_name: str) -> Plan:
     asset_from_world = world_from_asset(plan, object_name).inverse
     turn = asset_from_world.rotation
-    bodies = tuple(_in_asset(body, asset_from_world) for body in plan.of(object_name))
-    links = {body.name for body in bodies}
+    own = plan.of(object_name)
+    links = {body.name for body in own}
+    bodies = tuple(_in_asset(body, asset_from_world, is_base=body.parent not in links) for body in own)
     handles = tuple(
         replace(h, world_from_handle=asset_from_world @ h.world_from_handle, opening_world=turn @ h.opening_world)
         for h in plan.handles
@@ -52,12 +53,13 @@ def _asset(plan: Plan, object_name: str) -> Plan:
     return Plan(name=object_name, bodies=bodies, floor_z_m=0.0, handles=handles)
 
 
-def _in_asset(body: Body, asset_from_world: Rigid3) -> Body:
+def _in_asset(body: Body, asset_from_world: Rigid3, *, is_base: bool) -> Body:
     pose = asset_from_world @ body.world_from_body
     return replace(
         body,
         world_from_body=pose,
-        parent_from_body=pose if body.parent == WORLD else body.parent_from_body,
+        parent=WORLD if is_base else body.parent,
+        parent_from_body=pose if is_base else body.parent_from_body,
         bundle=_UP,
         texture_file=None if body.texture_file is None else f"{_UP}{body.texture_file}",
     )

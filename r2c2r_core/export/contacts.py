@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 ALLOWED_PENETRATION_M = 5e-4
+CARRIED_BY = "carried_by"
+"""Key, in the text of a free body in scene.xml, of the body that it lies in."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,6 +65,21 @@ def free_bodies(model: Any) -> set[int]:
     """Bodies of free-standing objects."""
     roots = {int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == 0}
     return {body for body in range(model.nbody) if int(model.body_rootid[body]) in roots}
+
+
+def carried_by(model: Any, carriers: set[int]) -> set[int]:
+    """Free bodies that lie in one of these bodies, as scene.xml says."""
+    ends = tuple(f"{CARRIED_BY}={model.body(carrier).name}" for carrier in carriers)
+    return {body for body in free_bodies(model) if _text(model, model.body(body).name).endswith(ends)}
+
+
+def _text(model: Any, name: str) -> str:
+    """The custom text of that name; empty without one."""
+    import mujoco
+
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, name)
+    start, size = (0, 0) if number < 0 else (int(model.text_adr[number]), int(model.text_size[number]))
+    return str(model.text_data[start : start + size].rstrip(b"\0").decode())
 
 
 def body_name(model: Any, body: int) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from r2c2r_core.export import randomize
 from r2c2r_core.export.labels import Labels, labels_of, labels_of_handle
-from r2c2r_core.export.plan import Body, Plan
+from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.randomize import Range
 from r2c2r_core.export.scan_fit import ScanFit
 from r2c2r_core.export.seen import Seen
@@ -107,6 +107,7 @@ def _object_entry(
         "joints": joints,  # a double door has two
         "labels": {body.name: _labels_entry(labels_of(body)) for body in bodies},
         "movable": item.movable,
+        "carried_by": None if bodies[0].parent == WORLD else bodies[0].parent,
         "dimension_source": list(item.dimension_sources),
         "inside_source": dict(item.inside_sources),
         "layout_move_m": _plain(reconstruction.scene.layout_moves_m.get(item.name)),

@@ -7,7 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Image
 from r2c2r_core.export.plan import Plan
-from r2c2r_core.export.preview import Soup, albedo, scene_soup, shaded, soup_faces
+from r2c2r_core.export.preview import Soup, albedo, alone, scene_soup, shaded, soup_faces
 from r2c2r_core.failing import apart
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.masks import PackedMask
@@ -15,7 +15,7 @@ from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.reconstruction import Reconstruction
-from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.model.track import MaskTrack, at_rest
 from r2c2r_core.progress import SILENT, Progress
 
 _HEIGHT_PX = 180
@@ -29,14 +29,15 @@ def write_pictures(reconstruction: Reconstruction, plan: Plan, folder: Path, *, 
     written = {}
     for item in progress.each(reconstruction.scene.objects, "pictures"):
         track = tracks.get(item.name)
-        frame = None if track is None else _best_frame(reconstruction.capture.frames, track)
+        frame = None if track is None else _best_frame(at_rest(reconstruction.capture, track).frames, track)
         if track is None or frame is None:
             continue
         with apart("export", item.name, {}):
             bodies = {number for number, body in enumerate(plan.bodies, start=1) if body.object_name == item.name}
             photo = reconstruction.capture.images.rgb(frame.index)
             name = f"pictures/{item.name}.jpg"
-            pair = side_by_side(photo, track.masks[frame.index], frame, soup, bodies)
+            shown = soup if item.carried_by is None else alone(soup, bodies)  # a closed drawer hides it
+            pair = side_by_side(photo, track.masks[frame.index], frame, shown, bodies)
             (folder / "pictures").mkdir(exist_ok=True)
             (folder / name).write_bytes(cv2.imencode(".jpg", pair[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])[1].tobytes())
             written[item.name] = name

@@ -33,7 +33,7 @@ class Body:
     joint_name: str
     joint: Joint | None  # None: fixed to its parent
     axis_body: Vector3 | None
-    free: bool  # a free rigid body, where the format supports it
+    free: bool  # a free rigid body, where the format supports it: then its parent only carries it
     link: Link
     texture_file: str | None  # relative to the bundle; bodies of one object share equal textures
     is_support: bool = False  # a plate of support.py, not part of the object
@@ -92,12 +92,17 @@ def plan_bundle(scene: ArticulatedScene) -> Plan:
     if not scene.objects:
         raise ExportFailed("the scene has no object", hint="add prompts, or see why the earlier stages failed")
     taken: set[str] = {WORLD}
-    bodies = tuple(body for item in scene.objects for body in _bodies_of(item, taken))
+    bodies: list[Body] = []
+    for item in sorted(scene.objects, key=lambda item: item.carried_by is not None):  # drawers before what lies in them
+        carrier = next((body for body in bodies if item.carried_by == body.link.name), None)
+        bodies += _bodies_of(item, taken, carrier)
     lowest_m = floor_height(corners for body in bodies for corners in collider_corners_world(body))
-    return Plan(name=_clean(scene.name) or "scene", bodies=bodies, floor_z_m=lowest_m)
+    return Plan(name=_clean(scene.name) or "scene", bodies=tuple(bodies), floor_z_m=lowest_m)
 
 
-def _bodies_of(item: SceneObject, taken: set[str]) -> list[Body]:
+def _bodies_of(item: SceneObject, taken: set[str], carrier: Body | None) -> list[Body]:
+    """Bodies of an object; its base is a child of the body that carries it, else of the world."""
+    ground, world_from_ground = (WORLD, Rigid3()) if carrier is None else (carrier.name, carrier.world_from_body)
     links = {link.name: link for link in item.links}
     joints = {joint.child: joint for joint in item.joints}
     for joint in item.joints:
@@ -111,18 +116,20 @@ def _bodies_of(item: SceneObject, taken: set[str]) -> list[Body]:
         link, found = links[link_name], joints.get(link_name)
         base = link_name == item.links[0].name
         parent_link = found.parent if found is not None else item.links[0].name
-        object_from_parent = item.world_from_object.inverse if base else links[parent_link].object_from_link
+        object_from_ground = item.world_from_object.inverse @ world_from_ground
+        object_from_parent = object_from_ground if base else links[parent_link].object_from_link
         name = names[link_name]
-        default_joint = f"{name}_to_{WORLD if base else names[parent_link]}"
+        parent = ground if base else names[parent_link]
+        joint_name = _starting_with(item.name, found.name, "joint") if found else f"{name}_to_{parent}"
         bodies.append(
             Body(
                 object_name=item.name,
                 category=item.category,
                 name=name,
-                parent=WORLD if base else names[parent_link],
+                parent=parent,
                 parent_from_body=object_from_parent.inverse @ link.object_from_link,
                 world_from_body=item.world_from_object @ link.object_from_link,
-                joint_name=_unique(_starting_with(item.name, found.name, "joint") if found else default_joint, joint_names),
+                joint_name=_unique(joint_name, joint_names),
                 joint=found,
                 axis_body=None if found is None else link.object_from_link.rotation.T @ _unit(found.axis_object),
                 free=item.movable and base,

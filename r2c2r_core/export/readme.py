@@ -61,6 +61,8 @@ LOADING  (unpack first; run in the bundle's folder)
              its size, protrusion, free room and opening direction. A front without a handle has a point to push.
   Labels     category, part and disposition (openable, graspable, pushable) of every part: UsdSemantics.LabelsAPI in USD, a
              <custom><text> named as the body or site in MJCF, node extras in GLB, <r2c2r><labels> in URDF
+  Contents   a thing in a drawer is a free body in scene.xml, scene.sdf and scene.usda, and a child of the drawer in scene.urdf
+             and scene.glb, which have no free bodies; manifest.json names the drawer (carried_by), <custom><text> in MJCF too
   Python     yourdfpy.URDF.load("scene.urdf").show()
   A joint    model.joint("{example}")
 

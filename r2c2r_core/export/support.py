@@ -39,6 +39,8 @@ def supported(plan: Plan) -> Plan:
 def _support(thing: Body, bodies: Mapping[str, Body], floor_z_m: float) -> tuple[dict[str, Body], list[Body]]:
     """The bodies of an object moved onto its support, or a supporting plate if one fits."""
     points = _colliders(thing)
+    if thing.parent != WORLD:  # a drawer carries it
+        return {}, []
     others = [c for body in bodies.values() if body.object_name != thing.object_name for c in collider_corners_world(body)]
     under_m = _carried_at(points, others, floor_z_m)
     if under_m is not None:

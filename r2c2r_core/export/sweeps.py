@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from r2c2r_core.export.cavities import cavity_open
-from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, body_name, free_bodies, movers_of, touches
+from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, body_name, carried_by, free_bodies, movers_of, touches
 from r2c2r_core.export.rules.table import finding
 from r2c2r_core.model.report import Blocker, Finding, JointResult
 
@@ -53,10 +53,11 @@ def push_open(model: Any, joint: str) -> float:
 
 
 def things_in_the_way(solid: Any, name: str) -> list[Blocker]:
-    """Free-standing objects that the joint's part hits, with the position of first contact."""
+    """Free-standing objects that the joint's part hits, with the position of first contact; not what lies in it."""
     import mujoco
 
-    movers, free, scratch = movers_of(solid, name), free_bodies(solid), mujoco.MjData(solid)
+    movers, scratch = movers_of(solid, name), mujoco.MjData(solid)
+    free = free_bodies(solid) - carried_by(solid, movers)
     first: dict[str, float] = {}
     for position in _positions(solid, name) if free else ():
         for touch in touches(solid, {name: position}, scratch):

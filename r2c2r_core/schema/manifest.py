@@ -260,6 +260,7 @@ class ManifestObject(Document):
     joints: list[ManifestJoint] = Field(description="all of its joints")
     labels: dict[str, ManifestLabels] = Field(default_factory=dict, description="what each of its links means")
     movable: bool = Field(description="whether it stands free")
+    carried_by: str | None = Field(default=None, description="the link of a drawer that it lies in; null elsewhere")
     dimension_source: _Sources = Field(description="where width, depth and height come from")
     inside_source: dict[Literal["depth", "shelves"], Source] = Field(
         default_factory=dict,

@@ -77,7 +77,8 @@ Finish = tuple[str | None, tuple[float, float, float]]
 def _change(rng: np.random.Generator, entry: Mapping[str, Any], fronts: Finish, stone: Finish) -> Change:
     kind = KIND_OF.get(entry["category"], "thing" if entry["movable"] else "wood")
     texture, tint = {"wood": fronts, "stone": stone}.get(kind, (None, _tint(rng)))
-    level = rng.uniform(-SHIFT_M, SHIFT_M, 2) if entry["movable"] else np.zeros(2)
+    loose = entry["movable"] and entry.get("carried_by") is None  # a drawer's sides leave no room
+    level = rng.uniform(-SHIFT_M, SHIFT_M, 2) if loose else np.zeros(2)
     return Change(
         name=entry["name"],
         scale=_scale(rng, entry),
@@ -85,7 +86,7 @@ def _change(rng: np.random.Generator, entry: Mapping[str, Any], fronts: Finish, 
         tint=tint,
         texture=texture,
         shift_m=(float(level[0]), float(level[1])),
-        turn_rad=float(rng.uniform(-np.pi, np.pi)) if entry["movable"] else 0.0,
+        turn_rad=float(rng.uniform(-np.pi, np.pi)) if loose else 0.0,
     )
 
 

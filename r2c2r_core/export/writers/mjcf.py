@@ -7,8 +7,10 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from r2c2r_core.export.assets import asset_file, assets_of
+from r2c2r_core.export.contacts import CARRIED_BY
 from r2c2r_core.export.labels import labels_of, labels_of_handle
 from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.preview import poses_at
 from r2c2r_core.export.states import STATES, position
 from r2c2r_core.export.writers.stand import add_surroundings, add_view
 from r2c2r_core.export.writers.text import numbers, quat_wxyz_of, words_of
@@ -71,12 +73,12 @@ def _add_bodies(root: ET.Element, worldbody: ET.Element, plan: Plan) -> None:
     """Add bodies, their semantics, and contact exclusions."""
     elements = {WORLD: worldbody}
     for body in plan.bodies:
-        elements[body.name] = _add_body(elements[body.parent], body)
+        elements[body.name] = _add_body(elements[WORLD if body.free else body.parent], body)
         _add_sites(elements[body.name], body, plan)
     _add_meaning(root, plan)
     contact = ET.SubElement(root, "contact")
     for body in plan.bodies:
-        if body.parent != WORLD:
+        if body.parent != WORLD and not body.free:
             ET.SubElement(contact, "exclude", name=f"{body.name}_parent", body1=body.parent, body2=body.name)
     _add_states(root, worldbody, plan)
 
@@ -86,25 +88,31 @@ def _add_states(root: ET.Element, worldbody: ET.Element, plan: Plan) -> None:
     bodies = [plan.body(element.attrib["name"]) for element in worldbody.iter("body")]
     keyframe = ET.SubElement(root, "keyframe")
     for state in STATES:
-        qpos = [value for body in bodies for value in _positions(body, state)]
+        poses = poses_at(plan, STATES[state])
+        qpos = [value for body in bodies for value in _positions(body, state, poses[body.name])]
         if qpos:
             ET.SubElement(keyframe, "key", name=state, qpos=numbers(qpos))
 
 
-def _positions(body: Body, state: str) -> list[float]:
+def _positions(body: Body, state: str, world_from_body: Rigid3) -> list[float]:
     """Generalised positions of a body: its joint's, or its pose if it is free."""
     if body.free:
-        return [*body.parent_from_body.translation, *quat_wxyz_of(body.parent_from_body.rotation)]
+        return [*world_from_body.translation, *quat_wxyz_of(world_from_body.rotation)]
     return [] if body.joint is None else [position(body.joint, state)]
 
 
 def _add_meaning(root: ET.Element, plan: Plan) -> None:
-    """Add <custom> texts named like bodies and sites: `category=…;part=…;disposition=…` (several: by commas)."""
+    """Add <custom> texts named like bodies and sites: `category=…;part=…;disposition=…` (several: by commas).
+
+    The text of a free body in a drawer ends with `carried_by=…`, the drawer's body.
+    """
     custom = ET.SubElement(root, "custom")
+    carriers = {body.name: {CARRIED_BY: body.parent} for body in plan.bodies if body.free and body.parent != WORLD}
     said = [(body.name, labels_of(body)) for body in plan.bodies]
     said += [(handle.name, labels_of_handle(handle, plan.body(handle.link))) for handle in plan.handles]
     for name, labels in said:
-        ET.SubElement(custom, "text", name=name, data=";".join(f"{key}={value}" for key, value in words_of(labels).items()))
+        words = words_of(labels) | carriers.get(name, {})
+        ET.SubElement(custom, "text", name=name, data=";".join(f"{key}={value}" for key, value in words.items()))
 
 
 def _add_defaults(root: ET.Element) -> None:
@@ -138,7 +146,8 @@ def _add_assets(asset: ET.Element, plan: Plan) -> None:
 
 
 def _add_body(parent: ET.Element, body: Body) -> ET.Element:
-    element = ET.SubElement(parent, "body", {"name": body.name, **_pose(body.parent_from_body)})
+    pose = body.world_from_body if body.free else body.parent_from_body
+    element = ET.SubElement(parent, "body", {"name": body.name, **_pose(pose)})
     inertial = body.link.inertial
     full = [inertial.inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     mass = {"pos": numbers(inertial.com_link), "mass": numbers(inertial.mass_kg), "fullinertia": numbers(full)}

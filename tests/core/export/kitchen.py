@@ -201,22 +201,22 @@ def counter(name: str) -> SceneObject:
     return _object(name, "counter", size, _at([0.15, 0.0, 0.825 + 0.02]), (slab,), ())
 
 
-def bottle(name: str, *, x: float = 0.2, bottom_z: float = 0.8651) -> SceneObject:
+def bottle(name: str, *, x: float = 0.2, bottom_z: float = 0.8651, height_m: float = 0.26) -> SceneObject:
     """A free-standing object with one convex collider and its own texture."""
-    size = np.array([0.08, 0.08, 0.26])
+    size, half_m = np.array([0.08, 0.08, height_m]), height_m / 2
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     ring = np.column_stack([0.04 * np.cos(angles), 0.04 * np.sin(angles)])
-    points = np.concatenate([np.column_stack([ring, np.full(16, z)]) for z in (-0.13, 0.13)])
+    points = np.concatenate([np.column_stack([ring, np.full(16, z)]) for z in (-half_m, half_m)])
     body = Link(
         name=f"{name}_body",
-        object_from_link=_at([0.0, 0.0, -0.13]),  # the frame of a free-standing object is at the centre of its base
+        object_from_link=_at([0.0, 0.0, -half_m]),  # the frame of a free-standing object is at the centre of its base
         boxes=(),
-        pieces=(ConvexPiece(name="hull", vertices_link=points + np.array([0.0, 0.0, 0.13])),),
-        visual=panel_mesh(np.array([0.056, 0.056, 0.26]), np.array([0.0, 0.0, 0.13]), seed=3),
+        pieces=(ConvexPiece(name="hull", vertices_link=points + np.array([0.0, 0.0, half_m])),),
+        visual=panel_mesh(np.array([0.056, 0.056, height_m]), np.array([0.0, 0.0, half_m]), seed=3),
         colour=(0.2, 0.5, 0.3),
-        inertial=_slab_inertial(size, np.array([0.0, 0.0, 0.13]), density=900.0),
+        inertial=_slab_inertial(size, np.array([0.0, 0.0, half_m]), density=900.0),
     )
-    pose = _at([x, -0.1, bottom_z + 0.13])
+    pose = _at([x, -0.1, bottom_z + half_m])
     return replace(_object(name, "bottle", size, pose, (body,), ()), movable=True, fixture="object")
 
 
