@@ -30,6 +30,7 @@ class SceneItem(Shape):
     dimension_sources: list[str]
     joints: list[SceneJoint]
     movable: bool
+    carried_by: str | None  # link of the drawer that it lies in
     mask_frames: int
     placement_rms_m: float | None
     warp_residual_m: float | None

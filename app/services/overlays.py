@@ -1,6 +1,6 @@
 """Renderings of an object's mesh over photos: ghost, outline, and residual to the measured depth."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.camera import Intrinsics, unproject
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.raster import rasterize, sample_texture
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, joint_transform
 from r2c2r_core.ingest.depth import decode_depth
 from r2c2r_core.ingest.store import depth_path
 from r2c2r_core.model.capture import Frame
@@ -123,6 +123,17 @@ def point_under(context: Context, project_id: str, object_id: int, index: int, x
 
 def parts_of(files: ProjectFiles, name: str, of: schemas.OverlayOf, index: int, said: openings.States) -> list[Part]:
     """The object's meshes in the world at a frame's joint states, filmed or marked; NotReady before that stage."""
+    track = views.latest(files, "segment", name)
+    carrier = track.box.carrier if track is not None and track.box is not None else None
+    parts = _still_parts(files, name, of, index, said)
+    if carrier is None:
+        return parts
+    opening = carrier.motion.opening(carrier.motion.state_in(index))
+    return [replace(part, vertices_world=opening.apply(part.vertices_world)) for part in parts]
+
+
+def _still_parts(files: ProjectFiles, name: str, of: schemas.OverlayOf, index: int, said: openings.States) -> list[Part]:
+    """The object's meshes in the world, as if no drawer carried it."""
     if of == "placed":
         placement, made = (views.latest(files, stage, name) for stage in ("align", "generate"))
         asset = (
@@ -167,18 +178,9 @@ def _moved(item: SceneObject, link: str, index: int) -> Rigid3:
     joint = next((joint for joint in item.joints if joint.child == link), None)
     if joint is None:
         return Rigid3()
-    value, axis = _state(joint, index), joint.axis_object
-    before = _moved(item, joint.parent, index)
-    if joint.type == "prismatic":
-        return before @ Rigid3(np.eye(3), value * axis)
-    rotation = cv2.Rodrigues(value * axis)[0]
-    return before @ Rigid3(rotation, joint.origin_object - rotation @ joint.origin_object)
-
-
-def _state(joint: Joint, index: int) -> float:
-    """Filmed joint position in a frame; 0 if unknown."""
-    state = joint.motion.states.get(index) if joint.motion is not None else None
-    return state.value if state is not None and state.value is not None else 0.0
+    state = 0.0 if joint.motion is None else joint.motion.state_in(index)
+    own = joint_transform(joint.axis_object, joint.origin_object, state, turns=joint.type == "revolute")
+    return _moved(item, joint.parent, index) @ own
 
 
 def _opened_frames(item: SceneObject) -> set[int]:

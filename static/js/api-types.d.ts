@@ -1227,6 +1227,7 @@ export interface SceneItem {
   dimension_sources: string[];
   joints: SceneJoint[];
   movable: boolean;
+  carried_by: string | null;
   mask_frames: number;
   placement_rms_m: number | null;
   warp_residual_m: number | null;

@@ -62,3 +62,8 @@ test("a click on a frame without a mask is reported once segmentation is done, u
   assert.deepEqual(said({ points: [{ ...point, label: 0 }] }), []);
   assert.deepEqual(said({ frames: [{ frame: 4, mask: null }] }), []);
 });
+
+test("an open front may share its mask with what lies behind it", () => {
+  const open = { ...columns(1, 0, 50), isOpen: true };
+  assert.deepEqual(contradictionsOn([open, columns(2, 10, 40)]), []);
+});

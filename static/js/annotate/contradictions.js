@@ -6,7 +6,7 @@
 import { contradictionsOn, shownOn, unseenOn } from "../lib/contradictions.js";
 
 /** @typedef {import("./scene-objects.js").SceneObjects} SceneObjects */
-/** @typedef {import("./masks.js").Masks} Masks */
+/** @typedef {import("./live-masks.js").LiveMasks} LiveMasks */
 /** @typedef {import("../api-types").FrameInfo} FrameInfo */
 /** @typedef {import("../lib/contradictions.js").Said} Said */
 
@@ -22,7 +22,7 @@ export class Contradictions extends EventTarget {
 
   /**
    * @param {SceneObjects} objects
-   * @param {Masks} masks
+   * @param {LiveMasks} masks
    */
   constructor(objects, masks) {
     super();
@@ -52,13 +52,13 @@ export class Contradictions extends EventTarget {
   async #look(frame) {
     const objects = this.#objects.sorted;
     const masks = objects.flatMap((object) => {
-      const mask = this.#masks.on(object.id, frame.index)?.mask;
+      const mask = this.#masks.stored.on(object.id, frame.index)?.mask;
       return mask ? [{ object, mask }] : [];
     });
     const look = ++this.#looks;
-    const shown = await shownOn(masks, frame);
+    const shown = await shownOn(masks, frame, this.#masks.openings);
     if (look !== this.#looks) return; // a newer check has started
-    const unseen = unseenOn(objects, frame.index, (object) => this.#masks.lane(object).has(frame.index));
+    const unseen = unseenOn(objects, frame.index, (object) => this.#masks.stored.lane(object).has(frame.index));
     const said = [...contradictionsOn(shown), ...unseen];
     if (JSON.stringify(said) === JSON.stringify(this.#said)) return;
     this.#said = said;

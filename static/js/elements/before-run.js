@@ -1,6 +1,6 @@
 /** Warnings beside the run button: contradicting, missing and doubtful objects, each with a link to its frame. */
 
-import { getLanes, getMasks, listFrames, listObjects } from "../api.js";
+import { getLanes, getMasks, getOpenings, listFrames, listObjects } from "../api.js";
 import { h } from "../dom.js";
 import { framesToLook, spoiling } from "../lib/before-run.js";
 import { contradictionsOn, shownOn } from "../lib/contradictions.js";
@@ -15,7 +15,12 @@ export class BeforeRun {
 
   /** Check the project's current masks and draw the warnings. @param {string} project @param {AbortSignal} signal */
   async look(project, signal) {
-    const [objects, lanes, frames] = await Promise.all([listObjects(project), getLanes(project), listFrames(project)]);
+    const [objects, lanes, frames, openings] = await Promise.all([
+      listObjects(project),
+      getLanes(project),
+      listFrames(project),
+      getOpenings(project),
+    ]);
     const widths = new Map(frames.map(({ index, width }) => [index, width]));
     const looked = await Promise.all(
       framesToLook(lanes).map(async (frame) => {
@@ -23,7 +28,8 @@ export class BeforeRun {
           const known = objects.find(({ id }) => id === object);
           return known ? [{ object: known, mask }] : [];
         });
-        return { frame, said: contradictionsOn(await shownOn(masks, { index: frame, width: widths.get(frame) ?? 1 })) };
+        const shown = await shownOn(masks, { index: frame, width: widths.get(frame) ?? 1 }, openings);
+        return { frame, said: contradictionsOn(shown) };
       }),
     );
     if (!signal.aborted) this.#draw(project, objects, spoiling(objects, looked));

@@ -67,11 +67,17 @@ function row(item) {
       { class: "whole", title: `sources: ${item.dimension_sources.join(", ")}` },
       `${width} × ${depth} × ${height}`,
     ),
-    h("td", { class: "whole" }, ...(joints.length ? joints : [item.movable ? "free" : "fixed"])),
+    h("td", { class: "whole" }, ...(joints.length ? joints : [standing(item)])),
     h("td", { class: "number" }, String(item.mask_frames)),
     h("td", { class: "number" }, rms),
     h("td", { class: "muted notes" }, ...item.warnings.map((warning) => h("div", {}, warning))),
   );
+}
+
+/** How an object without joints is held. @param {import("../api-types").SceneItem} item */
+function standing(item) {
+  if (item.carried_by) return `in ${item.carried_by}`;
+  return item.movable ? "free" : "fixed";
 }
 
 /** Sources of a joint's numbers. @param {import("../api-types").SceneItem["joints"][number]} joint */

@@ -8,7 +8,10 @@ import { decodeBox } from "./masks.js";
 
 /** @typedef {import("../api-types").MaskBits} MaskBits */
 /** @typedef {{ x: number, y: number, label: number }} Click in pixels of the mask */
-/** @typedef {{ object: number, name: string, mask: MaskBits, pixels: Uint8Array, clicks: Click[] }} Shown pixels: of the box */
+/**
+ * Object on a frame; `pixels` are those of its mask's box. An open front shows what lies behind it: its mask may hold others.
+ * @typedef {{ object: number, name: string, mask: MaskBits, pixels: Uint8Array, clicks: Click[], isOpen: boolean }} Shown
+ */
 /**
  * Contradiction of an object; `other` is the object whose mask shares pixels with its mask.
  * @typedef {{ object: number, text: string, other?: number, mergesWith?: { object: number, name: string } }} Said
@@ -22,16 +25,20 @@ const NEAR = 0.01; // of the image's width: a click this near to a mask is on it
  * Masks of a frame, decoded, with the clicks of their objects there.
  * @param {{ object: import("../api-types").SceneObject, mask: MaskBits }[]} masks
  * @param {{ index: number, width: number }} frame
+ * @param {import("../api-types").Opening[]} openings
  * @returns {Promise<Shown[]>}
  */
-export function shownOn(masks, { index, width }) {
+export function shownOn(masks, { index, width }, openings) {
+  const opened = openings.filter(({ states }) => states.some(({ frame, value }) => frame === index && value !== 0));
+  const open = new Set(opened.map(({ object }) => object));
   return Promise.all(
     masks.flatMap(({ object, mask }) => {
       if (!mask.box_width) return [];
       const scale = mask.width / width;
       const here = object.points.filter((point) => point.frame === index);
       const clicks = here.map(({ x, y, label }) => ({ x: x * scale, y: y * scale, label }));
-      return [decodeBox(mask).then((pixels) => ({ object: object.id, name: object.name, mask, clicks, pixels }))];
+      const shown = { object: object.id, name: object.name, mask, clicks, isOpen: open.has(object.id) };
+      return [decodeBox(mask).then((pixels) => ({ ...shown, pixels }))];
     }),
   );
 }
@@ -71,6 +78,7 @@ export function unseenOn(objects, frame, isSeen) {
  * @returns {Said[]}
  */
 function between(first, second) {
+  if (first.isOpen || second.isOpen) return [];
   const smaller = Math.min(count(first.pixels), count(second.pixels));
   const share = smaller ? shared(first, second) / smaller : 0;
   if (share < OVERLAP) return [];

@@ -40,7 +40,7 @@ export class AnnotatePage extends LiveElement {
   #objects = new SceneObjects();
   #masks = new LiveMasks();
   #meanwhile = new Meanwhile();
-  #contradictions = new Contradictions(this.#objects, this.#masks.stored);
+  #contradictions = new Contradictions(this.#objects, this.#masks);
   #edits = new Edits(this.#objects);
   /** @type {string[]} */
   #categories = [];
@@ -164,7 +164,7 @@ export class AnnotatePage extends LiveElement {
     this.#on(this.#player, "frame", () => (this.#picture.drawFrame(), this.#drawTip()));
     this.#on(this.#player, "settled", () => this.#settled());
     this.#on(this.#masks, "masks", ({ frame }) => !signal.aborted && this.#drawMasks(frame));
-    this.#on(this.#masks, "openings", () => this.#picture.drawLanesSoon());
+    this.#on(this.#masks, "openings", () => this.#opened());
     this.#on(this.#masks, "grown", ({ object }) => this.#grown(object));
     this.#on(this.#strip, "seek", (position) => this.#player.seek(position));
     this.#on(this.#strip, "play", () => this.#player.play());
@@ -351,6 +351,11 @@ export class AnnotatePage extends LiveElement {
     this.#picture.drawMasks(of);
     const { frame } = this.#player;
     if (frame && (of ?? frame.index) === frame.index) this.#contradictions.lookSoon(frame);
+  }
+
+  #opened() {
+    this.#picture.drawLanesSoon();
+    if (this.#player.frame) this.#contradictions.lookSoon(this.#player.frame);
   }
 
   #contradicted = (/** @type {number} */ object) => this.#contradictions.about(object);
