@@ -1,6 +1,6 @@
 """Kitchens of the second generator, filmed while fronts are opened.
 
-    python benchmarks/second_opened.py PATH/make_kitchen.py OUT --seed N [--frames F] [--size WxH]
+    python benchmarks/second_opened.py PATH/make_kitchen.py OUT --seed N [--frames F] [--size WxH] [--look-in]
 
 PATH/make_kitchen.py is that generator, deliberately independent of the project; its layouts, paints, light and shading are used
 unchanged, and nothing of the project's own generator is used. The moving parts, the space behind them, the camera path and the
@@ -95,22 +95,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--frames", type=int, default=240)
     parser.add_argument("--size", default="960x720")
+    parser.add_argument("--look-in", action="store_true", help="open drawers first, and film what lies in them from nearby")
     options = parser.parse_args(arguments)
     width, height = (int(value) for value in options.size.split("x"))
-    film(_load(options.generator), options.out, options.seed, options.frames, width, height)
+    film(_load(options.generator), options.out, options.seed, options.frames, width, height, look_in=options.look_in)
 
 
-def film(generator: ModuleType, out: Path, seed: int, frames: int, width: int, height: int) -> None:
+def film(generator: ModuleType, out: Path, seed: int, frames: int, width: int, height: int, *, look_in: bool = False) -> None:
     """Write the recording and its truth."""
     rng = np.random.default_rng([seed, 41])
     leaves: list[Leaf] = []
     generator.unit = _units(generator.unit, leaves, rng)
     scene, run, length, _ = generator.build(seed)
-    turns = _turns(leaves, frames, rng)
+    turns = _turns([leaf for leaf in leaves if leaf.kind == "drawer"] if look_in else leaves, frames, rng)
     sleeves = {turn.leaf.name: _sleeve(scene) for turn in turns}
     focal = 0.78 * width
     camera = np.array([[focal, 0, width / 2 - 0.5], [0, focal, height / 2 - 0.5], [0, 0, 1]])
-    eyes, targets = _path(turns, run, length, frames, rng)
+    eyes, targets = _path(turns, run, length, frames, rng, look_in=look_in)
     lights = [((run @ [0.3 * length, -1.5, 2.4, 1])[:3], 0.9), ((run @ [0.9 * length, -2.2, 2.3, 1])[:3], 0.6)]
     names = [thing["name"] for thing in scene.objects]
     for name in names:
@@ -137,7 +138,9 @@ def film(generator: ModuleType, out: Path, seed: int, frames: int, width: int, h
             )
         recording.writestr("metadata", json.dumps(_metadata(camera, width, height, poses)))
     times = [number / max(frames - 1, 1) for number in range(frames)]
-    _write(out / "truth.json", {"version": 1, "objects": _truth(scene, leaves, turns, times, tally)})
+    shown = [thing for index, thing in enumerate(scene.objects) if index in clicks or "carried_by" not in thing]
+    entries = [entry for entry in _truth(scene, leaves, turns, times, tally) if entry["name"] in {t["name"] for t in shown}]
+    _write(out / "truth.json", {"version": 1, "objects": entries})
     _write(out / "prompts.json", {"version": 1, "objects": _prompts(scene, clicks, rng)})
 
 
@@ -297,7 +300,7 @@ def _board(
     body: list[int] = []
     axis, origin, upper = _joint(cell, way, rng)
     if way == "drawer":
-        inside, body = _drawer(cell, inside, upper, rng)
+        inside, body = _drawer(cell, f"{cell.name}_joint{suffix}", inside, upper, rng)
     corners = np.array([[x, y, z, 1.0] for x in (x0, x1) for y in (0.0, _FRONT_M) for z in (z0, z1)])
     leaves.append(
         Leaf(
@@ -344,8 +347,10 @@ def _joint(cell: Cell, way: str, rng: np.random.Generator) -> tuple[np.ndarray, 
     return np.array([sign, 0.0, 0.0]), np.array([middle[0], behind, z]), round(float(limit), 3)
 
 
-def _drawer(cell: Cell, carcass: dict[str, Any], travel: float, rng: np.random.Generator) -> tuple[dict[str, Any], list[int]]:
-    """Add the box that moves with a drawer's front, with objects in it; return its clear lengths."""
+def _drawer(
+    cell: Cell, joint: str, carcass: dict[str, Any], travel: float, rng: np.random.Generator
+) -> tuple[dict[str, Any], list[int]]:
+    """Add the box that moves with a drawer's front, with two cartons in it; return its clear lengths."""
     wall, floor, slide = float(rng.uniform(0.01, 0.018)), 0.006, 0.014
     side = carcass["board_m"] + slide
     x0, x1 = cell.x + side, cell.x + cell.width - side
@@ -360,13 +365,13 @@ def _drawer(cell: Cell, carcass: dict[str, Any], travel: float, rng: np.random.G
         ((x0 + wall, rear - wall, z0 + floor), (x1 - wall, rear, z1)),
     ]
     parts = [cell.box(low, high, colour) for low, high in boxes]
-    for _ in range(2):  # unlabelled contents that move along
-        x, y = x0 + (x1 - x0) * float(rng.uniform(0.25, 0.7)), _FRONT_M + (rear - _FRONT_M) * float(rng.uniform(0.2, 0.7))
-        parts.append(
-            cell.box(
-                (x - 0.04, y - 0.05, z0 + floor), (x + 0.04, y + 0.05, z0 + floor + 0.05), rng.uniform(0.1, 0.9, 3), "label", -1
-            )
-        )
+    sizes, clear = rng.spawn(1)[0], np.array([(x1 - x0) / 2 - wall, rear - wall - _FRONT_M, z1 - z0 - floor])
+    for half in range(2):  # cartons that move along; the first is an object
+        at = np.array([rng.uniform(0.25, 0.7), rng.uniform(0.2, 0.7), 0.0])
+        size = np.minimum(sizes.uniform((0.09, 0.12, 0.05), (0.18, 0.24, 0.14)), [0.85, 0.6, 0.9] * clear)
+        low = np.array([x0 + wall + half * clear[0], _FRONT_M, z0 + floor]) + (clear - size) * at
+        owner = _carton(cell, joint, low, size) if half == 0 else -1
+        parts.append(cell.box(tuple(low), tuple(low + size), rng.uniform(0.1, 0.9, 3), "label", owner))
     inside = {
         "depth_m": rear - wall - _FRONT_M,
         "width_m": x1 - x0 - 2 * wall,
@@ -376,6 +381,16 @@ def _drawer(cell: Cell, carcass: dict[str, Any], travel: float, rng: np.random.G
         "front_m": _FRONT_M,
     }
     return inside, parts
+
+
+def _carton(cell: Cell, joint: str, low: np.ndarray, size: np.ndarray) -> int:
+    """Add the entry of a carton in a drawer to the scene's objects; return its number."""
+    objects, pose = cell.scene.objects, cell.run.copy()
+    pose[:3, 3] = (cell.run @ [*(low + size / 2), 1.0])[:3]
+    name = f"box_{sum(thing['category'] == 'box' for thing in objects)}"
+    entry = {"name": name, "category": "box", "dims": size.tolist(), "T_world_object": pose.tolist(), "joint": None}
+    objects.append({**entry, "carried_by": joint})
+    return len(objects) - 1
 
 
 def _turns(leaves: list[Leaf], frames: int, rng: np.random.Generator) -> list[Turn]:
@@ -427,7 +442,7 @@ def _way(time: float, start: float, end: float, thinks: float) -> float:
 
 
 def _path(
-    turns: list[Turn], run: np.ndarray, length: float, frames: int, rng: np.random.Generator
+    turns: list[Turn], run: np.ndarray, length: float, frames: int, rng: np.random.Generator, *, look_in: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eyes and targets in world coordinates: before each front while it moves, along the run in between."""
     from scipy.interpolate import PchipInterpolator
@@ -435,7 +450,9 @@ def _path(
     knots: list[tuple[float, np.ndarray, np.ndarray]] = []
     starting = [turn for turn in turns if turn.out[0] < 0]
     for turn in starting[:1]:
-        knots += [(t, *_before(turn.leaf, run, s)) for t, s in ((0.0, 0.0), (0.5 * _START, 0.12), (_START, -0.08))]
+        knots += [
+            (t, *_before(turn.leaf, run, s, look_in=look_in)) for t, s in ((0.0, 0.0), (0.5 * _START, 0.12), (_START, -0.08))
+        ]
     reach = length + 0.7
     for s in np.linspace(0.0, 1.0, 9):
         phase = 2 * np.pi * s
@@ -454,7 +471,7 @@ def _path(
         begin, end = min(t.out[0] for t in group), min(max(t.back[1] for t in group), 1.0)
         side = float(rng.choice((-1.0, 1.0)))
         for t, s in zip(np.linspace(begin - 0.01, end, 4), (0.0, 0.13, -0.06, 0.1), strict=True):
-            views = [_before(turn.leaf, run, side * s) for turn in group]
+            views = [_before(turn.leaf, run, side * s, look_in=look_in) for turn in group]
             knots.append((float(t), np.mean([v[0] for v in views], axis=0), np.mean([v[1] for v in views], axis=0)))
     knots = sorted(knots, key=lambda knot: knot[0])
     knots = [knot for n, knot in enumerate(knots) if n == 0 or knot[0] > knots[n - 1][0] + 1e-4]
@@ -465,9 +482,11 @@ def _path(
     return eyes + rng.normal(0, 0.003, eyes.shape), targets + rng.normal(0, 0.004, targets.shape)
 
 
-def _before(leaf: Leaf, run: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+def _before(leaf: Leaf, run: np.ndarray, step: float, *, look_in: bool) -> tuple[np.ndarray, np.ndarray]:
     """An eye to one side of a front, and its target; from a drawer's side the camera looks down into it."""
     middle, across = leaf.corners.mean(axis=0), run[:3, 0]
+    if look_in:
+        return middle + 0.95 * leaf.out + (0.15 + step) * across + [0.0, 0.0, 0.95], middle + 0.2 * leaf.out
     aside = {"left": 0.45, "right": -0.45}.get(leaf.hinge or "", 0.35)
     high = middle[2] > 1.2
     eye = middle + (1.75 if leaf.hinge else 1.5) * leaf.out + (aside + step) * across
@@ -694,6 +713,7 @@ def _truth(
                 "symmetry": "axial" if bottle else None,
                 "observed_axes": [True, bottle, True],
                 "opened": [joint["name"] for joint in joints if any(joint["states"])] or None,
+                "carried_by": thing.get("carried_by"),
             }
         )
     return entries

@@ -63,6 +63,7 @@ class ObjectRecord:
     joints: tuple[JointRecord, ...]
     observed_axes: tuple[bool, bool, bool] | None = None  # truth only; None: not stated
     scan_fit: Mapping[str, float] | None = None  # of a bundle: its mesh's fit to the scan, from its manifest; None: unknown
+    carried_by: str | None = None  # the drawer that it lies in: its joint in a truth file, its link in a bundle
     turns_freely: bool = False  # truth only: rotationally symmetric about the vertical, so yaw is undefined
 
 
@@ -137,6 +138,7 @@ def _object(entry: dict[str, Any], world_from_file: Rigid3) -> ObjectRecord:
         joints=tuple(_joint(joint, world_from_file) for joint in joints),
         observed_axes=None if observed is None else (bool(observed[0]), bool(observed[1]), bool(observed[2])),
         scan_fit=_fit(entry.get("scan_fit")),
+        carried_by=entry.get("carried_by"),
         turns_freely=entry.get("symmetry") == "axial",
     )
 
