@@ -30,7 +30,7 @@ class JointScore:
     open_shown: int  # those in which it is open
     open_right: int
     stop_right: bool | None  # None: no stop in the truth, and none reported
-    limit_right: bool  # reported as measured and right if it stopped; not reported as measured if it did not
+    limit_right: bool  # reported as measured and right; or, if no stop was seen, not as measured and beyond what was seen
     inner_depth_mm: float | None  # signed error; None: not seen, or no truth
 
 
@@ -96,8 +96,8 @@ def _score(true: JointRecord, motion: MotionRecord, found: JointRecord | None) -
         shown_right=len(right),
         open_shown=len(ajar),
         open_right=len(right & ajar),
-        stop_right=_stop_right(motion, found.motion if same and found is not None else None, tolerance),
-        limit_right=same and found is not None and _limit_right(motion, found, tolerance),
+        stop_right=_stop_right(true, motion, found.motion if same and found is not None else None, tolerance),
+        limit_right=same and found is not None and _limit_right(true, motion, found, tolerance),
         inner_depth_mm=_depth_error_mm(motion, found.motion if found is not None else None),
     )
 
@@ -106,17 +106,22 @@ def _near(value: float | None, true: float | None, tolerance: float) -> bool:
     return value is not None and true is not None and abs(value - true) <= tolerance
 
 
-def _stop_right(true: MotionRecord, found: MotionRecord | None, tolerance: float) -> bool | None:
+def _stop_right(true: JointRecord, motion: MotionRecord, found: MotionRecord | None, tolerance: float) -> bool | None:
+    """Whether a stop was found where the joint has its limit.
+
+    None if none was found and none was seen. One may be found that was not seen: a sliding leaf may stop hidden behind another,
+    with only its vacated place in view.
+    """
     claimed = found is not None and found.stop_seen
-    if not true.stop_seen:
-        return False if claimed else None
-    return claimed and found is not None and abs(found.largest - true.largest) <= tolerance
+    if not motion.stop_seen and not claimed:
+        return None
+    return claimed and found is not None and abs(found.largest - true.upper) <= tolerance
 
 
-def _limit_right(true: MotionRecord, found: JointRecord, tolerance: float) -> bool:
-    if not true.stop_seen:
-        return found.limit_source != "measured" and found.upper >= true.largest - tolerance
-    return found.limit_source == "measured" and abs(found.upper - true.largest) <= tolerance
+def _limit_right(true: JointRecord, motion: MotionRecord, found: JointRecord, tolerance: float) -> bool:
+    if found.limit_source == "measured":
+        return abs(found.upper - true.upper) <= tolerance
+    return not motion.stop_seen and found.upper >= motion.largest - tolerance
 
 
 def _depth_error_mm(true: MotionRecord, found: MotionRecord | None) -> float | None:

@@ -20,11 +20,12 @@ def opened_truth() -> dict[str, Any]:
     for thing in truth["objects"]:
         for joint in thing["joints"]:
             opens = thing["name"] in NAMES
-            joint["states"] = [0.8 * joint["upper"] if opens and i in OPEN else 0.0 for i in range(FRAMES)]
+            widest = joint["upper"] if thing["name"] == "drawer_1" else 0.8 * joint["upper"]
+            joint["states"] = [widest if opens and i in OPEN else 0.0 for i in range(FRAMES)]
             joint["seen_px"] = [100 if i in UNSEEN else 4000 for i in range(FRAMES)]
             joint["seen_share"] = [0.9] * FRAMES
             joint["stop_seen"] = thing["name"] == "drawer_1"
-            joint["largest"] = 0.8 * joint["upper"] if opens else 0.0
+            joint["largest"] = widest if opens else 0.0
             joint["inside"] = {"depth_m": 0.45, "shelves_m": []} if opens else None
     return truth
 
@@ -108,6 +109,19 @@ def test_an_unobserved_limit_claimed_as_measured_is_an_error(tmp_path: Path) -> 
 
     door, _ = found(tmp_path, claim)
     assert (door["limit_source"], door["stop"]) == (0.0, 0.0)
+
+
+def test_a_limit_that_is_right_counts_though_its_stop_was_hidden(tmp_path: Path) -> None:
+    """A sliding leaf stops behind another one, with its vacated place in view."""
+
+    def claim(joints: dict[str, Any]) -> None:
+        joint = joints["cabinet_1"]
+        joint["source"]["limits"] = "measured"
+        joint["upper"] = joint["motion"]["largest"] = joint["upper"] / 0.8
+        joint["motion"]["stop_seen"] = True
+
+    door, _ = found(tmp_path, claim)
+    assert (door["limit_source"], door["stop"]) == (1.0, 1.0)
 
 
 def test_motion_of_a_static_joint_is_a_false_motion(tmp_path: Path) -> None:
