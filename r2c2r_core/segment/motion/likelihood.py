@@ -139,6 +139,20 @@ def evidence(states: States, scene: Scene, frame: Frame, *, edges: bool = False)
     return np.asarray(params.told_apart * total)
 
 
+def static_evidence(states: States, scene: Scene, frames: Sequence[Frame]) -> np.ndarray:
+    """Mean evidence (q,) for each state in frames that show the leaf closed: of surfaces that stand where it would be open.
+
+    Points near the closed plane are left out, where the closed leaf itself is.
+    """
+    found = [np.zeros(len(states.hypothesis.states))]
+    for frame in frames:
+        seen = _towards(frame.world_from_camera.translation, *states.faces)
+        read = _readings(seen, scene, frame)
+        told = (np.where(seen.on_plane, 0.0, read.ratio) * read.weight).sum(axis=1)
+        found.append(np.maximum(tuned(Params).told_apart * told, 0.0))
+    return np.asarray(sum(found) / max(len(frames), 1))
+
+
 def _towards(camera: Vector3, front: Samples, back: Samples) -> Samples:
     """Face visible to a camera in each state."""
     is_back = ((camera - front.points[:, 0]) * front.outward).sum(axis=1)[:, None] < 0

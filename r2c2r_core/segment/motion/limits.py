@@ -14,11 +14,10 @@ class Params:
 
     still_rad: float = param(float(np.deg2rad(2.0)), "rad", "Maximum change of angle of a door at rest: a frame's error")
     still_m: float = param(0.006, "m", "Maximum displacement of a drawer at rest: a frame's error")
-    dwell_s: float = param(
-        0.4, "s", "Minimum time at rest at the largest opening", source="a leaf that turns back at once has not stopped"
-    )
-    fps: float = param(15.0, "count", "Frames per second of a recording without timestamps", gt=0)
     least_frames: int = param(3, "count", "Minimum number of frames that show the largest opening", ge=2)
+    n_sigma: float = param(
+        4.0, "σ", "Range of error of a state at rest: a leaf seen edge-on may seem to rest where its angle is least known", ge=0
+    )
     arrives: float = param(
         4.0, "ratio", "Minimum opening motion observed before a stop, relative to the tolerance of rest", ge=2
     )
@@ -34,18 +33,38 @@ def widest(fitted: np.ndarray, values: np.ndarray, *, turns: bool) -> float:
     return float(np.median(every[np.abs(every - top) < still]))
 
 
-def stop_seen(values: np.ndarray, seconds: Sequence[float | None], largest: float, *, turns: bool) -> bool:
-    """Whether the leaf moved to its largest state on camera and rested there."""
+def stop_seen(values: np.ndarray, sigmas: np.ndarray, frames: Sequence[int], largest: float, *, turns: bool) -> bool:
+    """Whether the leaf moved to its largest state on camera and rested there for longer than it takes to turn back.
+
+    `values` and their standard deviations are those of the frames with these numbers. A leaf that turns back at once, at any
+    speed, spends twice as long within four times a distance of its end.
+    """
     params, still = tuned(Params), _still(turns=turns)
-    held = np.abs(values - largest) < still
-    times = np.array([k / params.fps if t is None else t for k, t in enumerate(seconds)])
-    for start, stop in _stretches(held):
-        long = stop - start >= params.least_frames and times[stop - 1] - times[start] >= params.dwell_s
+    for start, stop in _stretches(np.abs(values - largest) < still):
         before = values[:start]  # a leaf open from the first frame on, or one that closes from here, need not have met a stop
         arrived = start > 0 and 2 * still < before[-1] and before.min() < largest - params.arrives * still
-        if long and arrived:
+        if stop - start < params.least_frames or not arrived:
+            continue
+        error = max(still, params.n_sigma * float(np.median(sigmas[start:stop])))
+        near = _time_below(np.abs(values - largest), frames, error, start)
+        wider = _time_below(largest - values, frames, 4 * error, start)
+        turning = wider - near  # time within `error` of the end if it had turned back at once
+        if near > 2 * turning:
             return True
     return False
+
+
+def _time_below(values: np.ndarray, frames: Sequence[int], limit: float, within: int) -> float:
+    """Time (frames) for which interpolated values stay below a limit around one of them."""
+    start, stop = next(each for each in _stretches(values < limit) if each[0] <= within < each[1])
+
+    def crossing(outside: int, inside: int) -> float:
+        if not 0 <= outside < len(values):
+            return float(frames[inside])
+        share = (limit - values[inside]) / (values[outside] - values[inside])
+        return float(frames[inside] + share * (frames[outside] - frames[inside]))
+
+    return crossing(stop, stop - 1) - crossing(start - 1, start)
 
 
 def _still(*, turns: bool) -> float:

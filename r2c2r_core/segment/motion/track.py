@@ -17,7 +17,7 @@ from r2c2r_core.segment.motion.bundle import FittedJoint, as_supposed, fit_joint
 from r2c2r_core.segment.motion.hypotheses import Hypothesis, Way, hypotheses
 from r2c2r_core.segment.motion.lateral import slid
 from r2c2r_core.segment.motion.leaf import Leaf
-from r2c2r_core.segment.motion.likelihood import States, closed_counts, evidence, in_view, lay_out
+from r2c2r_core.segment.motion.likelihood import States, closed_counts, evidence, in_view, lay_out, static_evidence
 from r2c2r_core.segment.motion.limits import stop_seen, widest
 from r2c2r_core.segment.motion.path import best_path
 from r2c2r_core.segment.motion.pose import fix_plane
@@ -45,6 +45,7 @@ class Params:
         0.5, "share", "Minimum fraction of readings towards the open leaf's place that look past it while the leaf is closed"
     )
     closed_cost: float = param(60.0, "log", "Cost of every open state in a frame that shows the leaf closed")
+    static_frames: int = param(8, "count", "Number of frames with the leaf closed that show what stands around it", ge=1)
     gain: float = param(40.0, "log", "Minimum log-likelihood gain of a sequence over a leaf that never moved")
     support: float = param(40.0, "log", "Minimum log-likelihood of the readings on the open leaf: occluders contribute none")
     told: float = param(3.0, "log", "Minimum evidence for a frame's state for the leaf to be localised in it")
@@ -85,7 +86,8 @@ def find_motion(
     counts = closed_counts(leaf, scene.frames, scene)
     known = counts[:, :3].sum(axis=1)
     agrees = counts[:, 0] / np.maximum(known, 1)
-    if ((agrees < params.vacated_share) & (known >= params.least_known)).sum() < params.least_frames:
+    vacated = (agrees < params.vacated_share) & (known >= params.least_known)
+    if vacated.sum() < params.least_frames:
         return leaf, None
     closed = (agrees > params.closed_share) & (known >= params.least_closed)
     silent = (counts[:, 3] > params.closed_share * counts.sum(axis=1)) & (counts.sum(axis=1) >= params.least_known)
@@ -94,7 +96,8 @@ def find_motion(
     tried = [each for each in hypotheses(leaf, scene.floor_m) if not each.lateral or closed.sum() >= params.least_frames]
     if through.sum() < params.least_frames:  # hidden and never seen into: hidden by the leaf itself, drawn out, or by others
         tried = [each for each in tried if each.way == "out"]
-    courses = [_course(lay_out(leaf, each), scene, closed, silent, prior.get(each.way, 0.0)) for each in tried]
+    before = _nearest(scene.frames, closed, vacated)
+    courses = [_course(lay_out(leaf, each), scene, closed, silent, before, prior.get(each.way, 0.0)) for each in tried]
     for course in sorted(courses, key=lambda course: -course.gain):
         if course.gain < params.gain:
             break
@@ -102,17 +105,28 @@ def find_motion(
         empty = (through & (course.values > 0) & (course.log > params.told)).sum() >= params.least_frames
         if course.hypothesis.way == "out":  # a drawer hides its own place: the space where it stands was seen through before
             empty |= _was_free(leaf, course, scene, closed)
-        found = _measured(leaf, course, scene, closed, silent, part) if empty and course.support > params.support else None
+        found = _measured(leaf, course, scene, silent, part) if empty and course.support > params.support else None
         if found is not None:
             return (leaf, None) if only and course.hypothesis.way not in prior else found
     return leaf, None
 
 
-def _course(states: States, scene: Scene, closed: np.ndarray, silent: np.ndarray, prior: float) -> Course:
-    """Most probable sequence of states under a hypothesis."""
+def _nearest(frames: Sequence[Frame], closed: np.ndarray, vacated: np.ndarray) -> list[Frame]:
+    """Frames with the leaf closed that are nearest in time to those that show its place vacated."""
+    known = np.flatnonzero(closed)
+    away = np.abs(known[:, None] - np.flatnonzero(vacated)).min(axis=1)
+    return [frames[k] for k in known[np.argsort(away, kind="stable")[: tuned(Params).static_frames]]]
+
+
+def _course(
+    states: States, scene: Scene, closed: np.ndarray, silent: np.ndarray, before: Sequence[Frame], prior: float
+) -> Course:
+    """Most probable sequence of states under a hypothesis; what `before`, frames with the leaf closed, show is not the leaf."""
     params, values = tuned(Params), states.hypothesis.states
     shut = np.where(np.arange(len(values)) > 0, -params.closed_cost, 0.0)
     log = np.stack([shut if is_shut else evidence(states, scene, f) for is_shut, f in zip(closed, scene.frames, strict=True)])
+    if not states.hypothesis.lateral:
+        log[~closed] -= static_evidence(states, scene, before)
     log[silent, 1:] -= params.silent_cost
     path, total = best_path(log)
     own = log[np.arange(len(path)), path]
@@ -131,15 +145,7 @@ def _was_free(leaf: Leaf, course: Course, scene: Scene, closed: np.ndarray) -> b
     return bool((counts[:, 1] > params.free_share * counts[:, :3].sum(axis=1)).sum() > len(frames) / 2)
 
 
-def _filled(leaf: Leaf, frames: Sequence[Frame], scene: Scene) -> bool:
-    """Whether most readings towards a leaf's place are on a surface there or in front of it."""
-    counts = closed_counts(leaf, frames, scene).sum(axis=0) if frames else np.zeros(4)
-    return bool(counts[1] < tuned(Params).free_share * counts[:3].sum())
-
-
-def _measured(
-    leaf: Leaf, course: Course, scene: Scene, closed: np.ndarray, silent: np.ndarray, part: str
-) -> tuple[Leaf, JointMotion] | None:
+def _measured(leaf: Leaf, course: Course, scene: Scene, silent: np.ndarray, part: str) -> tuple[Leaf, JointMotion] | None:
     """Leaf and joint fitted to the frames that show the leaf; None where too few of them show it in one piece."""
     params, step = tuned(Params), float(course.hypothesis.states[1])
     joint, seen = _fitted(leaf, course, scene)
@@ -153,10 +159,9 @@ def _measured(
     turns = course.hypothesis.turns
     sigma_m = min(leaf.sigma_thickness_m, joint.sigma_thicker_m)
     leaf = replace(leaf, thickness_m=leaf.thickness_m + joint.thicker_m, sigma_thickness_m=sigma_m)
-    states = _states(leaf, course, joint, seen, scene, closed)
-    values = np.array([state.value for state in states.values()], dtype=np.float64)
+    states = _states(leaf, course, joint, seen, scene)
+    values, sigmas = np.array([(state.value, state.sigma) for state in states.values()], dtype=np.float64).T
     largest = widest(np.array([value for value, _ in seen.values()]), values, turns=turns)
-    times = [scene.frames[k].timestamp_s for k in states]
     pivot = joint.pivot - joint.axis * float(joint.axis @ joint.pivot) if turns else np.zeros(3)
     place = leaf.world_from_front
     return leaf, JointMotion(
@@ -167,7 +172,7 @@ def _measured(
         covariance=joint.covariance_in(place.rotation),
         states={scene.frames[k].index: state for k, state in states.items()},
         largest=largest,
-        stop_seen=stop_seen(values, times, largest, turns=turns),
+        stop_seen=stop_seen(values, sigmas, [scene.frames[k].index for k in states], largest, turns=turns),
         source="measured",
     )
 
@@ -190,41 +195,28 @@ def _fitted(leaf: Leaf, course: Course, scene: Scene) -> tuple[FittedJoint, Seen
     return joint, {k: (float(states[n]), float(sigmas[n])) for n, k in enumerate(fixes)}
 
 
-def _states(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene, closed: np.ndarray) -> dict[int, State]:
-    """State in every frame that shows the leaf: as fitted, else the likeliest near the neighbouring fits.
-
-    A floor or a wall beside an open leaf looks like the leaf at a wrong state, but is there while the leaf is closed too.
-    """
+def _states(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene) -> dict[int, State]:
+    """State in every frame that shows the leaf: as fitted, else the likeliest near the neighbouring fits."""
     states: dict[int, State] = {}
-    shut_frames = [frame for frame, is_closed in zip(scene.frames, closed, strict=True) if is_closed]
     shut = np.pad(course.values == 0, 1, mode="edge")
     rests = shut[:-2] & shut[1:-1] & shut[2:]  # a moving leaf passes the first tested step within a frame or two
     for k, frame in enumerate(scene.frames):
         if k in seen:
             value, sigma = seen[k]
         else:
-            strays = course.values[k] > 0 and _filled(leaf.at(joint.pose(float(course.values[k]))), shut_frames, scene)
-            value, sigma = _likeliest(leaf, course, joint, seen, scene, k, strays=strays)
-            if strays and _filled(leaf.at(joint.pose(value)), shut_frames, scene):
-                continue
+            value, sigma = _likeliest(leaf, course, joint, seen, scene, k)
         value = _opening(value, joint, float(course.hypothesis.states[1]) if rests[k] else 0.0)
         if k in seen or in_view(leaf, joint.pose(value), scene, frame):
             states[k] = State(value=value, sigma=sigma)
     return states
 
 
-def _likeliest(
-    leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene, k: int, *, strays: bool
-) -> tuple[float, float]:
-    """State and standard deviation of a frame without a fit of its own: it may show the leaf edge-on, or a part of it.
-
-    With `strays` its state lies where another surface is: then only the range between the neighbouring fits is searched.
-    """
+def _likeliest(leaf: Leaf, course: Course, joint: FittedJoint, seen: Seen, scene: Scene, k: int) -> tuple[float, float]:
+    """State and standard deviation of a frame without a fit of its own: it may show the leaf edge-on, or a part of it."""
     params, step = tuned(Params), float(course.hypothesis.states[1])
     beside = [max((j for j in seen if j < k), default=None), min((j for j in seen if j > k), default=None)]
-    near = [seen[j][0] for j in beside if j is not None] if strays or course.log[k] < params.sure else []
-    near += [] if strays and near else [float(course.values[k])]
-    low, high = min(near), max(near)
+    near = [seen[j][0] for j in beside if j is not None] if course.log[k] < params.sure else []
+    low, high = (edge([*near, float(course.values[k])]) for edge in (min, max))
     fine = step / params.finer
     tried = np.arange(max(low - params.around_steps * step, 0.0), high + params.around_steps * step + fine, fine)
     log = evidence(

@@ -57,6 +57,7 @@ def filmed(
     other: Sequence[int] = (),
     pivot_off: tuple[float, float, float] = (0.0, 0.0, 0.0),
     niche: bool = False,
+    leans: bool = False,
     jars: bool = False,
     glass: bool = False,
     thickness_m: float = THICKNESS_M,
@@ -66,6 +67,7 @@ def filmed(
 
     In frames `other` it is closed, and a similar board stands before it where it would be, hinged left and opened by 0.9.
     With `niche` it is closed between two appliances that protrude into the room and occlude it at the ends of the walk.
+    With `leans` a board leans on the neighbour at its left in all frames, where the leaf would be if opened by 160 degrees.
     With `jars` a row of them stands on a shelf behind it, and the unit's rear board returns no depth. With `glass` its outer
     face returns none.
     """
@@ -83,6 +85,7 @@ def filmed(
         before = [_arm()] if number in hands else []
         before += [_board(LEAF.world_from_front @ joint("left").pose(0.9))] if number in other else []
         before += _niche() if niche else []
+        before += [_board(LEAF.world_from_front @ joint("left").pose(np.deg2rad(160)))] if leans else []
         before += _jars() if jars else []
         seen = cast_rays([*_unit(), _board(leaf, thickness_m), *before], pose)
         if jars:

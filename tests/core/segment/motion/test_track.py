@@ -140,6 +140,16 @@ def test_static_appliances_beside_a_leaf_are_not_reported_as_motion() -> None:
     assert motion_of(LEAF, scene("left", np.zeros(36), niche=True)) is None
 
 
+def test_a_board_that_stands_beside_a_leaf_is_not_taken_for_it() -> None:
+    """While the leaf is edge-on, a board that leans on the neighbouring front would explain an angle of 160 degrees better."""
+    turn = np.linspace(0, np.deg2rad(80), 8)
+    states = np.concatenate([np.zeros(10), turn, np.full(4, turn[-1]), turn[::-1], np.zeros(10)])
+    motion = motion_of(LEAF, scene("left", states, leans=True))
+    assert motion is not None
+    values = np.array([motion.states[k].value for k in range(len(states))], dtype=float)
+    assert np.abs(values - states).max() < np.deg2rad(2)
+
+
 def test_a_leaf_open_at_the_start_has_no_observed_stop() -> None:
     """The first frames have small errors, but no frame shows the leaf arriving at a stop."""
     states = np.concatenate([[1.15], np.full(14, 1.2), np.linspace(1.2, 0, 12), np.zeros(6)])
