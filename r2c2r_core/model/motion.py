@@ -10,7 +10,7 @@ the front (one that is not listed, or has no value, is a miss), stops, limits an
 `largest` and `inside`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -101,3 +101,10 @@ class JointMotion:
     def limit_source(self) -> Source:
         """Source of `largest` as the joint's upper limit."""
         return "measured" if self.stop_seen else "at_least"
+
+
+def opened_frames(motions: Iterable[JointMotion]) -> frozenset[int]:
+    """Frames in which at least one of the fronts is not closed, or may not be."""
+    return frozenset(
+        frame for motion in motions for frame, state in motion.states.items() if state.value is None or state.value > 0
+    )

@@ -8,7 +8,7 @@ from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.carrier import Carrier
-from r2c2r_core.model.motion import JointMotion
+from r2c2r_core.model.motion import JointMotion, opened_frames
 from r2c2r_core.model.rectangle import Rectangle3
 
 
@@ -78,10 +78,7 @@ class MaskTrack:
     def opened_frames(self) -> frozenset[int]:
         """Frames in which its front, or the drawer that carries it, is not closed."""
         carrier = None if self.box is None else self.box.carrier
-        moved = self.motions if carrier is None else (carrier.motion,)
-        return frozenset(
-            frame for motion in moved for frame, state in motion.states.items() if state.value is None or state.value > 0
-        )
+        return opened_frames(self.motions if carrier is None else (carrier.motion,))
 
 
 def at_rest(capture: Capture, track: MaskTrack) -> Capture:

@@ -180,7 +180,8 @@ def _loose(
         return None
     config = replace(sized_as(category), on_floor=False, support_z_m=drawer_floor(drawer.front, scene))
     boards = drawer_boards(drawer, prepared.scene)
-    thing = _small_thing(scene, boards, replace(prompt, points=clicks), config, on, off.points)
+    carved = replace(prompt, points=clicks)  # drawers hold nothing too large for silhouettes
+    thing = _small_thing(scene, boards, carved, config, on, off.points, by_silhouettes=True)
     return FoundCarried(thing, scene, drawer) if thing is not None else None
 
 
@@ -200,7 +201,8 @@ def _thing(
         if standing is not None:
             colours = standing_colours(standing, scene, scene.frames)
             return FoundStanding(replace(standing, thing=replace(standing.thing, colours=colours)), scene)
-    thing = _small_thing(scene, structure, prompt, config, hits, negatives)
+    is_small = config.radius_m < tuned(Params).small_m
+    thing = _small_thing(scene, structure, prompt, config, hits, negatives, by_silhouettes=is_small)
     if thing is not None:
         return thing
     cut_out = find_thing(scene, positives, negatives, config)
@@ -208,16 +210,23 @@ def _thing(
 
 
 def _small_thing(
-    scene: Scene, structure: tuple[PlaneRegion, ...], prompt: ObjectPrompt, config: ThingConfig, hits: Hits, negatives: Points
+    scene: Scene,
+    structure: tuple[PlaneRegion, ...],
+    prompt: ObjectPrompt,
+    config: ThingConfig,
+    hits: Hits,
+    negatives: Points,
+    *,
+    by_silhouettes: bool,
 ) -> FoundThing | None:
-    """Body of revolution, or object small enough for silhouettes; None where neither is found."""
+    """Body of revolution, or object carved by silhouettes where it is small enough; None where neither is found."""
     positives = _on_thing(scene, hits, config)
     if config.round:
         on, off = ([Sight(*scene.ray(c.frame, c.x, c.y)) for c in prompt.points if c.label == sign] for sign in (1, 0))
         body = find_round(scene, on, off, positives[0], config, structure)
         if body is not None:
             return FoundThing(replace(body, clicks=prompt.points), scene, small=True, round=True)
-    if config.support_z_m is not None or config.radius_m < tuned(Params).small_m:  # drawers hold nothing larger
+    if by_silhouettes:
         small = find_small(scene, positives, negatives, config, structure)
         if small is not None:
             return FoundThing(replace(small, clicks=prompt.points), scene, small=True, round=config.round)

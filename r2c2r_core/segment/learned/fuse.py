@@ -7,7 +7,7 @@ where less than 40 % of the colour mask is left, the colour mask stays and the f
 The intersection also deletes what a depth image cannot show, such as handles and flush gaps (method.md row 13).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
 import cv2
@@ -99,8 +99,11 @@ def both_masks(colour: Mask, depth: Mask) -> tuple[Mask, bool]:
     return (both, True) if agreed else (colour, False)
 
 
-def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int) -> Fused:
-    """Masks without leaks over depth edges, and filled in where the model lost the object; unchanged without a surface."""
+def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int, opened: Set[int] = frozenset()) -> Fused:
+    """Masks without leaks over depth edges, and filled in where the model lost the object; unchanged without a surface.
+
+    Masks of `opened` frames stay as they are: the object is not where its surface is.
+    """
     params = tuned(Params)
     if not body.exists:
         return found
@@ -113,6 +116,10 @@ def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int) ->
     filled = 0
     for frame in scene.frames:
         mask, trust = None, found.confidence.get(frame.index, 0.0)
+        if frame.index in opened:
+            if frame.index in found.masks:
+                masks[frame.index], confidence[frame.index] = found.masks[frame.index], trust
+            continue
         if frame.index in found.masks:
             mask = without_leaks(unpack_mask(found.masks[frame.index]), scene, frame, near)
         outline, share = thing_mask(thing, scene, frame, refine=False)

@@ -1,7 +1,7 @@
 """Measurements from masks of any segmenter: a front's rectangle and handle, the box of an appliance or other object."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -11,16 +11,19 @@ from r2c2r_core.geometry.camera import pixel_rays, unproject
 from r2c2r_core.geometry.masks import PackedMask, unpack_mask
 from r2c2r_core.kitchen.category import Category, Kind
 from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.carrier import Carrier
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.track import FrontPanel, ThingBox
 from r2c2r_core.segment.appliances.box import appliance_box
 from r2c2r_core.segment.appliances.fit import fit_box
+from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.front import Front, depth_behind, front_panel
 from r2c2r_core.segment.learned.voting import Body, vote, voting_frames
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, joined
+from r2c2r_core.segment.motion.carried import drawer_floor
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.planes import PlaneRegion, region_along, region_at
@@ -28,7 +31,7 @@ from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.boxes import box_of
-from r2c2r_core.segment.things.thing import sized_as, support_height
+from r2c2r_core.segment.things.thing import ThingConfig, sized_as, support_height
 from r2c2r_core.tuning import param, tuned
 
 
@@ -76,11 +79,11 @@ def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int,
     """Front or box of the object: `masks` show which part of the scan it is, `body` is that part of the fused surface."""
     category = category_of(prompt.category)
     if category.kind == "thing":
-        return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category))
+        return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, sized_as(category)))
     front = _front(prepared, prompt, masks, body, category)
     if front is None:
         said = (f"no flat front in its masks: treated as a free-standing object ({prompt.category})",)
-        return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, category), warnings=said)
+        return Measured(kind="thing", box=_thing_box(prepared.scene, prompt, masks, body, sized_as(category)), warnings=said)
     behind = depth_behind(front, prepared.scene.capture.room, category)
     if category.kind == "front":
         leaves = FilmedLeaves(Leaf.of(front.rectangle), category, prepared.scene, behind.depth_m)
@@ -90,6 +93,20 @@ def measure(prepared: PreparedCapture, prompt: ObjectPrompt, masks: Mapping[int,
     panel, box = front_panel(front), appliance_box(front, depth_seen=fitted.depth_seen)
     motions = FilmedLeaves(Leaf.of(front.rectangle), category, prepared.scene, front.depth_m).motions
     return Measured(kind="appliance", front=panel, box=box, warnings=fitted.warnings(prompt.category), motions=motions)
+
+
+def measure_carried(
+    drawer: Carrier, scene: Scene, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body
+) -> Measured:
+    """Box of a thing in a drawer, closed; `scene`, and the masks and the surface in it, are as seen from that drawer."""
+    config = replace(sized_as(category_of(prompt.category)), support_z_m=drawer_floor(drawer.front, scene))
+    box = _thing_box(scene, prompt, masks, body, config)
+    return Measured(kind="thing", box=None if box is None else replace(box, carrier=drawer))
+
+
+def measured_as(found: Found) -> Measured:
+    """Measurements of the weight-free segmenter."""
+    return Measured(kind=found.kind, front=found.panel(), box=found.box(), warnings=found.warnings, motions=found.motions())
 
 
 def _front(
@@ -216,20 +233,21 @@ def _overlap(a: Cell, b: Cell) -> float:
 
 
 def _thing_box(
-    scene: Scene, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, category: Category
+    scene: Scene, prompt: ObjectPrompt, masks: Mapping[int, PackedMask], body: Body, config: ThingConfig
 ) -> ThingBox | None:
     """Box of an object's points on its support; None where depth never observed it."""
     points = _points(scene, masks, body)
     if len(points) < 20:
         return None
-    clicked = [scene.pick(click.frame, click.x, click.y) for click in prompt.points if click.label == 1]
+    clicks = [click for click in prompt.points if click.label == 1 and click.frame in scene.rendered_mm]
+    clicked = [scene.pick(click.frame, click.x, click.y) for click in clicks]
     hits = np.array([point for point in clicked if point is not None]).reshape(-1, 3)
-    support = support_height(scene, hits if len(hits) else points.mean(axis=0)[None], sized_as(category))
+    support = support_height(scene, hits if len(hits) else points.mean(axis=0)[None], config)
     if support is not None and (points[:, 2] > support).sum() >= 20:
         points = points[points[:, 2] > support]
     centres = np.stack([frame.world_from_camera.translation for frame in scene.frames])
     yaw = scene.capture.room.manhattan_yaw_rad
-    return box_of(points, support, yaw, centres.mean(axis=0), round_thing=category.round)
+    return box_of(points, support, yaw, centres.mean(axis=0), round_thing=config.round)
 
 
 def _points(scene: Scene, masks: Mapping[int, PackedMask], body: Body) -> Points:

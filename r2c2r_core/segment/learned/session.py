@@ -1,5 +1,6 @@
 """Learned segmenters: a video model predicts masks, depth prunes them, furniture is measured as without weights."""
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -7,23 +8,29 @@ from pathlib import Path
 import numpy as np
 
 from r2c2r_core.arrays import Image, Mask
-from r2c2r_core.errors import ObjectNotSeen, PromptError
+from r2c2r_core.errors import ObjectNotSeen, PromptError, R2C2RError
 from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.carrier import Carrier
 from r2c2r_core.model.elevation import Elevation
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.model.motion import JointMotion
+from r2c2r_core.model.motion import JointMotion, opened_frames
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.cropped import cropped_mask, world_crop
+from r2c2r_core.segment.found import Found as WeightFree
+from r2c2r_core.segment.fronts.drawer_at import drawer_at
 from r2c2r_core.segment.geometric.session import GeometricSegmenter, GeometricSession
 from r2c2r_core.segment.learned.fuse import DepthPictures, Fused, both_masks, with_evidence
-from r2c2r_core.segment.learned.measure import Measured, measure
+from r2c2r_core.segment.learned.measure import Measured, measure, measure_carried, measured_as
 from r2c2r_core.segment.learned.sam_video import EDGETAM, SAM2, SAM3, Click, Family, Seen, VideoModel, load_model
 from r2c2r_core.segment.learned.voting import agreed_body
+from r2c2r_core.segment.motion.carried import seen_from_drawer
 from r2c2r_core.segment.prompts import check_prompt
 from r2c2r_core.segment.protocol import SegmentConfig, Segmenter
+from r2c2r_core.segment.scene import Scene
 
 _KEPT_OBJECTS = 8  # tracked so far: a later click resumes where it stopped
 
@@ -75,6 +82,7 @@ class LearnedSession:
     config: SegmentConfig
     _followed: dict[ObjectPrompt, "_Followed"] = field(default_factory=dict)
     _depths: DepthPictures | None = None
+    _drawers: dict[PromptPoint, Carrier | None] = field(default_factory=dict)  # at the clicks on things
 
     @property
     def capture(self) -> Capture:
@@ -117,25 +125,21 @@ class LearnedSession:
         """Mask track of the object over all frames that see it, after fusion of all frames; raises ObjectNotSeen."""
         if prompt.front is not None:  # a drawn front needs no search
             return self.prepared.track(prompt, progress=progress)
-        total = len(self.capture.frames)
-        masks: dict[int, PackedMask] = {}
-        confidence: dict[int, float] = {}
-        for position, (index, packed, trust) in enumerate(self._seen(prompt)):
-            if packed.area_px >= self.config.least_area_px:
-                masks[index], confidence[index] = packed, trust
-            progress.at(0.9 * (position + 1) / total, f"{prompt.name}: {self.name} at frame {position + 1}/{total}")
-        if not masks:
-            raise ObjectNotSeen(
-                f"{prompt.name}: {self.name} sees it in 0 of {total} frames, at least 1 expected",
-                hint="click where it is clearly visible, or add a second click",
-            )
-        progress.at(0.9, f"{prompt.name}: comparing frames")
-        body = agreed_body(self.prepared.scene, masks)
-        fused = Fused(masks, confidence, self._of(prompt).warnings())
+        drawer, moving = self._drawer(prompt), self._moving(prompt)
+        scene = self.prepared.scene if drawer is None else seen_from_drawer(drawer, self.prepared.scene)
+        seen = self._fused(prompt, scene, progress)
+        opened = opened_frames(moving.motions()) if moving is not None else frozenset()
+        body = agreed_body(scene, {index: mask for index, mask in seen.masks.items() if index not in opened} or seen.masks)
         if self.config.fusion == "evidence":
-            fused = with_evidence(self.prepared.scene, fused, body, self.config.least_area_px)
+            seen = with_evidence(scene, seen, body, self.config.least_area_px, opened)
         progress.at(0.95, f"{prompt.name}: measuring it")
-        return self._track(prompt, fused, measure(self.prepared, prompt, fused.masks, body))
+        if moving is not None:
+            measured = measured_as(moving)
+        elif drawer is not None:
+            measured = measure_carried(drawer, scene, prompt, seen.masks, body)
+        else:
+            measured = measure(self.prepared, prompt, seen.masks, body)
+        return self._track(prompt, seen, measured)
 
     def elevations(self) -> Iterator[Elevation]:
         """Elevations of the weight-free segmenter."""
@@ -161,6 +165,45 @@ class LearnedSession:
         """Proposals of the weight-free segmenter; the model tracks confirmed ones."""
         return self.prepared.propose()
 
+    def _drawer(self, prompt: ObjectPrompt) -> Carrier | None:
+        """Open drawer in which a free-standing object was clicked; None for others."""
+        click = next(click for click in prompt.points if click.label == 1)
+        point = self.prepared.scene.pick(click.frame, click.x, click.y)
+        if point is None or category_of(prompt.category).kind != "thing":
+            return None
+        if click not in self._drawers:
+            self._drawers[click] = drawer_at(self.prepared, point, click.frame)
+        return self._drawers[click]
+
+    def _moving(self, prompt: ObjectPrompt) -> WeightFree | None:
+        """Front or appliance that the recording shows open, as the weight-free segmenter finds it; None for others.
+
+        Masks alone do not tell where such a front is closed.
+        """
+        if category_of(prompt.category).kind == "thing":
+            return None
+        with contextlib.suppress(R2C2RError):  # the model may see what the weight-free segmenter does not
+            found = self.prepared.find(replace(prompt, crop=None))
+            return found if found.motions() else None
+        return None
+
+    def _fused(self, prompt: ObjectPrompt, scene: Scene, progress: Progress) -> Fused:
+        """The model's masks in the frames of a scene, after tracking through all frames; raises ObjectNotSeen."""
+        total, usable = len(self.capture.frames), {frame.index for frame in scene.frames}
+        masks: dict[int, PackedMask] = {}
+        confidence: dict[int, float] = {}
+        for position, (index, packed, trust) in enumerate(self._seen(prompt)):
+            if index in usable and packed.area_px >= self.config.least_area_px:
+                masks[index], confidence[index] = packed, trust
+            progress.at(0.9 * (position + 1) / total, f"{prompt.name}: {self.name} at frame {position + 1}/{total}")
+        if not masks:
+            raise ObjectNotSeen(
+                f"{prompt.name}: {self.name} sees it in 0 of {total} frames, at least 1 expected",
+                hint="click where it is clearly visible, or add a second click",
+            )
+        progress.at(0.9, f"{prompt.name}: comparing frames")
+        return Fused(masks, confidence, self._of(prompt).warnings())
+
     def _track(self, prompt: ObjectPrompt, fused: Fused, measured: Measured) -> MaskTrack:
         return MaskTrack(
             name=prompt.name,
@@ -182,10 +225,11 @@ class LearnedSession:
             yield from self._of(prompt).all()
             return
         crop = world_crop(prompt.crop, self.capture.world_from_capture)
+        drawer = self._drawer(prompt)
         for index, packed, trust in self._of(prompt).all():
-            depth = self.prepared.scene.depth(index)
-            mask = cropped_mask(unpack_mask(packed), self.capture.frame(index), depth, crop)
-            yield index, pack_mask(mask), trust
+            frame, depth = self.capture.frame(index), self.prepared.scene.depth(index)
+            closed = frame if drawer is None else drawer.frame(frame) or frame  # the box lies where its drawer is closed
+            yield index, pack_mask(cropped_mask(unpack_mask(packed), closed, depth, crop)), trust
 
     def _of(self, prompt: ObjectPrompt) -> "_Followed":
         """Tracking state of the object, reused from earlier requests."""

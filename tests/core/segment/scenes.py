@@ -26,6 +26,8 @@ DRAWERS = {
 }
 PARCEL_M = ((1.50, 0.04, 0.39), (1.66, 0.18, 0.63))
 """Corners of a parcel in the middle drawer, closed: y from the drawer's front."""
+OUT_M = 0.25
+"""Opening of the middle drawer."""
 Corners = tuple[tuple[float, float, float], tuple[float, float, float]]
 Named = tuple[tuple[float, ...], tuple[float, ...], tuple[int, int, int], str | None]
 TABLE: Corners = ((-0.6, -0.35, 0.0), (0.6, 0.35, 0.73))
@@ -71,6 +73,12 @@ def kitchen(
     before, after = (_shapes(*state, bool(swung_rad)) for state in ((0.0, 0.0), (drawn_out_m, swung_rad)))
     wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)
     return _filmed("boxes", poses, [after if step >= from_step else before for step in range(len(poses))], (wall,))
+
+
+def parcel_top(drawn_out_m: float) -> tuple[float, float, float]:
+    """Middle of the parcel's upper face with its drawer open so far."""
+    (left, near, _), (right, far, top) = PARCEL_M
+    return (left + right) / 2, FRONT_Y - drawn_out_m + (near + far) / 2, top
 
 
 def _filmed(

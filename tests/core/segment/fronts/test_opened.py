@@ -5,30 +5,11 @@ import numpy as np
 import pytest
 
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
-from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import CropBox
 from r2c2r_core.model.track import at_rest
-from r2c2r_core.segment.protocol import SegmentSession
 from r2c2r_core.segment.stage import open_session
-from tests.core.segment.conftest import Truth
-from tests.core.segment.scenes import DOORS, FRONT_Y, PARCEL_M, click_on, kitchen, prompt
-
-OUT_M = 0.25
-Filmed = tuple[Capture, Truth, SegmentSession]
-
-
-@pytest.fixture(scope="module")
-def drawn_out(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
-    """The middle drawer is pulled out in the last frames."""
-    capture, truth = kitchen(OUT_M, from_step=10)
-    return capture, truth, open_session(capture, tmp_path_factory.mktemp("drawn_out"))
-
-
-@pytest.fixture(scope="module")
-def looked_into(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
-    """The middle drawer is pulled out, before cameras that see the parcel in it."""
-    capture, truth = kitchen(OUT_M, from_step=10, raised_m=0.6)
-    return capture, truth, open_session(capture, tmp_path_factory.mktemp("looked_into"))
+from tests.core.segment.conftest import Filmed
+from tests.core.segment.scenes import DOORS, FRONT_Y, OUT_M, PARCEL_M, click_on, kitchen, parcel_top, prompt
 
 
 @pytest.fixture(scope="module")
@@ -58,8 +39,7 @@ def test_a_drawer_open_in_the_last_frames_is_tracked_and_measured(drawn_out: Fil
 def test_a_thing_in_an_open_drawer_is_measured_where_the_drawer_is_closed(looked_into: Filmed) -> None:
     capture, truth, session = looked_into
     (left, near, bottom), (right, far, top) = PARCEL_M
-    middle = ((left + right) / 2, FRONT_Y - OUT_M + (near + far) / 2, top)
-    track = session.track(prompt("parcel", "box", click_on(capture, middle, 110)))
+    track = session.track(prompt("parcel", "box", click_on(capture, parcel_top(OUT_M), 110)))
     assert track.box is not None
     assert track.box.carrier is not None
     assert track.box.carrier.motion.largest == pytest.approx(OUT_M, abs=0.006)
@@ -77,8 +57,8 @@ def test_a_thing_in_an_open_drawer_is_measured_where_the_drawer_is_closed(looked
 
 def test_a_crop_box_of_a_thing_in_a_drawer_is_where_the_drawer_is_closed(looked_into: Filmed) -> None:
     capture, _, session = looked_into
-    (left, near, bottom), (right, far, top) = PARCEL_M
-    click = click_on(capture, ((left + right) / 2, FRONT_Y - OUT_M + (near + far) / 2, top), 110)
+    (left, _, bottom), (right, _, _) = PARCEL_M
+    click = click_on(capture, parcel_top(OUT_M), 110)
     edges = ((0.55 * (right - left), 0.0, 0.0), (0.0, 0.4, 0.0), (0.0, 0.0, 0.4))
     crop = CropBox(corner_capture=(left - 0.02, FRONT_Y, bottom - 0.05), edges_capture=edges)
     whole, half = (session.track(replace(prompt("parcel", "box", click), crop=one)) for one in (None, crop))

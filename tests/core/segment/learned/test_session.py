@@ -10,13 +10,13 @@ import pytest
 from r2c2r_core.errors import ObjectNotSeen, PromptError
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.model.inputs import CropBox, ObjectPrompt
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.learned.sam_video import SAM2, Click, Seen
 from r2c2r_core.segment.learned.session import LearnedSession
 from r2c2r_core.segment.stage import SegmentConfig, open_session
-from tests.core.segment.conftest import Truth
-from tests.core.segment.scenes import DOORS, FRONT_Y, click_on, prompt
+from tests.core.segment.conftest import Filmed, Truth
+from tests.core.segment.scenes import DOORS, FRONT_Y, OUT_M, PARCEL_M, click_on, parcel_top, prompt
 
 torch = pytest.importorskip("torch")
 from tests.core.segment.learned.tiny_models import tiny  # noqa: E402
@@ -153,6 +153,47 @@ def test_the_stream_starts_at_the_clicked_frame_and_reuses_masks(
     learned.track(carton)
     learned.track(carton)
     assert sorted(model.asked) == list(range(len(boxes[0].frames)))
+
+
+def test_a_thing_in_an_open_drawer_is_measured_where_the_drawer_is_closed(looked_into: Filmed) -> None:
+    capture, truth, session = looked_into
+    (left, near, bottom), (right, far, top) = PARCEL_M
+    parcel = prompt("parcel", "box", click_on(capture, parcel_top(OUT_M), 110))
+    track = opened(session, TrueMasks(true_masks((capture, truth), "parcel"))).track(parcel)
+    assert track.box is not None
+    assert track.box.carrier is not None
+    expected = [(left + right) / 2, FRONT_Y + (near + far) / 2, (bottom + top) / 2]
+    np.testing.assert_allclose(track.box.world_from_object.translation, expected, atol=0.02)
+    assert set(track.masks) <= {frame.index for frame in capture.frames if frame.index >= 100}
+    shown = [f for f, mask in truth["parcel"].items() if mask.sum() > 150]
+    assert np.mean([mask_iou(unpack_mask(track.masks[f]), truth["parcel"][f]) for f in shown]) > 0.9
+
+
+def test_a_crop_box_of_a_thing_in_a_drawer_is_where_the_drawer_is_closed(looked_into: Filmed) -> None:
+    capture, truth, session = looked_into
+    (left, _, bottom), (right, _, _) = PARCEL_M
+    learned = opened(session, TrueMasks(true_masks((capture, truth), "parcel")))
+    parcel = prompt("parcel", "box", click_on(capture, parcel_top(OUT_M), 110))
+    edges = ((0.55 * (right - left), 0.0, 0.0), (0.0, 0.4, 0.0), (0.0, 0.0, 0.4))
+    crop = CropBox(corner_capture=(left - 0.02, FRONT_Y, bottom - 0.05), edges_capture=edges)
+    whole, half = (learned.mask_at(replace(parcel, crop=box), 110) for box in (None, crop))
+    assert 0.2 < np.count_nonzero(half) / np.count_nonzero(whole) < 0.6
+
+
+@pytest.mark.parametrize(("y", "frame"), [(FRONT_Y, 20), (FRONT_Y - OUT_M, 120)])
+def test_a_drawer_open_in_the_last_frames_keeps_its_masks_and_gets_its_motion(y: float, frame: int, drawn_out: Filmed) -> None:
+    """Clicked where it is closed, and where it is open."""
+    capture, truth, session = drawn_out
+    drawer = prompt("drawer_mid", "drawer", click_on(capture, (1.5, y, 0.5), frame))
+    track = opened(session, TrueMasks(true_masks((capture, truth), "drawer_mid"))).track(drawer)
+    assert track.kind == "front"
+    assert track.front is not None
+    assert track.front.world_from_front.translation[1] == pytest.approx(FRONT_Y, abs=0.01)
+    (motion,) = track.motions
+    assert (motion.kind, motion.largest) == ("prismatic", pytest.approx(OUT_M, abs=0.006))
+    shown = [f for f, mask in truth["drawer_mid"].items() if mask.sum() > 3000]
+    overlap = {f: mask_iou(unpack_mask(track.masks[f]), truth["drawer_mid"][f]) for f in shown}
+    assert min(overlap.values()) > 0.9
 
 
 def test_an_object_the_model_never_sees_is_an_error(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
