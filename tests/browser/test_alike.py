@@ -9,6 +9,7 @@ from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext
 from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, post, signed_in
+from tests.waiting import until
 
 # half a metre wide and 20 cm high, like the proposals
 CORNERS = [[0.6, 2.0, 0.8], [1.1, 2.0, 0.8], [1.1, 2.0, 0.6], [0.6, 2.0, 0.6]]
@@ -47,6 +48,7 @@ def test_proposals_similar_to_an_object_are_listed_and_confirmed(new_context: Ne
     expect(page.get_by_role("button", name="pull_out_2", exact=True)).to_be_visible()
     expect(proposals.get_by_role("heading")).to_have_text("Like pull_out_1 (1)")
     page.keyboard.press("Control+z")  # of the confirmation, whose response is still pending
+    until(lambda: page.title() and answers, "no response")  # calls to the page deliver what was routed
     answers.pop()()
     page.unroute("**/proposals/confirm")
     expect(rows(page)).to_have_count(3)
