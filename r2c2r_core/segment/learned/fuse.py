@@ -111,15 +111,11 @@ def with_evidence(scene: Scene, found: Fused, body: Body, least_area_px: int, op
 
     near = cKDTree(body.vertices)
     thing = Thing(body.vertices, body.faces, None, scene.capture.surface.voxel_m)
-    masks: dict[int, PackedMask] = {}
-    confidence: dict[int, float] = {}
+    masks = {index: mask for index, mask in found.masks.items() if index in opened}
+    confidence = {index: found.confidence[index] for index in masks}
     filled = 0
-    for frame in scene.frames:
+    for frame in (frame for frame in scene.frames if frame.index not in opened):
         mask, trust = None, found.confidence.get(frame.index, 0.0)
-        if frame.index in opened:
-            if frame.index in found.masks:
-                masks[frame.index], confidence[frame.index] = found.masks[frame.index], trust
-            continue
         if frame.index in found.masks:
             mask = without_leaks(unpack_mask(found.masks[frame.index]), scene, frame, near)
         outline, share = thing_mask(thing, scene, frame, refine=False)

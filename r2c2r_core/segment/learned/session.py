@@ -167,6 +167,7 @@ class LearnedSession:
 
     def _drawer(self, prompt: ObjectPrompt) -> Carrier | None:
         """Open drawer in which a free-standing object was clicked; None for others."""
+        check_prompt(self.capture, prompt)
         click = next(click for click in prompt.points if click.label == 1)
         point = self.prepared.scene.pick(click.frame, click.x, click.y)
         if point is None or category_of(prompt.category).kind != "thing":
@@ -183,7 +184,7 @@ class LearnedSession:
         if category_of(prompt.category).kind == "thing":
             return None
         with contextlib.suppress(R2C2RError):  # the model may see what the weight-free segmenter does not
-            found = self.prepared.find(replace(prompt, crop=None))
+            found = self.prepared.find(prompt)
             return found if found.motions() else None
         return None
 

@@ -10,7 +10,7 @@ import pytest
 from r2c2r_core.errors import ObjectNotSeen, PromptError
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.inputs import CropBox, ObjectPrompt
+from r2c2r_core.model.inputs import CropBox, ObjectPrompt, PromptPoint
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.learned.sam_video import SAM2, Click, Seen
 from r2c2r_core.segment.learned.session import LearnedSession
@@ -205,6 +205,12 @@ def test_an_object_the_model_never_sees_is_an_error(session: GeometricSession, b
 def test_a_nonexistent_frame_is_rejected(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
     with pytest.raises(PromptError, match="frame 7 found"):
         opened(session, TrueMasks(true_masks(boxes, "carton"))).mask_at(carton, 7)
+
+
+def test_tracking_a_click_in_a_nonexistent_frame_is_rejected(session: GeometricSession, boxes: Boxes) -> None:
+    stray = prompt("carton", "box", PromptPoint(frame=7, x=240.0, y=180.0, label=1))
+    with pytest.raises(PromptError, match="frame 7"):
+        opened(session, TrueMasks(true_masks(boxes, "carton"))).track(stray)
 
 
 def test_the_real_model_class_runs_with_random_weights(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
