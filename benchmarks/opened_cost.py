@@ -18,6 +18,7 @@ from pathlib import Path
 from unittest import mock
 
 from r2c2r_core.errors import R2C2RError
+from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.prompts import read_prompts
 from r2c2r_core.segment.stage import open_session
 from r2c2r_core.workspace import Workspace
@@ -60,8 +61,8 @@ def tracking_seconds(folder: Path, *, closed: bool) -> float:
         return time.process_time() - start
 
 
-def _never(*_: object, **__: object) -> None:
-    return None
+def _never(leaf: Leaf, *_: object, **__: object) -> tuple[Leaf, None]:
+    return leaf, None
 
 
 def _apart(folder: Path, way: str) -> float:
