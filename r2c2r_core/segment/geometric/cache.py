@@ -51,7 +51,8 @@ def _alone_at(path: Path) -> Iterator[None]:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a file atomically: readers see the whole file or none."""
+    """Write a file atomically: readers see the whole file or none. Nothing is written to a folder deleted meanwhile."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    temporary.write_bytes(content)
-    temporary.replace(path)
+    with suppress(FileNotFoundError):  # a session with other settings deletes the caches of all others
+        temporary.write_bytes(content)
+        temporary.replace(path)

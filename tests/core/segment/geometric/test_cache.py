@@ -1,5 +1,6 @@
 import dataclasses
 import fcntl
+import shutil
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,17 @@ def test_a_damaged_cache_file_is_recomputed(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:40])
     assert kept(path, lambda: (3, 4)) == (3, 4)
     assert kept(path, lambda: (5, 6)) == (3, 4)
+
+
+def test_a_value_is_returned_where_its_folder_was_deleted_meanwhile(tmp_path: Path) -> None:
+    folder = tmp_path / "geometric-other"
+
+    def compute() -> tuple[int, int]:
+        shutil.rmtree(folder)
+        return 1, 2
+
+    assert kept(folder / "value.noun", compute) == (1, 2)
+    assert kept(folder / "value.noun", lambda: (3, 4)) == (3, 4)
 
 
 def test_concurrent_requests_compute_a_value_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -222,9 +222,10 @@ def test_the_real_model_class_runs_with_random_weights(session: GeometricSession
     assert {(packed.width, packed.height) for _, packed, _ in found} == {(480, 360)}
 
 
-def test_a_session_opens_by_name_from_a_folder_of_weights(boxes: Boxes, cache: Path, tmp_path: Path) -> None:
-    tiny(SAM2).model.save_pretrained(tmp_path)
-    learned = open_session(boxes[0], cache, "sam2", SegmentConfig(weights=str(tmp_path), least_area_px=0))
+def test_a_session_opens_by_name_from_a_folder_of_weights(boxes: Boxes, tmp_path: Path) -> None:
+    weights = tmp_path / "weights"
+    tiny(SAM2).model.save_pretrained(weights)
+    learned = open_session(boxes[0], tmp_path, "sam2", SegmentConfig(weights=str(weights), least_area_px=0))
     two = prompt("carton", "box", click_on(boxes[0], (1.06, -0.36, 1.0), 60), click_on(boxes[0], (1.3, -0.36, 1.0), 90, 0))
     assert [frame for (frame, _, _), _ in zip(learned.stream(two), range(3), strict=False)] == [90, 60, 100]
 
