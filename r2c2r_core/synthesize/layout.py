@@ -89,8 +89,8 @@ def with_outliers(layout: Layout, measured: Sequence[MeasuredObject]) -> Layout:
 def outliers_of(objects: Sequence[MeasuredObject]) -> dict[str, str]:
     """Objects to remove so that the rest are compatible, with reasons, among those that overlap beyond measurement errors.
 
-    The one in most such overlaps is removed first; among equals the one whose size and front are less likely. Objects that a
-    person placed are kept.
+    The one in most such overlaps is removed first; among equals one that was not filmed while it opened, which confirms its
+    edges, and of those the one whose size and front are less likely. Objects that a person placed are kept.
     """
     params, found = tuned(Params), dict[str, str]()
     clashes = {
@@ -98,10 +98,13 @@ def outliers_of(objects: Sequence[MeasuredObject]) -> dict[str, str]:
         for i, j, depth in overlapping_pairs(objects)
         if strain(objects, (i, j), params.gap_m) > params.outlier
     }
-    likely = {item.name: _likely(item) for item in objects}
+    likely, filmed = {item.name: _likely(item) for item in objects}, {item.name for item in objects if item.motions}
     while clashes:
         names = [name for pair in clashes for name in pair]
-        worst = max(dict.fromkeys(names), key=lambda name: (likely[name] < np.inf, names.count(name), -likely[name]))
+        worst = max(
+            dict.fromkeys(names),
+            key=lambda name: (likely[name] < np.inf, names.count(name), name not in filmed, -likely[name]),
+        )
         if likely[worst] == np.inf:
             break
         others = {other: depth for pair, depth in clashes.items() if worst in pair for other in pair if other != worst}

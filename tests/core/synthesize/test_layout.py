@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from r2c2r_core.synthesize.dimensions import MeasuredObject, measure_object
 from r2c2r_core.synthesize.layout import Layout, arrange, overlapping_pairs, with_outliers
 from r2c2r_core.synthesize.layout import Params as LayoutParams
 from r2c2r_core.tuning import tuned
+from tests.core.motions import motion
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
 NOTHING = ObjectOverride()
@@ -113,6 +116,15 @@ def test_an_implausible_object_is_an_outlier_and_moves_nothing() -> None:
     assert list(layout.outliers) == ["wide"]
     assert "overlaps a by" in layout.outliers["wide"]
     assert with_outliers(layout, [placed(wrong)]).objects[-1].name == "wide"
+
+
+def test_of_two_overlapping_fronts_the_one_filmed_while_it_opened_is_kept() -> None:
+    pair = placed(Unit("pair", "cabinet", (0.0, 0, 0.5), (0.9, 0.58, 0.7)))
+    wide = placed(Unit("wide", "cabinet", (0.6, 0, 0.5), (0.6, 0.58, 0.7)))
+    likelier = arrange([replace(pair, confidence=0.5), replace(wide, confidence=0.9)], 0.0, floor_found=True)
+    assert list(likelier.outliers) == ["pair"]
+    seen = replace(pair, confidence=0.5, motions=(motion({5: 1.0}, "left", world_from_front=pair.world_from_object),))
+    assert list(arrange([seen, replace(wide, confidence=0.9)], 0.0, floor_found=True).outliers) == ["wide"]
 
 
 def test_an_object_placed_by_a_person_is_not_an_outlier() -> None:
