@@ -19,6 +19,11 @@ def cauchy(residual: Numbers, scale: Numbers) -> np.ndarray:
     return np.asarray(1.0 / (1.0 + (residual / scale) ** 2))
 
 
+def huber(residual: Numbers, scale: Numbers) -> np.ndarray:
+    """Weights of the Huber kernel: beyond the scale, residuals count by their amount instead of its square."""
+    return np.asarray(1.0 / np.maximum(np.abs(residual / scale), 1.0))
+
+
 def geman_mcclure(residual: Numbers, scale: Numbers) -> np.ndarray:
     """Weights of the Geman-McClure kernel: outliers lose all influence."""
     return cauchy(residual, scale) ** 2

@@ -1,13 +1,17 @@
-"""Robust fit of one joint to all frames: its axis, its pivot and every state, with covariance from the Jacobian."""
+"""Robust fit of one joint to all frames: its axis, its pivot and every state, with their covariance.
+
+Gauss-Newton with Huber weights. The information matrix has the shape of an arrow, for a frame's state is linked to the others
+only through the joint: the states are eliminated by the Schur complement, as points are in bundle adjustment.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.geometry.least_squares import huber
 from r2c2r_core.geometry.transforms import Rigid3, joint_transform
 from r2c2r_core.segment.motion.hypotheses import Hypothesis
 from r2c2r_core.segment.motion.pose import PlaneFix
@@ -28,6 +32,7 @@ class Params:
         source="concealed hinges turn 5-20 mm inside the edge",
     )
     free_state: float = param(1.0, "ratio", "Prior standard deviation of a state: radians or metres", gt=0)
+    rounds: int = param(15, "count", "Number of Gauss-Newton rounds", source="4 to 13 rounds reach a ten-thousandth of σ", ge=1)
     outlier: float = param(2.0, "σ", "Residual of a frame's plane above which its weight falls (Huber 1964)", gt=0)
 
 
@@ -77,29 +82,65 @@ def fit_joint(
     across, seen = _across(hypothesis), _stacked(fixes)
     prior = np.concatenate([np.full(2, params.axis_rad), np.full(2, params.pivot_m), [sigma_thickness_m]])
 
-    def residuals(x: np.ndarray) -> np.ndarray:
-        off = seen.planes - _predicted(seen, hypothesis, across, x)
-        whitened = np.einsum("nij,nj->ni", seen.whiten, off).ravel()
-        return np.concatenate([whitened, x[:5] / prior, (x[5:] - states) / params.free_state])
+    def residuals(joint: np.ndarray, values: np.ndarray) -> np.ndarray:
+        off = seen.planes - _predicted(seen, hypothesis, across, joint, values)
+        return np.column_stack([np.einsum("nij,nj->ni", seen.whiten, off), (values - states) / params.free_state])
 
-    def jacobian(x: np.ndarray) -> np.ndarray:
-        return _differences(residuals, x, len(fixes))
-
-    start = np.concatenate([np.zeros(5), states])
-    scales = np.concatenate([prior, np.full(len(fixes), 0.01)])
-    fitted = least_squares(residuals, start, jac=jacobian, loss="huber", f_scale=params.outlier, x_scale=scales)
-    covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
-    axis, pivot = _joint_at(hypothesis, across, fitted.x)
+    found, values = np.zeros(5), states.astype(np.float64)
+    for _ in range(params.rounds):
+        off, by_joint, by_state = _linearised(residuals, found, values)
+        weights, held = huber(off, params.outlier), huber(found / prior, params.outlier) / prior**2
+        pull = -np.einsum("nri,nr->i", by_joint, weights * off) - held * found
+        change, changes = _Arrow.of(by_joint, by_state, weights, held).step(pull, -(by_state * weights * off).sum(axis=1))
+        found, values = found + change, values + changes
+    off, by_joint, by_state = _linearised(residuals, found, values)
+    inliers, held = np.abs(off) <= params.outlier, (np.abs(found / prior) <= params.outlier) / prior**2  # the loss's curvature
+    covariance, variances = _Arrow.of(by_joint, by_state, inliers, held).covariance()
+    axis, pivot = _joint_at(hypothesis, across, found)
     joint = FittedJoint(
         axis=axis,
         pivot=pivot,
         turns=hypothesis.turns,
         across=across,
         covariance=covariance[:4, :4],
-        thicker_m=float(fitted.x[4]),
+        thicker_m=float(found[4]),
         sigma_thicker_m=float(np.sqrt(covariance[4, 4])),
     )
-    return joint, fitted.x[5:], np.sqrt(np.diag(covariance)[5:])
+    return joint, values, np.sqrt(variances)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Arrow:
+    """Information matrix of the joint's five parameters and of one state per frame."""
+
+    joint: np.ndarray  # (5, 5)
+    between: np.ndarray  # (n, 5) of each state with the joint
+    states: np.ndarray  # (n,)
+
+    @staticmethod
+    def of(by_joint: np.ndarray, by_state: np.ndarray, weights: np.ndarray, held: np.ndarray) -> "_Arrow":
+        """Information of residuals (n, r) with derivatives (n, r, 5) and (n, r), and of the joint's prior (5,)."""
+        weighted = by_joint * weights[..., None]
+        return _Arrow(
+            np.einsum("nri,nrj->ij", weighted, by_joint) + np.diag(held),
+            np.einsum("nri,nr->ni", weighted, by_state),
+            (weights * by_state**2).sum(axis=1),
+        )
+
+    @property
+    def _reduced(self) -> np.ndarray:
+        """Schur complement of the states."""
+        return self.joint - self.between.T @ (self.between / self.states[:, None])
+
+    def step(self, pull: np.ndarray, pulls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gauss-Newton step of the joint (5,) and of the states (n,)."""
+        change = np.linalg.solve(self._reduced, pull - self.between.T @ (pulls / self.states))
+        return change, (pulls - self.between @ change) / self.states
+
+    def covariance(self) -> tuple[np.ndarray, np.ndarray]:
+        """Covariance of the joint (5, 5), and variances of the states (n,)."""
+        joint, along = np.linalg.inv(self._reduced), self.between / self.states[:, None]
+        return joint, 1 / self.states + np.einsum("ni,ij,nj->n", along, joint, along)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,10 +174,9 @@ def _joint_at(hypothesis: Hypothesis, across: np.ndarray, x: np.ndarray) -> tupl
     return axis / np.linalg.norm(axis), hypothesis.pivot + x[2] * across[0] + x[3] * across[1]
 
 
-def _predicted(seen: _Stacked, hypothesis: Hypothesis, across: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Planes (n, 3) predicted by the joint and its states, in the parametrisation of the fixes."""
+def _predicted(seen: _Stacked, hypothesis: Hypothesis, across: np.ndarray, x: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """Planes (n, 3) predicted by the joint (5,) and its states (n,), in the parametrisation of the fixes."""
     axis, pivot = _joint_at(hypothesis, across, x)
-    states = x[5:]
     if hypothesis.turns:
         rotation = Rotation.from_rotvec(axis * states[:, None]).as_matrix()
         shift = pivot - rotation @ pivot
@@ -148,19 +188,10 @@ def _predicted(seen: _Stacked, hypothesis: Hypothesis, across: np.ndarray, x: np
     return np.stack([level, -normal[:, 0] / normal[:, 1], -normal[:, 2] / normal[:, 1]], axis=1)
 
 
-def _differences(residuals: Callable[[np.ndarray], np.ndarray], x: np.ndarray, count: int) -> np.ndarray:
-    """Jacobian by forward differences: all states in one step, since each frame depends on its own state alone."""
-    step, base = 1e-6, residuals(x)
-    result = np.zeros((len(base), len(x)))
-    for k in range(5):
-        moved_x = x.copy()
-        moved_x[k] += step
-        result[:, k] = (residuals(moved_x) - base) / step
-    moved_x = x.copy()
-    moved_x[5:] += step
-    change = (residuals(moved_x) - base) / step
-    frame = np.arange(count)
-    for row in range(3):
-        result[3 * frame + row, 5 + frame] = change[3 * frame + row]
-    result[3 * count + 5 + frame, 5 + frame] = change[3 * count + 5 + frame]
-    return result
+def _linearised(
+    residuals: Callable[[np.ndarray, np.ndarray], np.ndarray], joint: np.ndarray, states: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Residuals (n, r) and their forward differences by the joint (n, r, 5) and by each frame's own state (n, r)."""
+    step, base = 1e-6, residuals(joint, states)
+    by_joint = np.stack([(residuals(joint + moved, states) - base) / step for moved in step * np.eye(5)], axis=-1)
+    return base, by_joint, (residuals(joint, states + step) - base) / step
