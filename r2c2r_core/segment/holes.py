@@ -36,11 +36,11 @@ class Rim(NamedTuple):
         return len(hull) > 0 and cv2.pointPolygonTest(cv2.convexHull(hull), self.at, measureDist=False) >= 0
 
 
-def find_rim(frame: Frame, depth_m: DepthMetres, x_px: float, y_px: float) -> Rim | None:
-    """Rim of the hole at a pixel of a frame's colour image; None where depth was measured, or only an outline lacks it."""
-    params, (height, width) = tuned(Params), depth_m.shape
-    column, row = int(x_px * width / frame.rgb_camera.width), int(y_px * height / frame.rgb_camera.height)
-    if depth_m[row, column] > 0:
+def find_hole(frame: Frame, depth_m: DepthMetres, x_px: float, y_px: float) -> Mask | None:
+    """Hole in a depth image at a pixel of its colour image; None where depth was measured, or only an outline lacks it."""
+    params, (column, row) = tuned(Params), _depth_pixel(frame, depth_m, x_px, y_px)
+    height, width = depth_m.shape
+    if not (0 <= column < width and 0 <= row < height) or depth_m[row, column] > 0:
         return None
     unknown = cv2.morphologyEx(
         (depth_m == 0).astype(np.uint8), cv2.MORPH_OPEN, np.ones((params.thin_px, params.thin_px), np.uint8)
@@ -48,9 +48,22 @@ def find_rim(frame: Frame, depth_m: DepthMetres, x_px: float, y_px: float) -> Ri
     if not unknown[row, column]:
         return None
     _, labels = cv2.connectedComponents(unknown)
-    hole = labels == labels[row, column]
-    wide = cv2.dilate(hole.astype(np.uint8), np.ones((params.about_px, params.about_px), np.uint8)) > 0
+    return np.asarray(labels == labels[row, column])
+
+
+def find_rim(frame: Frame, depth_m: DepthMetres, x_px: float, y_px: float) -> Rim | None:
+    """Rim of the hole at a pixel of a frame's colour image; None where there is no hole."""
+    hole, about_px = find_hole(frame, depth_m, x_px, y_px), tuned(Params).about_px
+    if hole is None:
+        return None
+    wide = cv2.dilate(hole.astype(np.uint8), np.ones((about_px, about_px), np.uint8)) > 0
     rows, columns = np.nonzero(wide & ~hole & (depth_m > 0))
     pixels = np.stack([columns, rows], axis=1)
     seen = unproject(pixels + 0.5, depth_m[rows, columns].astype(np.float64), frame.depth_camera)
-    return Rim((column, row), pixels, frame.world_from_camera.apply(seen))
+    return Rim(_depth_pixel(frame, depth_m, x_px, y_px), pixels, frame.world_from_camera.apply(seen))
+
+
+def _depth_pixel(frame: Frame, depth_m: DepthMetres, x_px: float, y_px: float) -> tuple[int, int]:
+    """Column and row in the depth image of a pixel of the colour image."""
+    height, width = depth_m.shape
+    return int(x_px * width / frame.rgb_camera.width), int(y_px * height / frame.rgb_camera.height)

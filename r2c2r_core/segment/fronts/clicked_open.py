@@ -1,5 +1,6 @@
 """Clicks on a front that stands open in the clicked frame, mapped back to where that front is closed."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,12 +9,16 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.rectangle import TOWARDS
+from r2c2r_core.segment.fronts.clicked_dark import best_frames, dark_beyond, dark_frames
 from r2c2r_core.segment.fronts.front import Front
-from r2c2r_core.segment.motion.hypotheses import Hypothesis, hypotheses
+from r2c2r_core.segment.fronts.units import unit_cell
+from r2c2r_core.segment.motion.filmed import Params as FilmedParams
+from r2c2r_core.segment.motion.hypotheses import USUAL_WAYS, Hypothesis, hypotheses
 from r2c2r_core.segment.motion.leaf import Leaf, face_points
 from r2c2r_core.segment.motion.likelihood import evidence, lay_out
 from r2c2r_core.segment.motion.track import Params as TrackParams
-from r2c2r_core.segment.planes import regions_at
+from r2c2r_core.segment.planes import PlaneRegion, regions_at
 from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -75,11 +80,12 @@ def closed_place(prepared: PreparedCapture, point: Vector3, frame_index: int, ca
     if not opened:
         return point
     held = [_explained(_in_all(leaf, each, scene)) for leaf in leaves if _holds(leaf, point) for each in _ways(leaf)]
-    best, place = max(held, default=0.0), point
+    closed, best, place = max(held, default=0.0), tuned(TrackParams).gain, point
     for leaf, hypothesis, state, closed_point in opened:
         log = _in_all(leaf, hypothesis, scene)
-        if _explained(log) > best and _opens_by(log) > tuned(TrackParams).gain and _is_free(log, state):
-            best, place = _explained(log), closed_point
+        gain = _opens_by(log) + (tuned(FilmedParams).usual if hypothesis.way in USUAL_WAYS.get(category.opens, ()) else 0.0)
+        if _explained(log) > closed and gain > best and _is_free(log, state):
+            best, place = gain, closed_point
     return place
 
 
@@ -107,9 +113,28 @@ def _leaves_near(prepared: PreparedCapture, point: Vector3, category: Category) 
         if category.kind == "appliance":
             faces = (Leaf.of(region.bounds), *leaves)
             leaves = [leaf for leaf in faces if category.width.allows(leaf.width_m) and category.height.allows(leaf.height_m)]
+        if category.one_front:
+            leaves += _dark_units(prepared, region, point, category)
         leaves = [leaf for leaf in leaves if min(leaf.width_m, leaf.height_m) > tuned(Params).least_m]
         found += [leaf for leaf in leaves if np.linalg.norm(leaf.centre - point) < reach]
     return found
+
+
+def _dark_units(prepared: PreparedCapture, region: PlaneRegion, point: Vector3, category: Category) -> Iterator[Leaf]:
+    """Units of black glass on a plane that would reach a point if opened by about a right angle."""
+    local = region.world_from_plane.inverse.apply(point)
+    for way in USUAL_WAYS.get(category.opens, ()):
+        hinge = next((towards for side, towards in TOWARDS.items() if side == way), np.zeros(3))
+        place = region.world_from_plane.apply(local * [1, 0, 1] + local[1] * hinge)
+        frames = dark_frames(prepared.scene, region, place, best_frames(prepared.scene, place))
+        beyond_m = dark_beyond(prepared.scene, region, place, frames, category)
+        run = prepared.run_of(region, margin_m=beyond_m) if frames else None
+        if run is None:
+            continue
+        column, row = run.grid.cells_of(place[None])[0].tolist()
+        cell = unit_cell(run, column, row, category)
+        if cell is not None:
+            yield Leaf.of(Front(run, cell, None, 0.0).rectangle)
 
 
 def _has_unit(leaf: Leaf, scene: Scene, category: Category) -> bool:

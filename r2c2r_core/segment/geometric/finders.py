@@ -1,5 +1,6 @@
 """Clicks to an object: the method of the category first (front, appliance, free-standing), then the one the scan suggests."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from r2c2r_core.segment.appliances.find import appliance_front
 from r2c2r_core.segment.appliances.fit import FittedBox, fit_box
 from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
-from r2c2r_core.segment.fronts.clicked_dark import dark_beyond, dark_place
+from r2c2r_core.segment.fronts.clicked_dark import best_frames, dark_beyond, dark_frames, dark_place
 from r2c2r_core.segment.fronts.clicked_open import closed_place, was_moved
 from r2c2r_core.segment.fronts.drawer_at import drawer_at
 from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
@@ -48,9 +49,8 @@ def find_object(
     """
     if category.kind == "front":
         closed = [closed_place(prepared, p, c.frame, category) for p, c in zip(positives.points, positives.clicks, strict=True)]
-        first = positives.clicks[0]
-        glass = None if dark_place(prepared.scene, prepared.planes, first) is None else first
-        found = _front(prepared, category, np.array(closed), negatives.points, others, glass)
+        dark_in = _may_be_dark(prepared, positives, closed[0])
+        found = _front(prepared, category, np.array(closed), negatives.points, others, dark_in)
         if found is not None:
             return found
     if category.kind == "appliance":
@@ -116,16 +116,15 @@ def _front(
     positives: Points,
     negatives: Points,
     others: Points,
-    glass: PromptPoint | None = None,
+    dark_in: Sequence[int] = (),
 ) -> FoundFront | None:
     """Front on the nearest plane where its size fits its category, else on the nearest: at a corner, two planes are near.
 
-    `glass` is the first click where it has no depth: it then lies outside its plane's observed part, which may extend there.
+    `dark_in` are frames that may lack depth at the first click: it then lies beyond its plane's observed part.
     """
     best: Front | None = None
-    for region in regions_at(prepared.planes, positives[0], beside_m=None if glass is None else category.longest_m):
-        dark_m = 0.0 if glass is None else dark_beyond(prepared.scene, region, glass, positives[0], category)
-        run = prepared.run_of(region, margin_m=dark_m)
+    for region, frames in _planes_at(prepared, positives[0], dark_in, category):
+        run = prepared.run_of(region, margin_m=dark_beyond(prepared.scene, region, positives[0], frames, category))
         front = None
         if run is not None:
             front = find_front(run, positives, negatives, pair=category.may_be_pair, kind=category, others=others)
@@ -139,6 +138,27 @@ def _front(
     best = replace(best, sides=seen_sides(best, prepared.scene))
     slides = sliding_chance(best, prepared.planes) if category.opens == "side" else 0.0
     return FoundFront(best, prepared.scene, category, fit=_fit(best, category), slides=slides)
+
+
+def _may_be_dark(prepared: PreparedCapture, positives: Hits, closed: Vector3) -> Sequence[int]:
+    """Frames that may lack depth at the first click: the clicked one, or those that show the closed place of an open front."""
+    first, scene = positives.clicks[0], prepared.scene
+    if dark_place(scene, prepared.planes, first) is not None:
+        return (first.frame,)
+    if closed is positives.points[0]:
+        return ()
+    return best_frames(scene, closed)
+
+
+def _planes_at(
+    prepared: PreparedCapture, point: Vector3, dark_in: Sequence[int], category: Category
+) -> Iterator[tuple[PlaneRegion, tuple[int, ...]]]:
+    """Planes that a point may lie on, the likeliest first, each with the frames of black glass that it surrounds."""
+    near = regions_at(prepared.planes, point)
+    for region in regions_at(prepared.planes, point, beside_m=category.longest_m) if dark_in else near:
+        frames = dark_frames(prepared.scene, region, point, dark_in)
+        if frames or any(region is each for each in near):
+            yield region, frames
 
 
 def _fit(front: Front, category: Category) -> float:

@@ -1,15 +1,15 @@
 """Leaves of one object in the recording: their observed motions, estimated once, and their poses where they stand open."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.kitchen.category import Category, Opening
+from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.motion import DOOR, DRAWER, JointMotion
-from r2c2r_core.segment.motion.hypotheses import Way
+from r2c2r_core.segment.motion.hypotheses import USUAL_WAYS, Way
 from r2c2r_core.segment.motion.inside import Params as InsideParams
 from r2c2r_core.segment.motion.inside import front_thickness, measure_inside
 from r2c2r_core.segment.motion.leaf import Leaf, OpenLeaf
@@ -30,14 +30,6 @@ class Params:
         source="few frames overrule it: each carries up to 80",
     )
     beyond_m: float = param(0.05, "m", "Maximum excess of a unit's depth over the expected one: usual depths differ by as much")
-
-
-_USUAL: Mapping[Opening, tuple[Way, ...]] = {
-    "drawer": ("out",),
-    "side": ("left", "right"),
-    "bottom": ("bottom",),
-    "sideways": ("slides_left", "slides_right"),
-}
 
 
 @dataclass(slots=True, eq=False)
@@ -86,7 +78,7 @@ class FilmedLeaves:
         for seam_m in self.seams_m:
             half_w, half_h = self.whole.half_m
             below, above = (self.whole.part((-half_w, half_w), ends) for ends in ((-half_h, seam_m), (seam_m, half_h)))
-            drawer = self._looked_for(DRAWER, below, _USUAL["drawer"])
+            drawer = self._looked_for(DRAWER, below, USUAL_WAYS["drawer"])
             if drawer[1] is not None:
                 return [
                     drawer,
@@ -162,7 +154,7 @@ def _leaves(whole: Leaf, category: Category) -> list[tuple[str, Leaf, tuple[Way,
     if category.opens in ("fixed", "rigid") or category.several_fronts:  # only handles show where one of several fronts ends
         return []
     if category.opens != "pair":
-        return [("", whole, _USUAL[category.opens])]
+        return [("", whole, USUAL_WAYS[category.opens])]
     half_w, half_h = whole.half_m
     left, right = (whole.part(ends, (-half_h, half_h)) for ends in ((-half_w, 0.0), (0.0, half_w)))
     return [("left", left, ("left",)), ("right", right, ("right",))]

@@ -1,5 +1,6 @@
 """Joint hypotheses of a leaf, each a one-parameter family of poses over its state."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -8,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3, joint_transform
+from r2c2r_core.kitchen.category import Opening
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.rectangle import HINGE_AXES, TOWARDS
 from r2c2r_core.segment.motion.leaf import Leaf
@@ -15,6 +17,14 @@ from r2c2r_core.tuning import param, tuned
 
 Way = HingeSide | Literal["out", "slides_left", "slides_right"]
 """The edge that it hangs on, as a person facing the closed front sees it; out of its unit; or along its own plane."""
+
+USUAL_WAYS: Mapping[Opening, tuple[Way, ...]] = {
+    "drawer": ("out",),
+    "side": ("left", "right"),
+    "bottom": ("bottom",),
+    "sideways": ("slides_left", "slides_right"),
+}
+"""Ways in which the front of a category opens; the doors of a pair are leaves of their own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ import pytest
 
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import PromptPoint
-from r2c2r_core.segment.fronts.clicked_dark import dark_beyond, dark_place
+from r2c2r_core.segment.fronts.clicked_dark import dark_beyond, dark_frames, dark_place
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
 from tests.core.segment.motion.boards import LEAF, THICKNESS_M, filmed
@@ -99,10 +99,22 @@ def test_black_glass_between_two_coplanar_regions_lies_on_their_plane() -> None:
     assert abs(LEAF.world_from_front.inverse.apply(place[None])[0, 1]) < 1e-6
 
 
-def test_a_front_extends_beyond_its_plane_only_over_missing_depth() -> None:
+def test_a_front_extends_beyond_its_plane_as_far_as_the_hole_in_the_depth() -> None:
     glass, wood = (cast(Scene, Film(glass=shown)) for shown in (True, False))
-    under = ABOVE.world_from_plane.apply(np.array([0.0, 0.0, -ABOVE.height_m / 2]))  # its lower border
-    oven = category_of("oven")
-    assert oven is not None
-    assert dark_beyond(glass, ABOVE, CLICK, under, oven) >= oven.height.usual
-    assert dark_beyond(wood, ABOVE, CLICK, under, oven) == 0.0
+    middle, oven = LEAF.centre, category_of("oven")
+    beyond_m = dark_beyond(glass, ABOVE, middle, (CLICK.frame,), oven)
+    assert LEAF.height_m - 0.02 < beyond_m < LEAF.height_m + 0.1
+    assert dark_beyond(wood, ABOVE, middle, (CLICK.frame,), oven) == 0.0
+
+
+def test_a_front_extends_no_farther_than_its_category() -> None:
+    microwave, point = category_of("microwave"), LEAF.world_from_front.apply(np.array([0.0, 0.0, 0.2]))
+    beyond_m = dark_beyond(cast(Scene, Film(glass=True)), ABOVE, point, (CLICK.frame,), microwave)
+    assert 0 < beyond_m < 0.1 + microwave.height.usual + 0.1 < LEAF.height_m
+
+
+def test_black_glass_is_looked_for_on_the_plane_that_surrounds_it() -> None:
+    glass, wood = (cast(Scene, Film(glass=shown)) for shown in (True, False))
+    assert dark_frames(glass, FACE, LEAF.centre, (CLICK.frame,)) == (CLICK.frame,)
+    assert dark_frames(glass, REAR, LEAF.centre, (CLICK.frame,)) == ()
+    assert dark_frames(wood, FACE, LEAF.centre, (CLICK.frame,)) == ()

@@ -10,10 +10,13 @@ import pytest
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.category import Size
 from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.segment.fronts import clicked_open
 from r2c2r_core.segment.fronts.clicked_open import closed_place
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.prepared import PreparedCapture
-from tests.core.segment.motion.boards import LEAF, filmed, joint
+from tests.core.segment.fronts.test_clicked_dark import FACE
+from tests.core.segment.motion.boards import LEAF, THICKNESS_M, filmed, joint
 
 STATES = np.concatenate([np.zeros(20), np.full(8, np.radians(80.0))])
 CLICKED = 24  # a frame in which it is open
@@ -51,3 +54,21 @@ def test_a_click_on_an_open_door_is_mapped_to_the_place_before_its_compartment(p
 def test_a_click_on_a_closed_door_stays_where_it_is(prepared: PreparedCapture) -> None:
     point = LEAF.world_from_front.apply(np.array([0.1, 0.0, 0.05]))
     assert closed_place(prepared, point, 3, BOX) is point
+
+
+FLAP_STATES = np.concatenate([np.zeros(20), np.full(8, np.radians(85.0))])
+
+
+def test_a_click_on_an_open_oven_is_mapped_to_its_black_glass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The closed face returns no depth, so no panel of the run has its size: it is found by the hole in the depth."""
+    film = filmed("bottom", FLAP_STATES, glass=True)
+    scene = SimpleNamespace(frames=film.frames, frame=lambda k: film.frames[k], depth=film.depth, noise=film.noise)
+    grid = SimpleNamespace(cells_of=lambda points: points[:, :2], rectangle=lambda cell: LEAF)
+    run = SimpleNamespace(grid=grid, cells=(), region=FACE)
+    prepared = cast(PreparedCapture, cast(Any, SimpleNamespace(scene=scene, planes=(FACE,), run_of=lambda *_, **__: run)))
+    monkeypatch.setattr(clicked_open, "best_frames", lambda *_: range(8))
+    monkeypatch.setattr(clicked_open, "unit_cell", lambda *_: Cell(0, 0, 1, 1))
+    on_leaf = np.array([0.1, THICKNESS_M, 0.05])  # on its inner face
+    flap = LEAF.world_from_front @ joint("bottom").pose(float(FLAP_STATES[CLICKED]))
+    closed = closed_place(prepared, flap.apply(on_leaf), CLICKED, category_of("oven"))
+    assert LEAF.world_from_front.inverse.apply(closed)[[0, 2]] == pytest.approx(on_leaf[[0, 2]], abs=0.04)
