@@ -1,6 +1,6 @@
 """Accuracy of joints in ten kitchens of two generators, filmed while fronts are opened, from one click per object.
 
-    python benchmarks/opened.py --second PATH/make_kitchen.py --workdir DIR [--only ours-26 second-105] [--frames F]
+    python benchmarks/opened.py --second PATH/make_kitchen.py --workdir DIR [--only ours-27 second-106] [--frames F]
                                 [--size WxH] [--again] [--json FILE]
 
 Each kitchen is drawn into DIR/<name> and taken through `r2c2r run`, `check` and `evaluate`; existing results are kept, so that
@@ -34,9 +34,12 @@ OURS = {
     "ours-24": (24, "island"),
     "ours-25": (25, "galley"),
     "ours-26": (26, "l"),
+    "ours-27": (27, "straight"),
+    "ours-28": (28, "island"),
 }
-SECOND = {f"second-{seed}": seed for seed in range(100, 106)}
-FURTHER = ("ours-26", "second-105")  # only on request: the other ten have been looked at while the code was written
+SECOND = {f"second-{seed}": seed for seed in range(100, 108)}
+FURTHER = ("ours-26", "ours-27", "ours-28", "second-105", "second-106", "second-107")
+"""Drawn only on request: the other ten have been looked at while the code was written."""
 _HERE = Path(__file__).resolve().parent
 Rows = dict[str, dict[str, Any]]
 
