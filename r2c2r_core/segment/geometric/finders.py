@@ -123,8 +123,8 @@ def _front(
     `dark_in` are frames that may lack depth at the first click: it then lies beyond its plane's observed part.
     """
     best: Front | None = None
-    for region, frames in _planes_at(prepared, positives[0], dark_in, category):
-        run = prepared.run_of(region, margin_m=dark_beyond(prepared.scene, region, positives[0], frames, category))
+    for region, dark_m in _planes_at(prepared, positives[0], dark_in, category):
+        run = prepared.run_of(region, margin_m=dark_m)
         front = None
         if run is not None:
             front = find_front(run, positives, negatives, pair=category.may_be_pair, kind=category, others=others)
@@ -152,13 +152,16 @@ def _may_be_dark(prepared: PreparedCapture, positives: Hits, closed: Vector3) ->
 
 def _planes_at(
     prepared: PreparedCapture, point: Vector3, dark_in: Sequence[int], category: Category
-) -> Iterator[tuple[PlaneRegion, tuple[int, ...]]]:
-    """Planes that a point may lie on, the likeliest first, each with the frames of black glass that it surrounds."""
+) -> Iterator[tuple[PlaneRegion, float]]:
+    """Planes that a point may lie on, the likeliest first, each with the width of the black glass beyond its border, metres."""
     near = regions_at(prepared.planes, point)
-    for region in regions_at(prepared.planes, point, beside_m=category.longest_m) if dark_in else near:
+    if not dark_in:
+        yield from ((region, 0.0) for region in near)
+        return
+    for region in regions_at(prepared.planes, point, beside_m=category.longest_m):
         frames = dark_frames(prepared.scene, region, point, dark_in)
         if frames or any(region is each for each in near):
-            yield region, frames
+            yield region, dark_beyond(prepared.scene, region, point, frames, category)
 
 
 def _fit(front: Front, category: Category) -> float:
