@@ -145,7 +145,7 @@ def _may_be_dark(prepared: PreparedCapture, positives: Hits, closed: Vector3) ->
     first, scene = positives.clicks[0], prepared.scene
     if dark_place(scene, prepared.planes, first) is not None:
         return (first.frame,)
-    if closed is positives.points[0]:
+    if np.array_equal(closed, positives.points[0]):
         return ()
     return best_frames(scene, closed)
 

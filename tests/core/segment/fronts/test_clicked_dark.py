@@ -1,16 +1,22 @@
 """Clicks on fronts without depth returns."""
 
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from r2c2r_core.kitchen.names import category_of
+from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import PromptPoint
 from r2c2r_core.segment.fronts.clicked_dark import dark_beyond, dark_frames, dark_place
+from r2c2r_core.segment.geometric import finders
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.stage import open_session
+from tests.core.segment.conftest import Truth
 from tests.core.segment.motion.boards import LEAF, THICKNESS_M, filmed
+from tests.core.segment.scenes import FRONT_Y, click_on, prompt
 
 WIDTH_M, HEIGHT_M = 1.7, 0.9
 
@@ -118,3 +124,11 @@ def test_black_glass_is_looked_for_on_the_plane_that_surrounds_it() -> None:
     assert dark_frames(glass, FACE, LEAF.centre, (CLICK.frame,)) == (CLICK.frame,)
     assert dark_frames(glass, REAR, LEAF.centre, (CLICK.frame,)) == ()
     assert dark_frames(wood, FACE, LEAF.centre, (CLICK.frame,)) == ()
+
+
+def test_black_glass_is_not_looked_for_where_a_closed_front_has_depth(
+    boxes: tuple[Capture, Truth], cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(finders, "best_frames", lambda *_: pytest.fail("searched other frames for black glass"))
+    door = prompt("a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60))
+    assert open_session(boxes[0], cache).panel(door) is not None
