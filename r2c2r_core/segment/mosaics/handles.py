@@ -8,6 +8,7 @@ import numpy as np
 from r2c2r_core.calibration import probability
 from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.relief import Params as ReliefParams
 from r2c2r_core.segment.mosaics.relief import Relief
 from r2c2r_core.tuning import param, tuned
 
@@ -65,7 +66,10 @@ def find_handle(odds: PanelOdds, relief: Relief, cell: Cell) -> GridHandle | Non
     closed = cv2.morphologyEx(likely, cv2.MORPH_CLOSE, np.ones((size, size), np.uint8))
     labels = np.where(likely > 0, cv2.connectedComponents(closed)[1], 0)
     inside = labels == np.bincount(labels.ravel(), np.maximum(panel, 0).ravel()).argmax()
-    rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+    rows, columns = _extent(inside)
+    if min(np.ptp(rows), np.ptp(columns)) + 1 > round(tuned(ReliefParams).handle_thick_m / relief.cell_m):  # print as well
+        inside = (likely > 0) & _likeliest_rectangle(panel)
+        rows, columns = _extent(inside)
     raised = (relief.count * relief.raised)[area]
     lift_m = float(np.average(relief.lift_m[area][inside], weights=raised[inside])) if raised[inside].any() else 0.0
     down, across = _shift(raised, rows, columns, round(params.parallax_m / relief.cell_m))
@@ -77,6 +81,27 @@ def find_handle(odds: PanelOdds, relief: Relief, cell: Cell) -> GridHandle | Non
         protrusion_m=lift_m,
         confidence=probability(float(panel[inside].mean())),
     )
+
+
+def _extent(inside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns with cells of a mask."""
+    return np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+
+
+def _likeliest_rectangle(odds: np.ndarray) -> np.ndarray:
+    """Maximum-likelihood rectangle of a handle, as a mask: the largest sum of log-odds, as of independent cells."""
+    sums = np.pad(odds.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    rows, best, mask = np.flatnonzero((odds > 0).any(axis=1)), -np.inf, np.zeros(odds.shape, dtype=bool)
+    for top in rows:
+        bottoms = rows[rows >= top] + 1
+        band = sums[bottoms] - sums[top]  # sums from the left end up to each column
+        gains = band - np.minimum.accumulate(band, axis=1)
+        bottom, right = np.unravel_index(gains.argmax(), gains.shape)
+        if gains[bottom, right] > best:
+            best, left = gains[bottom, right], band[bottom, : right + 1].argmin()
+            mask[:] = False
+            mask[top : bottoms[bottom], left:right] = True
+    return mask
 
 
 def _shift(raised: np.ndarray, rows: np.ndarray, columns: np.ndarray, reach: int) -> tuple[float, float]:

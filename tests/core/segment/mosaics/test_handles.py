@@ -70,3 +70,11 @@ def test_a_handle_centre_is_not_biased_to_the_end_with_more_depth() -> None:
     handle = find_handle(odds, relief, PANEL)
     assert handle is not None
     assert (handle.left + handle.right) / 2 == 46 * STEP
+
+
+def test_a_bar_among_printed_marks_is_found_by_its_likelihood() -> None:
+    """The marks of a microwave's keypad are within the gap between parts of one handle, but no handle is that thick."""
+    bar, marks = (slice(30, 60), slice(40, 43)), [(slice(row, row + 2), slice(48, 60)) for row in range(20, 70, 6)]
+    handle = find_handle(*found((*bar, 2.0), *((*mark, 1.5) for mark in marks), raised=bar), PANEL)
+    assert handle is not None
+    assert (handle.left, handle.right, handle.top, handle.bottom) == (40 * STEP, 43 * STEP, 30 * STEP, 60 * STEP)
