@@ -23,6 +23,7 @@ from r2c2r_core.segment.planes import PlaneRegion, region_along, regions_at
 from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.runs.run import Run
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.thing import Params as ThingParams
 from r2c2r_core.segment.things.thing import ThingConfig, support_height
 from r2c2r_core.tuning import param, tuned
 
@@ -79,12 +80,13 @@ def appliance_front(
     off = run.grid.cells_of(near_plane(run.grid, negatives))
     past = looked_past(run, prepared.scene, on[0], kind)
     beside = run.grid.cells_of(near_plane(run.grid, others))
-    cell = _rectangle(run, on, off, beside, kind, past, _support_row(prepared, run, point, kind))
+    support_row = _support_row(prepared, run, point, kind)
+    cell = _rectangle(run, on, off, beside, kind, past, support_row)
     if cell is None:
         return None
     surface = surface_of(run.mosaic, run.relief, run.seams)
     cell = panel_edges(cell, surface, run.grid.cell_m).panel
-    handle = None if glimpse else find_handle(run.odds, run.relief, cell)
+    handle = None if glimpse else find_handle(run.odds, run.relief, _above(cell, support_row, run.grid.cell_m))
     front = Front(run, cell, handle, kind.depth.usual)
     wall = depth_behind(front, prepared.scene.capture.room, kind).wall_m
     fitted = fit_box(front, prepared.scene, kind, wall, photographs=not glimpse)
@@ -119,6 +121,13 @@ def _support_row(prepared: PreparedCapture, run: Run, point: Vector3, kind: Cate
         return None
     row = float(run.grid.cells_of(np.array([[point[0], point[1], support]]))[0, 1])
     return row if row < run.grid.rows else None
+
+
+def _above(cell: Cell, support_row: float | None, cell_m: float) -> Cell:
+    """Part of a front that is clear of its support."""
+    if support_row is None:
+        return cell
+    return replace(cell, bottom=min(cell.bottom, support_row - tuned(ThingParams).clearance_m / cell_m))
 
 
 def _nudged(cell: Cell, on: np.ndarray, off: np.ndarray, cell_m: float) -> Cell:
