@@ -12,9 +12,13 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.motion import DRAWER, Inside, JointMotion, JointType, Source
 from r2c2r_core.model.rectangle import HINGE_AXES, TOWARDS
+from r2c2r_core.model.scene import Box
 from r2c2r_core.synthesize.dimensions import MeasuredObject
-from r2c2r_core.synthesize.fixtures.spec import Below, Motion
+from r2c2r_core.synthesize.fixtures.carcass import Params as BoardParams
+from r2c2r_core.synthesize.fixtures.spec import Below, Motion, Part
 from r2c2r_core.tuning import param, tuned
+
+_DEPTH = np.array([0.0, 1.0, 0.0])  # into the furniture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,18 +123,39 @@ def as_filmed(motion: Motion, found: JointMotion | None, placed_pose: Rigid3) ->
     known = np.diag([params.face_rad**2] * 3 + [params.hinge_m**2] * 3)
     distance = float(np.sqrt(off @ np.linalg.inv(measured + known) @ off))
     if distance > params.same_line:
-        return replace(motion, axis_object=axis, origin_object=motion.origin_object + shift)
+        clear = _clearing(shift, motion.axis_object)
+        return replace(motion, axis_object=axis, origin_object=motion.origin_object + clear)
     mean = known[3:, 3:] @ np.linalg.inv(measured[3:, 3:] + known[3:, 3:]) @ shift
     return replace(motion, origin_object=motion.origin_object + _clearing(mean, motion.axis_object))
 
 
 def _clearing(shift: Vector3, axis: Vector3) -> Vector3:
     """A hinge's shift from its leaf's edge (object frame), limited in depth so that the edge swings clear of its neighbours."""
-    depth = np.array([0.0, 1.0, 0.0])
-    inwards = max(float(shift @ np.cross(-depth, axis)), 0.0)
+    inwards, depth = max(float(shift @ np.cross(-_DEPTH, axis)), 0.0), float(shift @ _DEPTH)
     spare = tuned(Params).spare_m
     deepest = np.sqrt((inwards + spare) ** 2 - inwards**2)
-    return shift - depth * max(float(shift @ depth) - deepest, 0.0)
+    return shift - _DEPTH * max(depth - deepest, 0.0)
+
+
+def swinging_clear(leaf: Part, edge: Vector3, motion: Motion) -> Part:
+    """A hinged leaf, its boards as much thinner as their rear edge needs to swing clear of the carcass.
+
+    `edge` is a point of the leaf's outer edge on the hinge's side (object frame). Boards keep a front's minimum thickness.
+    """
+    shift = motion.origin_object - edge
+    inwards, depth = float(shift @ np.cross(-_DEPTH, motion.axis_object)), float(shift @ _DEPTH)
+    if motion.type != "revolute" or inwards <= 0:
+        return leaf
+
+    def thinner(board: Box) -> Box:
+        reach = float(board.size_m[1]) + tuned(Params).spare_m - depth  # of the rear edge when it passes the carcass
+        fits = depth + np.sqrt(max(reach**2 - inwards**2, 0.0))
+        excess = float(board.size_m[1]) - max(fits, tuned(BoardParams).thinnest_front_m)
+        cut = _DEPTH * max(excess, 0.0)
+        place = replace(board.link_from_box, translation=board.link_from_box.translation - cut / 2)
+        return replace(board, size_m=board.size_m - cut, link_from_box=place) if board.role == "front" else board
+
+    return replace(leaf, boxes=tuple(thinner(board) for board in leaf.boxes))
 
 
 def opening(motion: Motion, found: JointMotion | None, most: float) -> tuple[float, Source]:

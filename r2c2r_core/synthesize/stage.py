@@ -23,7 +23,16 @@ from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.schema.settings import setting, tuned_numbers
 from r2c2r_core.synthesize.contents import in_drawers
 from r2c2r_core.synthesize.dimensions import BoxSearch, MeasuredObject, measure_object
-from r2c2r_core.synthesize.filmed import as_filmed, drawer_below, filmed, inside_seen, opened_as, opening, widest
+from r2c2r_core.synthesize.filmed import (
+    as_filmed,
+    drawer_below,
+    filmed,
+    inside_seen,
+    opened_as,
+    opening,
+    swinging_clear,
+    widest,
+)
 from r2c2r_core.synthesize.fixtures.boards import Boards
 from r2c2r_core.synthesize.fixtures.carcass import CARCASSES, CarcassBuilder
 from r2c2r_core.synthesize.fixtures.spec import Build, Motion, Order, Part
@@ -169,7 +178,9 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
         )
         for motion in build.motions
     }
+    edges = {motion.part: motion.origin_object for motion in build.motions}
     motions = {motion.part: as_filmed(motion, seen[motion.part], item.placed_pose) for motion in build.motions}
+    movers = [swinging_clear(part, edges[part.name], motions[part.name]) for part in movers]
     links = [_link(item.name, base, np.zeros(3))]
     links += [_link(item.name, part, _link_origin(motions[part.name])) for part in movers]
     said, unheard = _limits_said(item.name, list(motions), override)

@@ -292,6 +292,22 @@ def test_a_hinge_filmed_near_the_edge_is_placed_so_that_the_leaf_clears() -> Non
     assert np.hypot(inwards, behind) - inwards < 0.0011
 
 
+def test_a_leaf_is_thinned_so_that_it_swings_clear_of_its_carcass() -> None:
+    """The rear edge of an 18 mm leaf that turns about a line 11 mm inside its edge would swing 3 mm into the carcass."""
+    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
+    assert track.front is not None
+    place = track.front.world_from_front
+    inside = Rigid3(place.rotation, place.apply(np.array([0.012, 0.002, 0.0])))
+    track = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
+    scene = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
+    item = scene.objects[0]
+    assert item.joints[0].origin_object[0] + item.dimensions_m[0] / 2 > 0.008
+    model = compile_scene(scene)
+    assert max(sweep(scene, model).values()) < 5e-4
+    assert min(reached(scene, model).values()) > 0.98
+
+
 def test_inner_depth_and_shelves_observed_behind_a_front_are_built() -> None:
     """Unobserved values are the category's defaults and are marked as such."""
     made = {}
