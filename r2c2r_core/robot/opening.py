@@ -44,6 +44,7 @@ class Measured:
     force_n: float = 0.0  # maximum base force while moving the joint
     held: float = 0.0  # fraction of the time from squeeze to release with a pad in contact with the part
     touched: dict[int, float] = field(default_factory=dict)  # other bodies touched: body, maximum force in N
+    jams: dict[int, float] = field(default_factory=dict)  # fixtures that the part meets as it opens: body, maximum force in N
     seconds: float = 0.0  # simulated
 
 
@@ -51,6 +52,7 @@ def attempt(rig: Rig, travel: Travel, way: Way, watch: Watch | None = None) -> M
     """Open and close the joint from the rig's reset state; the scene is left in its final state."""
     measured, held_at, moving, contacts = Measured(), None, 0, 0
     first = way.presses or way.opens
+    leaf, fixtures = _geoms_of(rig, travel.part.body), _fixtures(rig)
     rig.put(first.world_from_tool(travel, 0.0, BACK_M), first.wide_m)
     for command in commands(rig, travel, way):
         rig.command(command.pose, command.width_m)
@@ -67,6 +69,9 @@ def attempt(rig: Rig, travel: Travel, way: Way, watch: Watch | None = None) -> M
                 measured.reach_m = float(np.linalg.norm(at - way.opens.body_from_tool.translation))
             measured.slip_m = max(measured.slip_m, float(np.linalg.norm(at - held_at)))
             measured.opened = max(measured.opened, share)
+            for pull in rig.contacts_of(leaf):
+                if pull.body in fixtures:
+                    measured.jams[pull.body] = max(measured.jams.get(pull.body, 0.0), pull.force_n)
         if command.phase in ("open", "close"):
             measured.force_n = max(measured.force_n, rig.base_force_n)
             moving, contacts = moving + 1, contacts + touching
@@ -155,6 +160,16 @@ def _touches(rig: Rig, part: int, measured: Measured) -> bool:
         else:
             measured.touched[pull.body] = max(measured.touched.get(pull.body, 0.0), pull.force_n)
     return touching
+
+
+def _geoms_of(rig: Rig, body: int) -> frozenset[int]:
+    return frozenset(np.flatnonzero(rig.model.geom_bodyid == body).tolist())
+
+
+def _fixtures(rig: Rig) -> frozenset[int]:
+    """Bodies that neither move freely nor belong to the robot."""
+    robot = {int(rig.model.geom_bodyid[geom]) for geom in rig.own}
+    return frozenset(body for body in range(rig.model.nbody) if rig.model.body_dofnum[body] < 6 and body not in robot)
 
 
 def reset(rig: Rig) -> None:

@@ -23,10 +23,10 @@ _AXES = ("x", "y", "z", "yaw", "pitch", "roll")
 
 
 class Pull(NamedTuple):
-    """One contact of the gripper."""
+    """One contact of the gripper, or of a part."""
 
     body: int  # touched body; 0 is the world
-    geom: int  # of the gripper
+    geom: int  # of the gripper or the part
     force_n: float
 
 
@@ -86,13 +86,17 @@ class Rig(ABC):
 
     def pulls(self) -> Iterator[Pull]:
         """Current contacts of the robot."""
+        return self.contacts_of(self.own)
+
+    def contacts_of(self, own: frozenset[int]) -> Iterator[Pull]:
+        """Current contacts of some geoms with all others."""
         import mujoco
 
         force = np.zeros(6)
         pairs: list[tuple[int, int]] = self.data.contact.geom[: self.data.ncon].tolist()  # quicker to look up than NumPy's
         for number, (a, b) in enumerate(pairs):
-            if (a in self.own) != (b in self.own):
-                mine, other = (a, b) if a in self.own else (b, a)
+            if (a in own) != (b in own):
+                mine, other = (a, b) if a in own else (b, a)
                 mujoco.mj_contactForce(self.model, self.data, number, force)
                 yield Pull(int(self.model.geom_bodyid[other]), mine, math.sqrt(force[:3].dot(force[:3])))
 

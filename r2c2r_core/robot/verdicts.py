@@ -1,5 +1,6 @@
 """Diagnosis of a failed gripper trial: a sentence and the cause."""
 
+from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 from r2c2r_core.robot.grasps import Way, body_words
@@ -53,18 +54,25 @@ def verdict_on(model: Any, travel: Travel, way: Way, measured: Measured) -> Verd
         name = body_words(model, obstacle)
         blame: Blame = "scan" if obstacle == 0 else "world"
         return Verdict(f"blocked by {name}: the gripper collides with it; {done}", blame)
+    if measured.opened < OPEN_SHARE and (jam := _most(measured.jams)) is not None:
+        return Verdict(f"its part hits {body_words(model, jam)} as it opens; {done}", "scan")
     if not measured.reach_m <= _REACHED_M:
         return Verdict(f"not reached: the fingers close {1000 * measured.reach_m:.0f} mm beside the handle; {done}", "gripper")
     if measured.held < _HELD or measured.slip_m > _SLIPPED_M:
         return Verdict(f"slipped: the pads slid {1000 * measured.slip_m:.0f} mm along the handle; {done}", "gripper")
-    return Verdict(f"joint too stiff, or its part hits another: the gripper applied {measured.force_n:.0f} N; {done}", "scan")
+    return Verdict(f"joint too stiff: the gripper applied {measured.force_n:.0f} N; {done}", "scan")
 
 
 def _obstacle(travel: Travel, way: Way, measured: Measured) -> int | None:
     """The main obstacle: the body pressed most, or with the deepest expected collision."""
-    leant = {body: force for body, force in measured.touched.items() if force > _LEANS_N}
-    if leant:
-        return max(leant, key=lambda body: leant[body])
+    if (leant := _most(measured.touched)) is not None:
+        return leant
     if way.clashes:
         return max(way.clashes, key=lambda body: way.clashes[body])
     return None
+
+
+def _most(forces: Mapping[int, float]) -> int | None:
+    """The body pressed most; None where none is pressed."""
+    pressed = {body: force for body, force in forces.items() if force > _LEANS_N}
+    return max(pressed, key=lambda body: pressed[body], default=None)

@@ -88,6 +88,13 @@ def test_a_blocking_obstacle_is_reported_by_name(tmp_path: Path) -> None:
     assert grip.why.startswith("blocked by post")
 
 
+def test_an_obstacle_that_only_the_part_hits_is_reported_by_name(tmp_path: Path) -> None:
+    post = '<body name="post" pos="-0.1 -0.5 -0.2"><geom size="0.03 0.03 0.04"/></body>'
+    (grip,) = certify_with_gripper(scene(tmp_path, bar=Bar(), beside=post)).grips
+    assert (grip.passed, grip.blame) == (False, "scan")
+    assert grip.why.startswith("its part hits post as it opens; opens")
+
+
 def test_a_blocked_wrist_lets_the_bar_rotate_in_the_grip(tmp_path: Path) -> None:
     """A level bar on a vertical hinge: a wall blocks the wrist, so its rotation lags and the bar turns in the pads."""
     free, travel = rig_and_travel(scene(tmp_path, bar=LEVEL))
