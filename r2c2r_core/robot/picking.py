@@ -11,17 +11,20 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.robot.grasps import BACK_M, MARGIN_M
 from r2c2r_core.robot.opening import Watch
 from r2c2r_core.robot.ramps import approach_from, ramp, wait
-from r2c2r_core.robot.rig import STROKE_M, TIP_M, Rig, tool_rotation
+from r2c2r_core.robot.rig import HALF_PAD_M, STROKE_M, TIP_M, Rig, tool_rotation
 
 FURTHER_M = 0.10
 NEAR_M = 0.03  # maximum distance from the goal for success
 _UPRIGHT = np.cos(np.deg2rad(15.0))
 _LIFT_M = 0.06
 _DEEP_M = 0.035  # maximum depth of an object between the fingers
+_HEIGHTS = (0.5, 0.75, 0.9)  # fractions of the object's height for grasps from the side; the last holds a bottle's neck
 _UP = np.array([0.0, 0.0, 1.0])
 _TURNS = np.deg2rad(np.arange(0.0, 360.0, 30.0))
+_TILTS = (0.0, 0.5, np.pi / 2)  # rad below the horizontal
 _TOUCH_M = 0.001
-_NEAR_PADS_M = 0.025  # around the pads' middle: the part of an object grasped from above that determines its width
+_NEAR_PADS_M = 0.025  # behind the pads' middle: the part of an object grasped from above that determines its width
+_ON_EDGE = np.linspace(0.0, 1.0, 33)[:, None]  # sample positions along each edge of a collider
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,11 +63,12 @@ def plan_pick(rig: Rig, body: int) -> Pick | str:
     if not shifts:
         return "no free place 10 cm further on its support"
     narrow = False
-    for pick in _grasps(rig, body, shifts[0]):
+    for pick in _grasps(rig, body):
         narrow = True
-        for shift in shifts:
-            if not _in_the_way(rig, placed := replace(pick, shift=shift)):
-                return placed
+        if not _in_the_way(rig, pick):
+            for shift in shifts:
+                if not _in_the_way(rig, placed := replace(pick, shift=shift)):
+                    return placed
     return "blocked: no collision-free way" if narrow else f"wider than {1000 * (STROKE_M - 2 * MARGIN_M):.0f} mm all round"
 
 
@@ -102,32 +106,43 @@ def commands(rig: Rig, pick: Pick) -> Iterator[tuple[Rigid3, float]]:
     yield from wait(rig, (_back(there, BACK_M), pick.wide_m), 0.4)
 
 
-def _grasps(rig: Rig, body: int, shift: Vector3) -> Iterator[Pick]:
-    """Grasps that fit the stroke: from each side at half the object's height, then from above."""
+def _grasps(rig: Rig, body: int) -> Iterator[Pick]:
+    """Grasps that fit the stroke, not moved yet: from each side at several heights, then from above."""
     points = _points_world(rig, body)
-    low, high = points.min(axis=0), points.max(axis=0)
-    for tilt in (0.0, 0.5, np.pi / 2):
-        for turn in _TURNS:
-            level = np.array([np.cos(turn), np.sin(turn), 0.0])
-            stroke = np.cross(_UP, level)
-            approach = np.cos(tilt) * level - np.sin(tilt) * _UP
-            deep = points @ approach
-            reach = min(float(np.ptp(deep)) / 2, _DEEP_M - TIP_M if tilt > 1.0 else np.inf)  # of the pads' middle
-            held = points[np.abs(deep - deep.min() - reach) < max(_NEAR_PADS_M, float(np.ptp(deep)) / 2 if tilt < 1.0 else 0.0)]
-            across = held @ stroke
-            if not len(held) or float(np.ptp(across)) > STROKE_M - 2 * MARGIN_M:
-                continue
-            width, middle = float(np.ptp(across)), (low + high) / 2
-            place = middle + ((across.max() + across.min()) / 2 - middle @ stroke) * stroke
-            place = place + (deep.min() + reach - place @ approach) * approach
-            yield Pick(
-                body=body,
-                grasp=Rigid3(tool_rotation(approach, stroke), place),
-                shift=shift,
-                wide_m=STROKE_M,
-                held_m=width,
-                address=int(rig.model.jnt_qposadr[rig.model.body_jntadr[body]]),
-            )
+    for tilt in _TILTS:
+        for height in _HEIGHTS if tilt < 1.0 else (0.5,):
+            for turn in _TURNS:
+                pick = _grasp(points, tilt, height, turn)
+                if pick is not None:
+                    pose, width = pick
+                    yield Pick(
+                        body=body,
+                        grasp=pose,
+                        shift=np.zeros(3),
+                        wide_m=STROKE_M,
+                        held_m=width,
+                        address=int(rig.model.jnt_qposadr[rig.model.body_jntadr[body]]),
+                    )
+
+
+def _grasp(points: Points, tilt: float, height: float, turn: float) -> tuple[Rigid3, float] | None:
+    """Tool pose and width of a grasp of the object's section between the fingers; None where it is too wide."""
+    level = np.array([np.cos(turn), np.sin(turn), 0.0])
+    stroke = np.cross(_UP, level)
+    approach = np.cos(tilt) * level - np.sin(tilt) * _UP
+    over = np.cross(approach, stroke)
+    deep, across, up = points @ approach, points @ stroke, points @ over
+    at = up.min() + height * np.ptp(up)
+    if tilt < 1.0:
+        held = np.abs(up - at) < HALF_PAD_M
+        reach = deep[held].min() + np.ptp(deep[held]) / 2 if held.any() else 0.0
+    else:
+        reach = deep.min() + min(float(np.ptp(deep)) / 2, _DEEP_M - TIP_M)
+        held = deep < reach + _NEAR_PADS_M
+    if not held.any() or np.ptp(across[held]) > STROKE_M - 2 * MARGIN_M:
+        return None
+    middle = (across[held].min() + across[held].max()) / 2
+    return Rigid3(tool_rotation(approach, stroke), reach * approach + middle * stroke + at * over), float(np.ptp(across[held]))
 
 
 def _free_places(rig: Rig, body: int) -> Iterator[Vector3]:
@@ -164,27 +179,25 @@ def _stands(model: Any, data: Any, point: Vector3, body: int) -> bool:
 
 
 def _in_the_way(rig: Rig, pick: Pick) -> bool:
-    """Whether the gripper overlaps anything but the object at the pick or the place pose."""
+    """Whether the gripper overlaps anything but the object along its approach, with the object at its shifted place."""
     import mujoco
 
     scratch = mujoco.MjData(rig.model)
     probe = replace(rig, data=scratch)
-    start = rig.data.qpos.copy()
-    for moved in (np.zeros(3), pick.shift):
-        for back_m, width in ((BACK_M, pick.wide_m), (BACK_M / 2, pick.wide_m), (0.0, pick.wide_m)):
-            scratch.qpos[:] = start
-            scratch.qpos[pick.address : pick.address + 3] += moved
-            pose = _back(pick.grasp, back_m)
-            probe.put(Rigid3(pose.rotation, pose.translation + moved), width)
-            _place(rig.model, scratch)
-            for number, (a, b) in enumerate(scratch.contact.geom[: scratch.ncon]):
-                if (a in rig.own) != (b in rig.own) and scratch.contact.dist[number] < -_TOUCH_M:
-                    return True
+    for back_m in (BACK_M, BACK_M / 2, 0.0):
+        scratch.qpos[:] = rig.data.qpos
+        scratch.qpos[pick.address : pick.address + 3] += pick.shift
+        pose = _back(pick.grasp, back_m)
+        probe.put(Rigid3(pose.rotation, pose.translation + pick.shift), pick.wide_m)
+        _place(rig.model, scratch)
+        for number, (a, b) in enumerate(scratch.contact.geom[: scratch.ncon]):
+            if (a in rig.own) != (b in rig.own) and scratch.contact.dist[number] < -_TOUCH_M:
+                return True
     return False
 
 
 def _points_world(rig: Rig, body: int) -> Points:
-    """Corners and vertices of the object's colliders, in the world."""
+    """Points along the edges of the object's colliders, in the world."""
     model, data = rig.model, rig.data
     _place(model, data)
     found = []
@@ -193,11 +206,14 @@ def _points_world(rig: Rig, body: int) -> Points:
             continue
         mesh = int(model.geom_dataid[geom])
         if mesh >= 0:
-            first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-            local = np.asarray(model.mesh_vert[first : first + count], dtype=np.float64)
+            first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+            vertices = model.mesh_vert[model.mesh_vertadr[mesh] + model.mesh_face[first : first + count]]
+            ends = np.stack([vertices, np.roll(vertices, 1, axis=1)], axis=2).reshape(-1, 2, 3)
         else:
             signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-            local = model.geom_aabb[geom][:3] + signs * model.geom_aabb[geom][3:]
+            pairs = [(a, a | bit) for a in range(8) for bit in (1, 2, 4) if not a & bit]
+            ends = (model.geom_aabb[geom][:3] + signs * model.geom_aabb[geom][3:])[pairs]
+        local = (ends[:, :1] + _ON_EDGE * (ends[:, 1:] - ends[:, :1])).reshape(-1, 3)
         found.append(local @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
     return np.concatenate(found)
 

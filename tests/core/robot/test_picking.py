@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from r2c2r_core.robot.certificate import certify_with_gripper, gripper_to_json
+from r2c2r_core.robot.picking import Pick, plan_pick, things_of
 from r2c2r_core.robot.rig import gripper_in
 from r2c2r_core.robot.view import aimed, look, surfaces_of
 
@@ -41,6 +42,19 @@ def test_an_object_is_moved_by_ten_centimetres(tmp_path: Path, half: float) -> N
 def test_an_object_wider_than_the_stroke_is_not_picked(tmp_path: Path) -> None:
     (grip,) = certify_with_gripper(scene(tmp_path, radius=0.05)).grips
     assert (grip.passed, grip.why) == (False, "wider than 76 mm all round")
+
+
+def test_a_bottle_wider_than_the_stroke_is_held_by_its_neck(tmp_path: Path) -> None:
+    path = scene(tmp_path, radius=0.045)
+    neck = '<geom class="hard" type="box" size="0.015 0.015 0.04" pos="0 0 0.14"/>'
+    shelf = '<body name="shelf"><geom class="hard" type="box" size="0.4 0.4 0.02" pos="0 0 0.88"/></body>'  # no room from above
+    path.write_text(path.read_text().replace("</body>\n  </worldbody>", f"{neck}</body>{shelf}</worldbody>"))
+    (grip,) = certify_with_gripper(path).grips
+    assert grip.passed, grip
+    rig = gripper_in(path)
+    pick = plan_pick(rig, things_of(rig.model)[0])
+    assert isinstance(pick, Pick)
+    assert pick.held_m == pytest.approx(0.03, abs=1e-3)
 
 
 def test_an_object_without_free_support_nearby_is_not_moved(tmp_path: Path) -> None:
