@@ -7,7 +7,7 @@ import numpy as np
 from r2c2r_core.arrays import Points, Vector3
 
 _WALL_M = 0.03  # maximum thickness of walls, fronts and floors of furniture and ovens
-_THICKEST_WALL_M = 0.08  # of a refrigerator; anything thicker is inside the cavity
+_WALL_ZONE_M = 0.12  # a plate this near to the outside is a wall, such as a refrigerator's of 8 cm or a recessed back panel
 _STEP_M = 0.02
 _LEAST_INSIDE_M = 0.06
 _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
@@ -53,13 +53,14 @@ def cavity_open(model: Any, joint: str) -> float | None:
 
 
 def _between_walls(solids: list[Points]) -> tuple[Vector3, Vector3]:
-    """Low and high corner of the inner space: the bounds of all solids without the plates along them."""
+    """Low and high corner of the inner space: the bounds of all solids up to the inner faces of the plates near them."""
     lows, highs = np.array([s.min(axis=0) for s in solids]), np.array([s.max(axis=0) for s in solids])
     thick = highs - lows
     low, high = lows.min(axis=0), highs.max(axis=0)
-    wall = thick <= _THICKEST_WALL_M
-    below = np.where(wall & (lows < low + 1e-3), thick, 0.0).max(axis=0)
-    above = np.where(wall & (highs > high - 1e-3), thick, 0.0).max(axis=0)
+    across = thick == thick.min(axis=1, keepdims=True)  # the direction of each plate's normal
+    zone = np.minimum(_WALL_ZONE_M, (high - low) / 2)
+    below = np.where(across & (highs < low + zone), highs - low, 0.0).max(axis=0)
+    above = np.where(across & (lows > high - zone), high - lows, 0.0).max(axis=0)
     return low + np.maximum(below, _WALL_M), high - np.maximum(above, _WALL_M)
 
 

@@ -212,6 +212,31 @@ def test_openable_units_have_a_free_cavity(tmp_path: Path) -> None:
     assert all(joint.cavity_open is not None and joint.cavity_open > 0.9 for joint in result.joints)
 
 
+def test_a_recessed_back_panel_does_not_fill_the_cavity(tmp_path: Path) -> None:
+    """A shallow wall cabinet whose back is 5 cm in front of its sides' rear edges."""
+    item = cabinet("c")
+    shallow = [
+        replace(box, link_from_box=Rigid3(np.eye(3), box.link_from_box.translation - [0.0, 0.05 * (box.name == "back"), 0.0]))
+        for box in item.links[0].boxes
+    ]
+    (joint,) = simulated(tmp_path, replace(item, links=(replace(item.links[0], boxes=tuple(shallow)), *item.links[1:]))).joints
+    assert joint.cavity_open == 1.0
+
+
+def test_a_flap_opens_upwards_against_its_weight(tmp_path: Path) -> None:
+    """5 kg, 0.72 m high: 17.7 N m at the hinge, 24.5 N at its lower edge."""
+    item = cabinet("f")
+    door, size = item.links[1], item.dimensions_m
+    top = np.array([0.0, -size[1] / 2, size[2] / 2])
+    shift = door.object_from_link.translation - top
+    boxes = tuple(replace(box, link_from_box=Rigid3(np.eye(3), box.link_from_box.translation + shift)) for box in door.boxes)
+    inertia = replace(door.inertial, mass_kg=5.0, com_link=door.inertial.com_link + shift)
+    door = replace(door, object_from_link=Rigid3(np.eye(3), top), boxes=boxes, inertial=inertia, visual=None)
+    joint = replace(item.joints[0], origin_object=top, axis_object=np.array([-1.0, 0.0, 0.0]))
+    result = simulated(tmp_path, replace(item, links=(item.links[0], door), joints=(joint,)))
+    assert result.joints[0].travel_reached >= 0.98
+
+
 def test_the_cavity_check_of_a_door_ignores_space_behind_its_neighbour(tmp_path: Path) -> None:
     """A block behind the right door of a pair: the left door's cavity stays free, the right door's does not."""
     item = double_door("d")
