@@ -17,6 +17,7 @@ _REACHED_M = 0.012
 _HELD = 0.5
 _SLIPPED_M = 0.03
 _LEANS_N = 2.0
+_HINGE_SIDE = 1 / 3  # own choice: handles sit on the half away from the hinge
 
 
 class Verdict(NamedTuple):
@@ -52,6 +53,9 @@ def verdict_on(model: Any, travel: Travel, way: Way, measured: Measured) -> Verd
         )
     if obstacle is not None:
         name = body_words(model, obstacle)
+        if (beside_m := _beside_hinge_m(travel)) is not None:
+            why = f"handle beside the hinge, {1000 * beside_m:.0f} mm away: the gripper collides with {name}; {done}"
+            return Verdict(why, "scan")
         blame: Blame = "scan" if obstacle == 0 else "world"
         return Verdict(f"blocked by {name}: the gripper collides with it; {done}", blame)
     if measured.opened < OPEN_SHARE and (jam := _most(measured.jams)) is not None:
@@ -70,6 +74,16 @@ def _obstacle(travel: Travel, way: Way, measured: Measured) -> int | None:
     if way.clashes:
         return max(way.clashes, key=lambda body: way.clashes[body])
     return None
+
+
+def _beside_hinge_m(travel: Travel) -> float | None:
+    """Distance of a door's handle from its hinge where that is short; otherwise None."""
+    if travel.part.bar is None or not travel.hinged:
+        return None
+    front = travel.part.front
+    reach_m = max(travel.radius_of(front.low), travel.radius_of(front.high))
+    handle_m = travel.radius_of(travel.part.bar.centre)
+    return handle_m if handle_m < _HINGE_SIDE * reach_m else None
 
 
 def _most(forces: Mapping[int, float]) -> int | None:

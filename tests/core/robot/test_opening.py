@@ -88,6 +88,15 @@ def test_a_blocking_obstacle_is_reported_by_name(tmp_path: Path) -> None:
     assert grip.why.startswith("blocked by post")
 
 
+def test_a_handle_beside_the_hinge_is_the_reason_for_a_blocked_grasp(tmp_path: Path) -> None:
+    post = '<body name="post" pos="-0.16 -0.36 0"><geom size="0.3 0.01 0.4"/></body>'
+    path = scene(tmp_path, bar=Bar(), beside=post)
+    path.write_text(path.read_text().replace('axis="0 0 1" pos="0.2', 'axis="0 0 -1" pos="-0.2'))
+    (grip,) = certify_with_gripper(path).grips
+    assert (grip.passed, grip.blame) == (False, "scan")
+    assert grip.why.startswith("handle beside the hinge, 59 mm away: the gripper collides with post")
+
+
 def test_an_obstacle_that_only_the_part_hits_is_reported_by_name(tmp_path: Path) -> None:
     post = '<body name="post" pos="-0.1 -0.5 -0.2"><geom size="0.03 0.03 0.04"/></body>'
     (grip,) = certify_with_gripper(scene(tmp_path, bar=Bar(), beside=post)).grips
