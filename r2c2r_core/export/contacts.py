@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from r2c2r_core.robot.rig import find_contacts
+
 ALLOWED_PENETRATION_M = 5e-4
 CARRIED_BY = "carried_by"
 """Key, in the text of a free body in scene.xml, of the body that it lies in."""
@@ -34,9 +36,7 @@ def touches(model: Any, positions: Mapping[str, float], scratch: Any | None = No
     mujoco.mj_resetData(model, data)
     for name, position in positions.items():
         data.qpos[model.joint(name).qposadr[0]] = position
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    mujoco.mj_collision(model, data)
+    find_contacts(model, data)
     deepest: dict[tuple[int, int], float] = {}
     for contact in data.contact[: data.ncon]:
         pair = sorted(int(model.geom_bodyid[g]) for g in contact.geom)

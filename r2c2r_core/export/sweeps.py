@@ -1,6 +1,5 @@
 """Per-joint tests: overlap over the sweep, travel under a push, and obstacles."""
 
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ from r2c2r_core.export.cavities import cavity_open
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, body_name, carried_by, free_bodies, movers_of, touches
 from r2c2r_core.export.rules.table import finding
 from r2c2r_core.model.report import Blocker, Finding, JointResult
+from r2c2r_core.robot.rig import corners_of
 
 POSITIONS = 21
 DRIVE_FORCE_N = 30.0  # about what one hand gives a drawer, or a door at its free edge
@@ -58,12 +58,7 @@ def _free_edge_m(model: Any, joint: str) -> float:
 
     data, number, movers = mujoco.MjData(model), int(model.joint(joint).id), movers_of(model, joint)
     mujoco.mj_kinematics(model, data)
-    signs = np.array(list(product((-1, 1), repeat=3)))
-    corners = [
-        data.geom_xpos[g] + (model.geom_aabb[g][:3] + signs * model.geom_aabb[g][3:]) @ data.geom_xmat[g].reshape(3, 3).T
-        for g in range(model.ngeom)
-        if int(model.geom_bodyid[g]) in movers
-    ]
+    corners = [corners_of(model, data, g) for g in range(model.ngeom) if int(model.geom_bodyid[g]) in movers]
     arms = np.cross(np.concatenate(corners) - data.xanchor[number], data.xaxis[number])
     return float(np.linalg.norm(arms, axis=1).max())
 

@@ -12,7 +12,7 @@ from r2c2r_core.gym.robot_env import Observation, RobotEnv, tool_state
 from r2c2r_core.robot.grasps import BACK_M, Way, best_way
 from r2c2r_core.robot.motion import Travel, travel_of
 from r2c2r_core.robot.opening import OPEN_SHARE, joints_of
-from r2c2r_core.robot.rig import Rig
+from r2c2r_core.robot.rig import Rig, find_contacts
 
 STATE = 20
 _LOOKS = 21  # along the joint's travel
@@ -101,9 +101,7 @@ def close_in_the_way(rig: Rig, travel: Travel) -> None:
     for share in np.linspace(0.0, 1.0, _LOOKS):
         scratch.qpos[:] = rig.data.qpos
         scratch.qpos[travel.address] = share * travel.upper
-        mujoco.mj_kinematics(model, scratch)
-        mujoco.mj_comPos(model, scratch)
-        mujoco.mj_collision(model, scratch)
+        find_contacts(model, scratch)
         for pair in scratch.contact.geom[: scratch.ncon]:
             joints = [_joint_moving(model, int(model.geom_bodyid[geom])) for geom in pair]
             if own in joints:

@@ -10,7 +10,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.robot.handles import Board, Part
 from r2c2r_core.robot.motion import Hold, Travel, about
-from r2c2r_core.robot.rig import HALF_PAD_M, STROKE_M, TIP_M, Rig, tool_rotation
+from r2c2r_core.robot.rig import HALF_PAD_M, STROKE_M, TIP_M, Rig, find_contacts, tool_rotation
 
 BACK_M = 0.12  # distance from the handle at which an approach begins
 MARGIN_M = 0.002  # minimum clearance between the handle and each finger
@@ -86,9 +86,7 @@ def clashes(rig: Rig, travel: Travel, way: Way) -> dict[int, float]:
         probe = replace(rig, data=scratch)
         probe.put(pose, width)
         scratch.qpos[travel.address] = position
-        mujoco.mj_kinematics(rig.model, scratch)
-        mujoco.mj_comPos(rig.model, scratch)
-        mujoco.mj_collision(rig.model, scratch)
+        find_contacts(rig.model, scratch)
         for body, depth_m in overlaps(probe, travel.part.body):
             found[body] = max(found.get(body, 0.0), depth_m)
     return found

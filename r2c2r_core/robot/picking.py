@@ -11,7 +11,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.robot.grasps import BACK_M, MARGIN_M
 from r2c2r_core.robot.opening import Watch
 from r2c2r_core.robot.ramps import approach_from, ramp, wait
-from r2c2r_core.robot.rig import HALF_PAD_M, STROKE_M, TIP_M, Rig, tool_rotation
+from r2c2r_core.robot.rig import CORNERS, HALF_PAD_M, STROKE_M, TIP_M, Rig, find_contacts, tool_rotation
 
 FURTHER_M = 0.10
 NEAR_M = 0.03  # maximum distance from the goal for success
@@ -157,7 +157,7 @@ def _free_places(rig: Rig, body: int) -> Iterator[Vector3]:
         shift = FURTHER_M * np.array([np.cos(turn), np.sin(turn), 0.0])
         scratch.qpos[:] = rig.data.qpos
         scratch.qpos[address : address + 3] += shift + 0.004 * _UP
-        _place(model, scratch)
+        find_contacts(model, scratch)
         met = {
             int(b)
             for pair in scratch.contact.geom[: scratch.ncon]
@@ -189,7 +189,7 @@ def _in_the_way(rig: Rig, pick: Pick) -> bool:
         scratch.qpos[pick.address : pick.address + 3] += pick.shift
         pose = _back(pick.grasp, back_m)
         probe.put(Rigid3(pose.rotation, pose.translation + pick.shift), pick.wide_m)
-        _place(rig.model, scratch)
+        find_contacts(rig.model, scratch)
         for number, (a, b) in enumerate(scratch.contact.geom[: scratch.ncon]):
             if (a in rig.own) != (b in rig.own) and scratch.contact.dist[number] < -_TOUCH_M:
                 return True
@@ -199,7 +199,7 @@ def _in_the_way(rig: Rig, pick: Pick) -> bool:
 def _points_world(rig: Rig, body: int) -> Points:
     """Points along the edges of the object's colliders, in the world."""
     model, data = rig.model, rig.data
-    _place(model, data)
+    find_contacts(model, data)
     found = []
     for geom in range(model.ngeom):
         if model.geom_bodyid[geom] != body or not model.geom_contype[geom]:
@@ -210,20 +210,11 @@ def _points_world(rig: Rig, body: int) -> Points:
             vertices = model.mesh_vert[model.mesh_vertadr[mesh] + model.mesh_face[first : first + count]]
             ends = np.stack([vertices, np.roll(vertices, 1, axis=1)], axis=2).reshape(-1, 2, 3)
         else:
-            signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
             pairs = [(a, a | bit) for a in range(8) for bit in (1, 2, 4) if not a & bit]
-            ends = (model.geom_aabb[geom][:3] + signs * model.geom_aabb[geom][3:])[pairs]
+            ends = (model.geom_aabb[geom][:3] + CORNERS * model.geom_aabb[geom][3:])[pairs]
         local = (ends[:, :1] + _ON_EDGE * (ends[:, 1:] - ends[:, :1])).reshape(-1, 3)
         found.append(local @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
     return np.concatenate(found)
-
-
-def _place(model: Any, data: Any) -> None:
-    import mujoco
-
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    mujoco.mj_collision(model, data)
 
 
 def _back(pose: Rigid3, metres: float) -> Rigid3:

@@ -4,12 +4,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.arrays import Matrix3, Points, Vector3
 from r2c2r_core.geometry.transforms import Rigid3
 
 GRIPPER = Path(__file__).with_name("gripper.xml")
@@ -19,6 +20,7 @@ HALF_PAD_M = 0.009  # half the width of a fingertip
 GRIPS_N = (20.0, 40.0)
 CONTROL_STEPS = 5  # simulation steps between two commands
 PREFIX = "gripper/"
+CORNERS = np.array(list(product((-1, 1), repeat=3)))  # (8, 3) signs
 _AXES = ("x", "y", "z", "yaw", "pitch", "roll")
 
 
@@ -171,6 +173,21 @@ def hand_of(model: Any, data: Any, base: str) -> dict[str, Any]:
         "own": frozenset(own),
         "pads": frozenset(g for g in own if model.geom(g).name.endswith("_pad")),
     }
+
+
+def find_contacts(model: Any, data: Any) -> None:
+    """Update poses and contacts from qpos, without dynamics."""
+    import mujoco
+
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_collision(model, data)
+
+
+def corners_of(model: Any, data: Any, geom: int) -> Points:
+    """Corners (8, 3) of a geom's bounding box, in the world."""
+    local = model.geom_aabb[geom][:3] + CORNERS * model.geom_aabb[geom][3:]
+    return np.asarray(local @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
 
 
 def axes_of(pose: Rigid3, near_yaw: float = 0.0) -> np.ndarray:

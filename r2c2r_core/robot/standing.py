@@ -14,6 +14,7 @@ from r2c2r_core.robot.grasps import STATIONS_OF_A_LEG, Way, overlaps, stations
 from r2c2r_core.robot.kinematics import ease, matrices, solve
 from r2c2r_core.robot.motion import Hold, Travel
 from r2c2r_core.robot.panda import LIFTS_M, PEDESTAL_RADIUS_M, REACH_M, SHOULDER_M
+from r2c2r_core.robot.rig import corners_of, find_contacts
 
 GRID_M = 0.1
 _NEAR_M = 0.25  # minimum horizontal distance of the base from a tool pose
@@ -159,9 +160,7 @@ def _meets(probe: Arm, travel: Travel, stand: Stand, angles: np.ndarray, steps: 
         probe.stand(stand, bent)
         probe.bend(bent, width)
         probe.data.qpos[travel.address] = position
-        mujoco.mj_kinematics(probe.model, probe.data)
-        mujoco.mj_comPos(probe.model, probe.data)
-        mujoco.mj_collision(probe.model, probe.data)
+        find_contacts(probe.model, probe.data)
         if any(True for _ in overlaps(probe, travel.part.body)) or probe.meets_itself():
             return True
     return False
@@ -172,8 +171,6 @@ def _footprints(model: Any, data: Any, own: frozenset[int]) -> Iterator[Any]:
     for geom in range(model.ngeom):
         if geom in own or not model.geom_contype[geom] or model.geom_type[geom] == 0:
             continue
-        centre, half = model.geom_aabb[geom][:3], model.geom_aabb[geom][3:]
-        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        corners = (centre + signs * half) @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+        corners = corners_of(model, data, geom)
         if corners[:, 2].max() > _ABOVE_FLOOR_M and corners[:, 2].min() < LIFTS_M[-1]:
             yield shapely.MultiPoint(corners[:, :2]).convex_hull
