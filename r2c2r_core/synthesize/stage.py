@@ -13,7 +13,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import named
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
-from r2c2r_core.model.materials import JointFeel
+from r2c2r_core.model.materials import SLIDE_FEEL, JointFeel
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.model.motion import JointMotion, Source
 from r2c2r_core.model.placement import Placement
@@ -322,12 +322,13 @@ def _joint_name(object_name: str, part: str) -> str:
 def _joint(
     item: MeasuredObject,
     motion: Motion,
-    feel: JointFeel,
+    hinge_feel: JointFeel,
     hinge: Hinge | None,
     said: JointLimits | None,
     seen: JointMotion | None,
 ) -> Joint:
-    """The joint of one moving part; a person's or observed values replace the category's."""
+    """The joint of one moving part; a person's or observed values replace the category's. Slides all feel alike."""
+    feel = hinge_feel if motion.type == "revolute" else SLIDE_FEEL
     axis: Source = hinge.source if hinge is not None else "inferred" if seen is None else seen.source
     lower, upper, limits = _limits(item, motion, said or JointLimits(None, None), seen)
     return Joint(

@@ -10,6 +10,7 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.categories import CATEGORIES
 from r2c2r_core.model.capture import Capture, Wall
 from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
+from r2c2r_core.model.materials import HEAVY_DOOR_FEEL, SLIDE_FEEL
 from r2c2r_core.model.motion import Inside
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
 from r2c2r_core.model.track import MaskTrack
@@ -225,6 +226,22 @@ def test_drawer_travel_comes_from_the_filmed_opening(seen_m: float | None, stop_
         assert joint.upper == pytest.approx(seen_m, abs=1e-6)
     assert any("seen open" in w for w in scene.objects[0].warnings) == (seen_m is not None and source != "measured")
     assert (joint.motion is not None) == (seen_m is not None)
+
+
+def test_the_drawer_of_a_refrigerator_slides_like_a_drawer_and_its_doors_turn_like_heavy_doors() -> None:
+    """Damping of a hinge is in N m s/rad, of a slide in N s/m: with a heavy door's value the drawer would coast."""
+    unit = Unit("a", "fridge", (0, 0, 0.9), (0.6, 0.7, 1.8), kind="appliance")
+    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
+    assert track.front is not None
+    below = Rigid3(track.front.world_from_front.rotation, track.front.world_from_front.apply(np.array([0.0, 0.0, -0.6])))
+    track = replace(track, motions=(motion({4: 0.3}, world_from_front=below, part="drawer"),))
+    item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
+    feels = {"revolute": HEAVY_DOOR_FEEL, "prismatic": SLIDE_FEEL}
+    assert {joint.type for joint in item.joints} == feels.keys()
+    for joint in item.joints:
+        feel = feels[joint.type]
+        assert joint.damping == feel.damping
+        assert (joint.effort, joint.velocity) == (feel.effort, feel.velocity)
 
 
 @pytest.mark.parametrize(("way", "stop_seen"), [("right", True), ("right", False), ("top", True), ("bottom", True)])
