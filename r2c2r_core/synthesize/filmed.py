@@ -104,10 +104,11 @@ def drawer_below(item: MeasuredObject) -> Below | None:
     return Below(seam_m=2 * middle + float(item.dimensions_m[2]) / 2, inside=drawer.inside)
 
 
-def as_filmed(motion: Motion, found: JointMotion | None, placed_pose: Rigid3) -> Motion:
+def as_filmed(motion: Motion, found: JointMotion | None, placed_pose: Rigid3, leaf: Part) -> Motion:
     """The joint about the filmed line where that differs significantly from its front's edge.
 
-    Otherwise along that edge, and through the mean of both, weighted by their covariances.
+    Otherwise along that edge, and through the mean of both, weighted by their covariances. Hinges are limited to positions
+    about which the leaf can turn.
     """
     if found is None or found.covariance is None or found.pivot_world is None:
         return motion
@@ -122,19 +123,41 @@ def as_filmed(motion: Motion, found: JointMotion | None, placed_pose: Rigid3) ->
     measured = turn @ found.covariance @ turn.T
     known = np.diag([params.face_rad**2] * 3 + [params.hinge_m**2] * 3)
     distance = float(np.sqrt(off @ np.linalg.inv(measured + known) @ off))
+    thick_m = max((float(board.size_m[1]) for board in leaf.boxes if board.role == "front"), default=np.inf)
     if distance > params.same_line:
-        clear = _clearing(shift, motion.axis_object)
+        clear = _clearing(shift, motion.axis_object, thick_m)
         return replace(motion, axis_object=axis, origin_object=motion.origin_object + clear)
     mean = known[3:, 3:] @ np.linalg.inv(measured[3:, 3:] + known[3:, 3:]) @ shift
-    return replace(motion, origin_object=motion.origin_object + _clearing(mean, motion.axis_object))
+    return replace(motion, origin_object=motion.origin_object + _clearing(mean, motion.axis_object, thick_m))
 
 
-def _clearing(shift: Vector3, axis: Vector3) -> Vector3:
-    """A hinge's shift from its leaf's edge (object frame), limited in depth so that the edge swings clear of its neighbours."""
-    inwards, depth = max(float(shift @ np.cross(-_DEPTH, axis)), 0.0), float(shift @ _DEPTH)
-    spare = tuned(Params).spare_m
-    deepest = np.sqrt((inwards + spare) ** 2 - inwards**2)
-    return shift - _DEPTH * max(depth - deepest, 0.0)
+def hinge_notice(motion: Motion, found: JointMotion | None, placed_pose: Rigid3) -> str | None:
+    """A line where the leaf could not turn about its filmed hinge, so that the joint is elsewhere."""
+    if motion.type != "revolute" or found is None or found.pivot_world is None:
+        return None
+    arm = placed_pose.inverse.apply(found.pivot_world) - motion.origin_object
+    off_m = float(np.linalg.norm(np.cross(arm, motion.axis_object)))
+    if off_m <= 2 * tuned(Params).hinge_m:
+        return None
+    where = f"{motion.part}: its hinge was filmed {1000 * off_m:.0f} mm from where it is built"
+    return f"{where}, as it would hit its unit or its neighbour there; check the clicks at its edges"
+
+
+def _clearing(shift: Vector3, axis: Vector3, thick_m: float) -> Vector3:
+    """A hinge's shift from its leaf's edge (object frame), limited so that the edge swings clear.
+
+    In depth: of its neighbours. Inwards: of the carcass behind a leaf of `thick_m`, which `swinging_clear` thins.
+    """
+    inward = np.cross(-_DEPTH, axis)
+    inwards, depth, spare = float(shift @ inward), float(shift @ _DEPTH), tuned(Params).spare_m
+    carcass, rear = thick_m + spare, min(tuned(BoardParams).thinnest_front_m, thick_m)
+
+    def deepest(at: float) -> float:
+        return float(np.sqrt(spare * (2 * max(at, 0.0) + spare)))
+
+    farthest = np.sqrt((carcass - rear) * max(carcass + rear - 2 * min(depth, deepest(inwards)), 0.0))
+    kept = min(inwards, farthest)
+    return shift - inward * (inwards - kept) - _DEPTH * max(depth - deepest(kept), 0.0)
 
 
 def swinging_clear(leaf: Part, edge: Vector3, motion: Motion) -> Part:

@@ -27,6 +27,7 @@ from r2c2r_core.synthesize.filmed import (
     as_filmed,
     drawer_below,
     filmed,
+    hinge_notice,
     inside_seen,
     opened_as,
     opening,
@@ -179,7 +180,10 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
         for motion in build.motions
     }
     edges = {motion.part: motion.origin_object for motion in build.motions}
-    motions = {motion.part: as_filmed(motion, seen[motion.part], item.placed_pose) for motion in build.motions}
+    leaf = {part.name: part for part in movers}
+    motions = {
+        motion.part: as_filmed(motion, seen[motion.part], item.placed_pose, leaf[motion.part]) for motion in build.motions
+    }
     movers = [swinging_clear(part, edges[part.name], motions[part.name]) for part in movers]
     links = [_link(item.name, base, np.zeros(3))]
     links += [_link(item.name, part, _link_origin(motions[part.name])) for part in movers]
@@ -187,7 +191,9 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
     joints = [_joint(item, motion, fixture.feel, hinge, said.get(part), seen[part]) for part, motion in motions.items()]
     leaves = {link.name: link for link in links}
     joints = [_kept_shut(joint, leaves[joint.child]) for joint in joints]
-    warnings = [*item.warnings, *build.notes, *unheard, *unmarked, *(line for joint in joints if (line := _open_ended(joint)))]
+    hinges = [hinge_notice(motion, seen[part], item.placed_pose) for part, motion in motions.items()]
+    open_ended = [_open_ended(joint) for joint in joints]
+    warnings = [*item.warnings, *build.notes, *unheard, *unmarked, *(line for line in (*hinges, *open_ended) if line)]
     if hinge is not None and hinge.source == "default":
         said_of = "slides to the" if item.spec.opens == "sideways" else "hinge on the"
         warnings.append(f"{said_of} {hinge.side} by default: {hinge.reason}")

@@ -278,48 +278,53 @@ def test_friction_keeps_doors_closed_against_gravity(way: str, opens_by_itself: 
     assert model.dof_frictionloss[0] > max(pull, 0.0)
 
 
-def test_a_hinge_filmed_far_from_the_edge_keeps_its_filmed_position() -> None:
-    """Within the uncertainty of both, the edge is used, so that doors clear their neighbours."""
+def turning_about(inwards_m: float, behind_m: float) -> ArticulatedScene:
+    """A cabinet whose door was filmed turning about a line inside and behind its left edge."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
-    origins = []
-    for off in (0.003, 0.03):
-        place = track.front.world_from_front
-        inside = Rigid3(place.rotation, place.apply(np.array([off, 0.0, 0.0])))
-        moved = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
-        item = build_scene(capture(), [moved], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
-        origins.append(item.joints[0].origin_object[0])
-    np.testing.assert_allclose(origins, [-0.25, -0.22], atol=0.003)
+    place = track.front.world_from_front
+    inside = Rigid3(place.rotation, place.apply(np.array([inwards_m, behind_m, 0.0])))
+    track = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
+    return build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
+
+
+def hinge_of(item: SceneObject) -> np.ndarray:
+    """Distances of the hinge inside and behind the outer edge, in metres."""
+    return np.asarray(item.joints[0].origin_object[:2] + item.dimensions_m[:2] / 2)
+
+
+def test_a_hinge_filmed_far_from_the_edge_keeps_its_filmed_position() -> None:
+    """Within the uncertainty of both, the edge is used, so that doors clear their neighbours."""
+    near, far = (hinge_of(turning_about(off, 0.0).objects[0])[0] for off in (-0.003, -0.03))
+    assert (near, far) == pytest.approx((0.0, -0.03), abs=0.003)
 
 
 def test_a_hinge_filmed_near_the_edge_is_placed_so_that_the_leaf_clears() -> None:
     """Concealed hinges turn inside the edge; a rigid leaf about a line behind its face would swing into its neighbour."""
-    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
-    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
-    assert track.front is not None
-    place = track.front.world_from_front
-    inside = Rigid3(place.rotation, place.apply(np.array([0.008, 0.008, 0.0])))
-    track = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
-    item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
-    edge = np.array([-item.dimensions_m[0] / 2, -item.dimensions_m[1] / 2])
-    inwards, behind = item.joints[0].origin_object[:2] - edge
+    item = turning_about(0.008, 0.008).objects[0]
+    inwards, behind = hinge_of(item)
     assert 0.005 < inwards < 0.008
     assert 0.002 < behind < 0.008
     assert np.hypot(inwards, behind) - inwards < 0.0011
+    assert not any("its hinge" in line for line in item.warnings)
+
+
+@pytest.mark.parametrize(("inwards_m", "behind_m"), [(0.019, 0.019), (0.03, 0.0), (0.035, -0.01)])
+def test_a_hinge_filmed_where_its_door_could_not_turn_is_moved_and_reported(inwards_m: float, behind_m: float) -> None:
+    """The strip outside the hinge would swing into the carcass behind it."""
+    scene = turning_about(inwards_m, behind_m)
+    item = scene.objects[0]
+    model = compile_scene(scene)
+    assert max(sweep(scene, model).values()) < 5e-4
+    assert min(reached(scene, model).values()) > 0.98
+    assert any("its hinge was filmed" in line for line in item.warnings)
 
 
 def test_a_leaf_is_thinned_so_that_it_swings_clear_of_its_carcass() -> None:
-    """The rear edge of an 18 mm leaf that turns about a line 11 mm inside its edge would swing 3 mm into the carcass."""
-    unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
-    track, placement, asset = placed_unit(unit, np.random.default_rng(0))
-    assert track.front is not None
-    place = track.front.world_from_front
-    inside = Rigid3(place.rotation, place.apply(np.array([0.012, 0.002, 0.0])))
-    track = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
-    scene = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
-    item = scene.objects[0]
-    assert item.joints[0].origin_object[0] + item.dimensions_m[0] / 2 > 0.008
+    """The rear edge of an 18 mm leaf that turns about a line 12 mm inside its edge would swing 3 mm into the carcass."""
+    scene = turning_about(0.012, 0.002)
+    assert hinge_of(scene.objects[0])[0] > 0.008
     model = compile_scene(scene)
     assert max(sweep(scene, model).values()) < 5e-4
     assert min(reached(scene, model).values()) > 0.98
