@@ -7,6 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 from r2c2r_core.arrays import DepthMetres, Mask, Points, Vector3
+from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, pixel_rays, project, sample_nearest, unproject
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.geometry.transforms import Rigid3
@@ -163,12 +164,11 @@ def mask_box(view: View) -> np.ndarray:
 
 def known_corners(track: MaskTrack) -> Points:
     """World corners of the measured front or box; empty when the segmenter measured neither."""
-    signs = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     corners = [np.zeros((0, 3))]
     if track.front is not None:
         corners.append(track.front.corners)
     if track.box is not None:
-        corners.append(track.box.world_from_object.apply(signs * track.box.dimensions_m))
+        corners.append(track.box.world_from_object.apply(box_corners(track.box.dimensions_m)))
     return np.concatenate(corners)
 
 

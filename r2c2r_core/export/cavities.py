@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
-from r2c2r_core.robot.rig import CORNERS
+from r2c2r_core.geometry.boxes import box_corners
 
 _WALL_M = 0.03  # maximum thickness of walls, fronts and floors of furniture and ovens
 _WALL_ZONE_M = 0.12  # a plate this near to the outside is a wall, such as a refrigerator's of 8 cm or a recessed back panel
@@ -44,7 +44,7 @@ def cavity_open(model: Any, joint: str) -> float | None:
     inner = [solid for solid in solids if not (slides and _before(solid, centre, outward))]
     if not inner:
         return None
-    front = [centre + CORNERS * half] if slides else []  # a tray is open above its sides, up to its front's top
+    front = [centre + box_corners(2 * half)] if slides else []  # a tray is open above its sides, up to its front's top
     low, high = _between_walls([*front, *(solid.corners for solid in inner)])
     across = np.arange(3) != int(np.argmin(half))
     low[across] = np.maximum(low, centre - half + _WALL_M)[across]
@@ -103,7 +103,7 @@ def _solid(model: Any, data: Any, geom: int, leaf: int) -> _Solid:
         start = int(model.mesh_vertadr[mesh])
         own = model.mesh_vert[start : start + int(model.mesh_vertnum[mesh])].astype(np.float64)
     else:
-        own = CORNERS * model.geom_size[geom]
+        own = box_corners(2 * model.geom_size[geom])
     world = own @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
     corners = (world - data.geom_xpos[leaf]) @ data.geom_xmat[leaf].reshape(3, 3)
     return _Solid(corners, ConvexHull(corners).equations)

@@ -13,6 +13,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.export.free_room import Prism, Solid, free_length, solids_of
 from r2c2r_core.export.plan import Body, Plan
 from r2c2r_core.failing import apart
+from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.handle import Handle, HandleKind, Room
 from r2c2r_core.model.scene import Box, Joint
@@ -176,8 +177,7 @@ def _touch(a: Box, b: Box) -> bool:
 
 
 def _corners(box: Box) -> np.ndarray:
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    return np.asarray(box.link_from_box.apply(corners * box.size_m))
+    return box.link_from_box.apply(box_corners(box.size_m))
 
 
 def _unit(axis: int) -> Vector3:

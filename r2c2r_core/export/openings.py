@@ -6,6 +6,7 @@ from scipy.spatial import ConvexHull
 from r2c2r_core.arrays import Points
 from r2c2r_core.export.reading import UrdfLink
 from r2c2r_core.export.rules.files import BundleFiles
+from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.geometry.hollows import find_hollow
 
 NEEDED_OPENING = 0.9
@@ -30,7 +31,7 @@ def opening_free(link: UrdfLink, files: BundleFiles) -> float | None:
 def shape_corners(box_m: np.ndarray | None, mesh: str | None, files: BundleFiles) -> Points:
     """Corners of a box or vertices of a mesh, in the shape's frame; empty if unreadable."""
     if box_m is not None:
-        return np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * box_m
+        return box_corners(box_m)
     found = files.mesh(mesh) if mesh is not None else None
     return found.vertices if found is not None else np.zeros((0, 3))
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import ExportFailed
+from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.walls import floor_height
 from r2c2r_core.model.handle import Handle
@@ -185,8 +186,7 @@ def _moved_inertial(inertial: Inertial, new_from_old: Rigid3) -> Inertial:
 
 def collider_corners_world(body: Body) -> list[Points]:
     """Corners of each collider of a body in the world, joints closed."""
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    own = [box.link_from_box.apply(corners * box.size_m) for box in body.link.boxes]
+    own = [box.link_from_box.apply(box_corners(box.size_m)) for box in body.link.boxes]
     own += [piece.vertices_link for piece in body.link.pieces]
     return [body.world_from_body.apply(points) for points in own]
 

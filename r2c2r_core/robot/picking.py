@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.robot.grasps import BACK_M, MARGIN_M
 from r2c2r_core.robot.opening import Watch
 from r2c2r_core.robot.ramps import approach_from, ramp, wait
-from r2c2r_core.robot.rig import CORNERS, HALF_PAD_M, STROKE_M, TIP_M, Rig, find_contacts, tool_rotation
+from r2c2r_core.robot.rig import HALF_PAD_M, STROKE_M, TIP_M, Rig, find_contacts, tool_rotation
 
 FURTHER_M = 0.10
 NEAR_M = 0.03  # maximum distance from the goal for success
@@ -211,7 +212,7 @@ def _points_world(rig: Rig, body: int) -> Points:
             ends = np.stack([vertices, np.roll(vertices, 1, axis=1)], axis=2).reshape(-1, 2, 3)
         else:
             pairs = [(a, a | bit) for a in range(8) for bit in (1, 2, 4) if not a & bit]
-            ends = (model.geom_aabb[geom][:3] + CORNERS * model.geom_aabb[geom][3:])[pairs]
+            ends = (model.geom_aabb[geom][:3] + box_corners(2 * model.geom_aabb[geom][3:]))[pairs]
         local = (ends[:, :1] + _ON_EDGE * (ends[:, 1:] - ends[:, :1])).reshape(-1, 3)
         found.append(local @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
     return np.concatenate(found)

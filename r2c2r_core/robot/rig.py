@@ -4,13 +4,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from r2c2r_core.arrays import Matrix3, Points, Vector3
+from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.geometry.transforms import Rigid3
 
 GRIPPER = Path(__file__).with_name("gripper.xml")
@@ -20,7 +20,6 @@ HALF_PAD_M = 0.009  # half the width of a fingertip
 GRIPS_N = (20.0, 40.0)
 CONTROL_STEPS = 5  # simulation steps between two commands
 PREFIX = "gripper/"
-CORNERS = np.array(list(product((-1, 1), repeat=3)))  # (8, 3) signs
 _AXES = ("x", "y", "z", "yaw", "pitch", "roll")
 
 
@@ -186,7 +185,7 @@ def find_contacts(model: Any, data: Any) -> None:
 
 def corners_of(model: Any, data: Any, geom: int) -> Points:
     """Corners (8, 3) of a geom's bounding box, in the world."""
-    local = model.geom_aabb[geom][:3] + CORNERS * model.geom_aabb[geom][3:]
+    local = model.geom_aabb[geom][:3] + box_corners(2 * model.geom_aabb[geom][3:])
     return np.asarray(local @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
 
 

@@ -9,6 +9,7 @@ from r2c2r_core.export.plan import WORLD
 from r2c2r_core.export.reading import Urdf, UrdfInertial, UrdfLink
 from r2c2r_core.export.rules.files import BundleFiles
 from r2c2r_core.export.rules.table import finding
+from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.model.report import Finding
 
 _BEYOND_M = 0.02  # a fitted visual may end this far inside the panels that give the mass
@@ -26,14 +27,13 @@ def check_inertia(urdf: Urdf, files: BundleFiles) -> Iterator[Finding]:
 
 def link_points(link: UrdfLink, files: BundleFiles) -> Points:
     """Corners and vertices of all shapes of a link, in its frame."""
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     points = [np.zeros((0, 3))]
     for shape in link.shapes:
         mesh = None if shape.mesh is None else files.mesh(shape.mesh)
         if mesh is not None:
             points.append(shape.link_from_shape.apply(mesh.vertices * shape.scale))
         elif shape.box_m is not None:
-            points.append(shape.link_from_shape.apply(corners * shape.box_m))
+            points.append(shape.link_from_shape.apply(box_corners(shape.box_m)))
     stacked = np.concatenate(points)
     return stacked[np.isfinite(stacked).all(axis=1)]
 

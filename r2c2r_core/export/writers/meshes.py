@@ -9,6 +9,7 @@ import numpy as np
 from r2c2r_core.arrays import Faces, Image, Points
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.export.plan import Body
+from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.model.mesh import TexturedMesh
 
 MOST_HULL_VERTICES = 64
@@ -89,10 +90,9 @@ def _sharpness(hull: Any) -> np.ndarray:
 
 def box_mesh(body: Body) -> tuple[Points, Faces]:
     """All boxes of a body as one triangle mesh in the body's frame."""
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     if not body.link.boxes:
         return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    vertices = [box.link_from_box.apply(corners * box.size_m) for box in body.link.boxes]
+    vertices = [box.link_from_box.apply(box_corners(box.size_m)) for box in body.link.boxes]
     faces = [_BOX_FACES + 8 * k for k in range(len(vertices))]
     return np.concatenate(vertices), np.concatenate(faces)
 
