@@ -177,7 +177,7 @@ def _thing(rig: Rig, body: int, surfaces: Surfaces | None) -> tuple[Grip, Film |
     for grip_n in GRIPS_N:
         rig.grip_with(grip_n)
         reset(rig)
-        film = None if surfaces is None else film_of(surfaces, rig.model, pick.grasp.translation, _seen_from(rig, pick), 0.4)
+        film = None if surfaces is None else film_of(surfaces, rig, pick.grasp.translation, _seen_from(rig, pick), 0.4)
         put = pick_and_place(rig, pick, film.watch if film is not None else None)
         if put.done:
             break
@@ -200,7 +200,7 @@ def film_of_joint(rig: Rig, travel: Travel, surfaces: Surfaces, least_m: float =
     """A film of the joint's front, with at least `least_m` on all sides."""
     pose, front = travel.world_from_closed, travel.part.front
     reach_m = max(0.8 * float(front.size[0]), 0.8 * float(front.size[2]), least_m)
-    return film_of(surfaces, rig.model, pose.apply(front.centre), _level(-pose.rotation[:, 1]), reach_m)
+    return film_of(surfaces, rig, pose.apply(front.centre), _level(-pose.rotation[:, 1]), reach_m)
 
 
 def _seen_from(rig: Rig, pick: Pick) -> Vector3:

@@ -10,6 +10,7 @@ import numpy as np
 from r2c2r_core.arrays import Image, Vector3
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.robot.motion import about
 from r2c2r_core.robot.rig import Rig
 from r2c2r_core.robot.view import Poses, Surfaces, aimed, look, poses_now
 
@@ -18,6 +19,8 @@ SIZE = (208, 156)
 _FIELD_RAD = 0.9
 _COLOURS = 64
 _SHEET = 8  # pictures of the sheet
+_UP = np.array([0.0, 0.0, 1.0])
+_TURNS = np.deg2rad([37.0, -37.0, 0.0, 75.0, -75.0])  # of the camera to the left of the front's normal
 
 
 @dataclass(slots=True, kw_only=True)
@@ -64,9 +67,22 @@ class Film:
         return look(self.surfaces, self.model, moment, self.camera, self.camera_from_world).rgb
 
 
-def film_of(surfaces: Surfaces, model: Any, target: Vector3, outward: Vector3, reach_m: float) -> Film:
-    """A film of `target`, which faces `outward` (level, unit), from front and side, with `reach_m` around it in view."""
-    side = np.cross([0.0, 0.0, 1.0], outward)
-    away = (outward + 0.75 * side + np.array([0.0, 0.0, 0.45])) * reach_m / np.tan(_FIELD_RAD / 2)
-    camera, camera_from_world = aimed(target + away, target + 0.3 * reach_m * outward, SIZE, _FIELD_RAD)
-    return Film(surfaces=surfaces, model=model, camera=camera, camera_from_world=camera_from_world)
+def film_of(surfaces: Surfaces, rig: Rig, target: Vector3, outward: Vector3, reach_m: float) -> Film:
+    """A film of `target`, which faces `outward` (level, unit), with `reach_m` around it in view.
+
+    Seen from the left in front, or the next of a few directions from which nothing in the rig's scene hides the target.
+    """
+    distance_m = reach_m / np.tan(_FIELD_RAD / 2)
+    views = [target + distance_m * (about(_UP, turn) @ outward * 1.25 + 0.45 * _UP) for turn in _TURNS]
+    eye = next((view for view in views if _sees(rig, view, target)), views[0])
+    camera, camera_from_world = aimed(eye, target + 0.3 * reach_m * outward, SIZE, _FIELD_RAD)
+    return Film(surfaces=surfaces, model=rig.model, camera=camera, camera_from_world=camera_from_world)
+
+
+def _sees(rig: Rig, eye: Vector3, target: Vector3) -> bool:
+    """Whether nothing lies between an eye and the surroundings of a target."""
+    import mujoco
+
+    reach_m = float(np.linalg.norm(target - eye))
+    hit_m = mujoco.mj_ray(rig.model, rig.data, eye, (target - eye) / reach_m, None, 1, -1, np.zeros(1, np.int32), None)
+    return not 0.0 <= hit_m < 0.85 * reach_m

@@ -1,9 +1,11 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from r2c2r_core.robot.certificate import certify_with_gripper, gripper_to_json
+from r2c2r_core.robot.film import film_of
 from r2c2r_core.robot.picking import Pick, plan_pick, things_of
 from r2c2r_core.robot.rig import gripper_in
 from r2c2r_core.robot.view import aimed, look, surfaces_of
@@ -75,8 +77,6 @@ def test_a_gif_and_a_contact_sheet_are_written(tmp_path: Path) -> None:
 
 
 def test_a_rendered_picture_shows_each_body_at_its_pose(tmp_path: Path) -> None:
-    import numpy as np
-
     rig = gripper_in(scene(tmp_path).with_name("scene.xml"), lambda spec: [setattr(g, "group", 2) for g in spec.geoms])
     camera, camera_from_world = aimed(np.array([0.0, -1.5, 0.6]), np.array([0.0, 0.0, 0.6]), (160, 120), 0.8)
     rig.data.qpos[rig.axes[2]] = 3.0  # the gripper out of view
@@ -87,3 +87,17 @@ def test_a_rendered_picture_shows_each_body_at_its_pose(tmp_path: Path) -> None:
     assert seen.body[60, 80] == rig.model.body("block").id
     assert seen.depth_m[60, 80] == pytest.approx(1.47, abs=2e-3)  # the rasteriser's depth at this distance
     assert seen.body[2, 2] == -1
+
+
+@pytest.mark.parametrize("walls", [0, 1])
+def test_a_film_is_seen_from_where_nothing_hides_its_object(tmp_path: Path, walls: int) -> None:
+    """A wall on the left in front of the object."""
+    wall = '<body name="wall"><geom class="hard" type="box" size="0.2 0.01 1" pos="0.35 -0.3 1"/></body>' * walls
+    path = scene(tmp_path, table=TABLE + wall)
+    rig = gripper_in(path, lambda spec: [setattr(g, "group", 2) for g in spec.geoms])
+    block = rig.model.body("block").id
+    film = film_of(surfaces_of(rig.model), rig, rig.data.xpos[block].copy(), np.array([0.0, -1.0, 0.0]), 0.4)
+    seen = look(film.surfaces, rig.model, rig.data, film.camera, film.camera_from_world)
+    assert (seen.body == block).sum() > 300
+    right_of_it = film.camera_from_world.inverse.translation[0] < 0.0
+    assert right_of_it == bool(walls)
