@@ -126,7 +126,8 @@ def as_filmed(motion: Motion, found: JointMotion | None, placed_pose: Rigid3, le
     thick_m = max((float(board.size_m[1]) for board in leaf.boxes if board.role == "front"), default=np.inf)
     if distance > params.same_line:
         clear = _clearing(shift, motion.axis_object, thick_m)
-        return replace(motion, axis_object=axis, origin_object=motion.origin_object + clear)
+        straight = motion.axis_object if (clear != shift).any() else axis  # a limited hinge has no room for a slanting axis
+        return replace(motion, axis_object=straight, origin_object=motion.origin_object + clear)
     mean = known[3:, 3:] @ np.linalg.inv(measured[3:, 3:] + known[3:, 3:]) @ shift
     return replace(motion, origin_object=motion.origin_object + _clearing(mean, motion.axis_object, thick_m))
 

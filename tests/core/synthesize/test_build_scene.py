@@ -14,6 +14,7 @@ from r2c2r_core.model.materials import HEAVY_DOOR_FEEL, SLIDE_FEEL
 from r2c2r_core.model.motion import Inside
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
 from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.robot.motion import about
 from r2c2r_core.synthesize import stage
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from tests.core.motions import motion
@@ -278,13 +279,14 @@ def test_friction_keeps_doors_closed_against_gravity(way: str, opens_by_itself: 
     assert model.dof_frictionloss[0] > max(pull, 0.0)
 
 
-def turning_about(inwards_m: float, behind_m: float) -> ArticulatedScene:
+def turning_about(inwards_m: float, behind_m: float, tilt_rad: float = 0.0) -> ArticulatedScene:
     """A cabinet whose door was filmed turning about a line inside and behind its left edge."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
     place = track.front.world_from_front
-    inside = Rigid3(place.rotation, place.apply(np.array([inwards_m, behind_m, 0.0])))
+    turned = place.rotation @ about(np.array([0.0, 1.0, 0.0]), tilt_rad)
+    inside = Rigid3(turned, place.apply(np.array([inwards_m, behind_m, 0.0])))
     track = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
     return build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
 
@@ -310,10 +312,12 @@ def test_a_hinge_filmed_near_the_edge_is_placed_so_that_the_leaf_clears() -> Non
     assert not any("its hinge" in line for line in item.warnings)
 
 
-@pytest.mark.parametrize(("inwards_m", "behind_m"), [(0.019, 0.019), (0.03, 0.0), (0.035, -0.01)])
-def test_a_hinge_filmed_where_its_door_could_not_turn_is_moved_and_reported(inwards_m: float, behind_m: float) -> None:
+@pytest.mark.parametrize(("inwards_m", "behind_m", "tilt_rad"), [(0.019, 0.019, 0.009), (0.03, 0.0, 0.0), (0.035, -0.01, 0.0)])
+def test_a_hinge_filmed_where_its_door_could_not_turn_is_moved_and_reported(
+    inwards_m: float, behind_m: float, tilt_rad: float
+) -> None:
     """The strip outside the hinge would swing into the carcass behind it."""
-    scene = turning_about(inwards_m, behind_m)
+    scene = turning_about(inwards_m, behind_m, tilt_rad)
     item = scene.objects[0]
     model = compile_scene(scene)
     assert max(sweep(scene, model).values()) < 5e-4
