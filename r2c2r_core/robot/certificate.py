@@ -16,7 +16,7 @@ from r2c2r_core.robot.motion import Travel, travel_of
 from r2c2r_core.robot.opening import Measured, attempt, joints_of, reset
 from r2c2r_core.robot.picking import Pick, pick_and_place, plan_pick, things_of
 from r2c2r_core.robot.rig import GRIPS_N, STROKE_M, Rig, gripper_in
-from r2c2r_core.robot.verdicts import Blame, Verdict, unholdable, verdict_on
+from r2c2r_core.robot.verdicts import Blame, unholdable, verdict_on, verdict_on_pick
 from r2c2r_core.robot.view import Surfaces, surfaces_of
 
 GRIPPER_VERSION = 1
@@ -182,7 +182,7 @@ def _thing(rig: Rig, body: int, surfaces: Surfaces | None) -> tuple[Grip, Film |
         if put.done:
             break
     assert put is not None
-    verdict = None if put.done else Verdict(f"dropped or tipped: it ended {1000 * put.off_m:.0f} mm from its goal", "gripper")
+    verdict = None if put.done else verdict_on_pick(put.lifted, put.off_m, float(rig.model.body_subtreemass[body]))
     grip = Grip(
         kind="thing",
         name=name,

@@ -50,7 +50,12 @@ class Put(NamedTuple):
     @property
     def done(self) -> bool:
         """Whether the object was lifted and stands upright at its goal."""
-        return bool(self.lifted_m > _LIFT_M / 2 and self.off_m < NEAR_M and self.upright > _UPRIGHT)
+        return bool(self.lifted and self.off_m < NEAR_M and self.upright > _UPRIGHT)
+
+    @property
+    def lifted(self) -> bool:
+        """Whether the object left its support."""
+        return self.lifted_m > _LIFT_M / 2
 
 
 def things_of(model: Any) -> list[int]:
@@ -170,11 +175,11 @@ def _free_places(rig: Rig, body: int) -> Iterator[Vector3]:
 
 
 def _stands(model: Any, data: Any, point: Vector3, body: int) -> bool:
-    """Whether a collider lies just below a point."""
+    """Whether the floor or a collider lies just below a point."""
     import mujoco
 
     hit = np.zeros(1, np.int32)
-    groups = np.array([0, 0, 0, 1, 0, 0], np.uint8)  # colliders
+    groups = np.array([0, 1, 0, 1, 0, 0], np.uint8)  # the floor and colliders
     away = mujoco.mj_ray(model, data, point + 0.02 * _UP, -_UP, groups, 1, body, hit, None)
     return 0 <= away < 0.03
 

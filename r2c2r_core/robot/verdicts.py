@@ -36,6 +36,13 @@ def unholdable(travel: Travel | None) -> Verdict:
     return Verdict(f"handle too thick: {size}, the gripper opens {1000 * STROKE_M:.0f} mm", "scan")
 
 
+def verdict_on_pick(lifted: bool, off_m: float, mass_kg: float) -> Verdict:
+    """Verdict on an object that was not moved to its goal."""
+    if not lifted:
+        return Verdict(f"not lifted: its {mass_kg:.1f} kg slipped from the pads", "gripper")
+    return Verdict(f"dropped or tipped: it ended {1000 * off_m:.0f} mm from its goal", "gripper")
+
+
 def verdict_on(model: Any, travel: Travel, way: Way, measured: Measured) -> Verdict | None:
     """Verdict on an attempt; None where the joint was opened and closed."""
     if measured.opened >= OPEN_SHARE and measured.closed <= CLOSED_SHARE:

@@ -20,7 +20,7 @@ def scene(folder: Path, *, radius: float = 0.03, half: float = 0.1, table: str =
   <option timestep="0.002" integrator="implicitfast"/>
   <default><default class="hard"><geom group="3" friction="0.5 0.01 0.001"/></default></default>
   <worldbody>
-    <geom name="floor" type="plane" size="0 0 0.05"/>
+    <geom name="floor" type="plane" size="0 0 0.05" group="1"/>
     {table}
     <body name="block" pos="0 0 {0.5 + half}">
       <freejoint/>
@@ -57,6 +57,17 @@ def test_a_bottle_wider_than_the_stroke_is_held_by_its_neck(tmp_path: Path) -> N
     pick = plan_pick(rig, things_of(rig.model)[0])
     assert isinstance(pick, Pick)
     assert pick.held_m == pytest.approx(0.03, abs=1e-3)
+
+
+def test_an_object_that_stands_on_the_floor_is_moved_unless_it_is_too_heavy(tmp_path: Path) -> None:
+    path = scene(tmp_path, table="")
+    standing = path.read_text().replace('pos="0 0 0.6"', 'pos="0 0 0.1"')
+    path.write_text(standing)
+    (grip,) = certify_with_gripper(path).grips
+    assert grip.passed, grip
+    path.write_text(standing.replace('mass="0.8"', 'mass="30"'))
+    (grip,) = certify_with_gripper(path).grips
+    assert (grip.passed, grip.why, grip.blame) == (False, "not lifted: its 30.0 kg slipped from the pads", "gripper")
 
 
 def test_an_object_without_free_support_nearby_is_not_moved(tmp_path: Path) -> None:
