@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from r2c2r_core.export.alone import ALLOWED_DRIFT_M
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, free_bodies, joint_names, movers_of, touches
+from r2c2r_core.robot.rig import corners_of
 from r2c2r_core.variants.draw import Variation
 
 _POSITIONS = 7  # per joint sweep: enough that a door's edge does not jump over a board
-_DROP_M = 0.02  # maximum distance of a support below an object's base
+_ABOVE_M = 0.02  # height above the base from which a support is sought
 
 
 def colliders_of(root: ET.Element, folder: Path) -> Any:
@@ -80,11 +82,11 @@ def _stands(model: Any, data: Any, body: int) -> bool:
     geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body and model.geom_contype[g]]
     centres = np.array([data.geom_xpos[g] for g in geoms])
     reach = max(float(np.linalg.norm(model.geom_aabb[g][3:5])) for g in geoms) / 2
-    low = min(float(data.geom_xpos[g][2] - abs(data.geom_xmat[g].reshape(3, 3)[2]) @ model.geom_aabb[g][3:]) for g in geoms)
+    low = min(float(corners_of(model, data, g)[:, 2].min()) for g in geoms)
     middle, hit = centres.mean(axis=0), np.zeros(1, np.int32)
     for x, y in ((0, 0), (reach, 0), (-reach, 0), (0, reach), (0, -reach)):
-        at = np.array([middle[0] + x, middle[1] + y, low + _DROP_M])
+        at = np.array([middle[0] + x, middle[1] + y, low + _ABOVE_M])
         away = mujoco.mj_ray(model, data, at, np.array([0.0, 0.0, -1.0]), None, 1, body, hit, None)
-        if not 0 <= away < 2 * _DROP_M:
+        if not 0 <= away < _ABOVE_M + ALLOWED_DRIFT_M:
             return False
     return True

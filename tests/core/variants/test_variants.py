@@ -11,6 +11,7 @@ from r2c2r_core.errors import StageError
 from r2c2r_core.export.simulate import compiled
 from r2c2r_core.robot.handles import part_of
 from r2c2r_core.variants.draw import MASS, SURFACE, Change, Variation, draw
+from r2c2r_core.variants.judge import unfit
 from r2c2r_core.variants.overlay import varied
 from r2c2r_core.variants.stage import Variants, base_of, make_variants
 from tests.core.export.conftest import write_folder
@@ -148,3 +149,17 @@ def _box(model: object) -> tuple[np.ndarray, np.ndarray]:
     own = [g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name.startswith("cabinet_1")]  # type: ignore[attr-defined]
     half = np.array([np.abs(data.geom_xmat[g].reshape(3, 3)) @ model.geom_aabb[g][3:] for g in own])  # type: ignore[attr-defined]
     return (data.geom_xpos[own] - half).min(axis=0), (data.geom_xpos[own] + half).max(axis=0)
+
+
+@pytest.mark.parametrize(("gap_mm", "reason"), [(0.5, None), (15.0, "an object hangs over an edge")])
+def test_an_object_must_stand_on_its_support(gap_mm: float, reason: str | None) -> None:
+    """A mesh whose bounding box is not centred on its centre of mass, as most are."""
+    model = mujoco.MjModel.from_xml_string(f"""
+<mujoco>
+  <asset><mesh name="cone" vertex="0.03 0.03 0  -0.03 0.03 0  0.03 -0.03 0  -0.03 -0.03 0  0 0 0.2"/></asset>
+  <worldbody>
+    <geom type="box" size="0.3 0.3 0.02" pos="0 0 -0.02"/>
+    <body pos="0 0 {gap_mm / 1000}"><freejoint/><geom type="mesh" mesh="cone"/></body>
+  </worldbody>
+</mujoco>""")
+    assert unfit(model, {}) == reason
