@@ -118,15 +118,13 @@ def _grasps(rig: Rig, body: int) -> Iterator[Pick]:
     for tilt in _TILTS:
         for height in _HEIGHTS if tilt < 1.0 else (0.5,):
             for turn in _TURNS:
-                pick = _grasp(points, tilt, height, turn)
-                if pick is not None:
-                    pose, width = pick
+                if (found := _grasp(points, tilt, height, turn)) is not None:
                     yield Pick(
                         body=body,
-                        grasp=pose,
+                        grasp=found[0],
                         shift=np.zeros(3),
                         wide_m=STROKE_M,
-                        held_m=width,
+                        held_m=found[1],
                         address=int(rig.model.jnt_qposadr[rig.model.body_jntadr[body]]),
                     )
 
