@@ -1,7 +1,7 @@
 """Random sampling of variants from the bundle's uncertainties and from fixed ranges."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,7 @@ class Change:
     texture: str | None = None  # of TEXTURES; None: the scan's own
     shift_m: tuple[float, float] = (0.0, 0.0)  # of a free object, horizontal
     turn_rad: float = 0.0
+    shape: str | None = None  # the object of its category whose shape it takes; None: its own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,10 +61,11 @@ def draw(rng: np.random.Generator, objects: Sequence[Mapping[str, Any]]) -> Vari
     """A random variation of the objects of a manifest."""
     fronts = _finish(rng, "wood") if rng.random() < RETEXTURED else (None, _tint(rng))
     stone = _finish(rng, "stone") if rng.random() < RETEXTURED else (None, _tint(rng))
-    changes = tuple(_change(rng, entry, fronts, stone) for entry in objects)
+    changes = [_change(rng, entry, fronts, stone) for entry in objects]
+    shapes = _shapes(rng, objects)
     joints = [joint["name"] for entry in objects for joint in entry["joints"]]
     return Variation(
-        changes=changes,
+        changes=tuple(replace(change, shape=shapes.get(change.name)) for change in changes),
         damping={name: _times(rng, DAMPING) for name in joints},
         friction={name: _times(rng, FRICTION) for name in joints},
         ajar={name: float(rng.uniform(0.0, AJAR_MOST)) for name in joints if rng.random() < AJAR},
@@ -74,10 +76,25 @@ def draw(rng: np.random.Generator, objects: Sequence[Mapping[str, Any]]) -> Vari
 Finish = tuple[str | None, tuple[float, float, float]]
 
 
+def _shapes(rng: np.random.Generator, objects: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Shapes of free objects, exchanged at random within each category; without those that keep their own."""
+    alike: dict[str, list[str]] = {}
+    for entry in objects:
+        if _loose(entry):
+            alike.setdefault(entry["category"], []).append(entry["name"])
+    pairs = [pair for names in alike.values() for pair in zip(names, rng.permutation(names).tolist(), strict=True)]
+    return {name: shape for name, shape in pairs if shape != name}
+
+
+def _loose(entry: Mapping[str, Any]) -> bool:
+    """Whether an object may be moved about: what lies in a drawer has no room."""
+    return bool(entry["movable"] and entry.get("carried_by") is None)
+
+
 def _change(rng: np.random.Generator, entry: Mapping[str, Any], fronts: Finish, stone: Finish) -> Change:
     kind = KIND_OF.get(entry["category"], "thing" if entry["movable"] else "wood")
     texture, tint = {"wood": fronts, "stone": stone}.get(kind, (None, _tint(rng)))
-    loose = entry["movable"] and entry.get("carried_by") is None  # a drawer's sides leave no room
+    loose = _loose(entry)
     level = rng.uniform(-SHIFT_M, SHIFT_M, 2) if loose else np.zeros(2)
     return Change(
         name=entry["name"],

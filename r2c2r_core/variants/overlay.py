@@ -23,10 +23,15 @@ def varied(scene: ET.Element, variation: Variation, halves: Mapping[str, np.ndar
     assert compiler is not None
     compiler.set("meshdir", BASE)
     compiler.set("texturedir", BASE)
+    bodies = {links.get(body.get("name", "")): body for body in _world(scene).findall("body")}
     for body in root.iter("body"):
         name = body.get("name", "")
         if name in links:
-            _vary_body(root, body, changes[links[name]], halves[links[name]], top=body in list(_world(root)))
+            change = changes[links[name]]
+            half = halves[change.shape or change.name]
+            if change.shape is not None:
+                _take_shape(body, bodies[change.shape], float(half[2] - halves[change.name][2]))
+            _vary_body(root, body, change, half, top=body in list(_world(root)))
     for joint in root.iter("joint"):
         name = joint.get("name", "")
         _multiply(joint, "damping", variation.damping.get(name, 1.0))
@@ -82,6 +87,20 @@ def _vary_body(root: ET.Element, body: ET.Element, change: Change, half: np.ndar
         if site.get("type") == "box":
             turn = _matrix(_numbers(site, "quat"))  # a permutation of axes
             site.set("size", _text(_numbers(site, "size") * (np.abs(turn.T) @ scale)))
+
+
+def _take_shape(body: ET.Element, other: ET.Element, rise_m: float) -> None:
+    """Replace a free body's shape and mass by another's; `rise_m` keeps its underside in place."""
+    position = _numbers(body, "pos")
+    body.set("pos", _text([*position[:2], position[2] + rise_m]))
+    for part in [part for part in body if part.tag != "freejoint"]:
+        body.remove(part)
+    for part in other:
+        if part.tag != "freejoint":
+            taken = copy.deepcopy(part)
+            if taken.get("name") is not None:
+                taken.set("name", taken.get("name", "").replace(other.get("name", ""), body.get("name", ""), 1))
+            body.append(taken)
 
 
 def _dress(root: ET.Element, geom: ET.Element, change: Change) -> None:

@@ -163,3 +163,33 @@ def test_an_object_must_stand_on_its_support(gap_mm: float, reason: str | None) 
   </worldbody>
 </mujoco>""")
     assert unfit(model, {}) == reason
+
+
+def test_bottles_exchange_their_shapes_and_stay_on_their_support() -> None:
+    free = {"movable": True, "placement": None, "dimension_source": ["measured"] * 3, "joints": []}
+    categories = {"bottle_1": "bottle", "bottle_2": "bottle", "mug_1": "mug"}
+    objects = [{"name": name, "category": category, **free} for name, category in categories.items()]
+    drawn = [draw(np.random.default_rng(seed), objects) for seed in range(10)]
+    shapes = [{change.name: change.shape for change in variation.changes} for variation in drawn]
+    assert {"bottle_1": "bottle_2", "bottle_2": "bottle_1", "mug_1": None} in shapes
+    assert {"bottle_1": None, "bottle_2": None, "mug_1": None} in shapes
+
+    halves = {"bottle_1": np.array([0.03, 0.03, 0.1]), "bottle_2": np.array([0.04, 0.04, 0.15])}
+    bodies = "".join(
+        f'<body name="{name}_base" pos="{x} 0 {half[2]}" quat="1 0 0 0">'
+        f'<inertial pos="0 0 0" mass="{x}" fullinertia="0.01 0.01 0.01 0 0 0"/><freejoint name="{name}_free"/>'
+        f'<geom name="{name}_base_col_0" type="box" size="{half[0]} {half[1]} {half[2]}"/></body>'
+        for x, (name, half) in enumerate(halves.items(), start=1)
+    )
+    scene = ET.fromstring(f"<mujoco><compiler/><asset/><worldbody>{bodies}</worldbody></mujoco>")
+    swapped = {"bottle_1": "bottle_2", "bottle_2": "bottle_1"}
+    changes = tuple(Change(name=name, shape=shape) for name, shape in swapped.items())
+    joints: dict[str, float] = {}
+    variation = Variation(changes=changes, damping=joints, friction=joints, ajar=joints, surface=0.5)
+    root = varied(scene, variation, halves, {f"{name}_base": name for name in halves})
+    model = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+    for name, shape in swapped.items():
+        np.testing.assert_allclose(model.geom(f"{name}_base_col_0").size, halves[shape])
+        assert model.body(f"{name}_base").mass[0] == {"bottle_1": 2.0, "bottle_2": 1.0}[name]
+        assert model.body(f"{name}_base").pos[0] == {"bottle_1": 1.0, "bottle_2": 2.0}[name]
+        assert model.body(f"{name}_base").pos[2] == pytest.approx(halves[shape][2])
