@@ -133,7 +133,7 @@ def as_filmed(motion: Motion, found: JointMotion | None, placed_pose: Rigid3, le
 
 
 def hinge_notice(motion: Motion, found: JointMotion | None, placed_pose: Rigid3) -> str | None:
-    """A line where the leaf could not turn about its filmed hinge, so that the joint is elsewhere."""
+    """A line where the joint is far from its filmed hinge."""
     if motion.type != "revolute" or found is None or found.pivot_world is None:
         return None
     arm = placed_pose.inverse.apply(found.pivot_world) - motion.origin_object
@@ -141,7 +141,7 @@ def hinge_notice(motion: Motion, found: JointMotion | None, placed_pose: Rigid3)
     if off_m <= 2 * tuned(Params).hinge_m:
         return None
     where = f"{motion.part}: its hinge was filmed {1000 * off_m:.0f} mm from where it is built"
-    return f"{where}, as it would hit its unit or its neighbour there; check the clicks at its edges"
+    return f"{where}: it was measured too roughly, or its leaf could not turn there; check the clicks at its edges"
 
 
 def _clearing(shift: Vector3, axis: Vector3, thick_m: float) -> Vector3:
