@@ -4,13 +4,14 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from playwright.sync_api import Page
+from playwright.sync_api import Locator, Page
 
 from tests.waiting import PATIENCE_MS, until
 
 LONG_MS = 4 * PATIENCE_MS  # software GL is slow
 PICTURES = os.environ.get("R2C2R_PICTURES")  # a folder in which tests store screenshots of the pages
 AXE = Path(__file__).parents[2] / "static" / "node_modules" / "axe-core" / "axe.min.js"
+SCROLL = "element => (element.scrollIntoView({ block: 'center', behavior: 'instant' }), element.isConnected)"
 SETTLE = "document.getAnimations().forEach((one) => one.effect.getComputedTiming().endTime < Infinity && one.finish())"
 FINDINGS = "axe.run({ exclude: ['iframe'] }, { resultTypes: ['violations'] })"  # viser's page is third-party
 
@@ -22,6 +23,11 @@ def each_theme(page: Page) -> Iterator[str]:
         page.evaluate(SETTLE)
         yield theme
     page.emulate_media(color_scheme="null")
+
+
+def scroll_to(located: Locator) -> None:
+    """Scroll an element into view, again if the page replaces it meanwhile, on which Playwright's own method fails."""
+    until(lambda: located.evaluate(SCROLL), f"{located} is replaced all the time")
 
 
 def picture(page: Page, name: str, *, still: bool = False) -> None:

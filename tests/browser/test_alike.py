@@ -5,7 +5,7 @@ from functools import partial
 
 from playwright.sync_api import expect
 
-from tests.browser.looks import picture, serious
+from tests.browser.looks import picture, scroll_to, serious
 from tests.browser.serving import NewContext
 from tests.browser.test_together import rows, sample
 from tests.browser.together import Server, post, signed_in
@@ -39,7 +39,7 @@ def test_proposals_similar_to_an_object_are_listed_and_confirmed(new_context: Ne
     expect(proposals.get_by_role("heading")).to_have_text("Like pull_out_1 (2)")
     expect(shown.first).to_contain_text("50 % alike")
     expect(shown.first).to_have_class("current")
-    proposals.scroll_into_view_if_needed()
+    scroll_to(proposals)
     picture(page, "alike")
     assert serious(page, "alike") == []
     answers: list[Callable[[], None]] = []

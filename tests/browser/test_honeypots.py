@@ -6,7 +6,7 @@ from pathlib import Path
 from playwright.sync_api import expect
 
 from tests.app.test_honeypots import write_truth
-from tests.browser.looks import picture, serious
+from tests.browser.looks import picture, scroll_to, serious
 from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_together import click_frame, ready, rows, sample
 from tests.browser.together import Server, signed_in
@@ -44,7 +44,7 @@ def test_a_honeypot_is_assigned_annotated_and_scored(new_context: NewContext, se
     expect(line.locator("td").nth(1)).to_have_text("0 of 2")
     expect(line.locator("td").nth(2)).to_have_text("1")
     expect(line.locator("th")).to_have_text("cleo")
-    line.scroll_into_view_if_needed()
+    scroll_to(line)
     picture(ann, "honeypots")
     assert serious(ann, "people with honeypots") == []
     ann.set_viewport_size({"width": 390, "height": 800})

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from playwright.sync_api import expect
 
-from tests.browser.looks import picture, serious
+from tests.browser.looks import picture, scroll_to, serious
 from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_together import click_frame, ready, rows, sample
 from tests.browser.together import Server, post, signed_in
@@ -31,7 +31,7 @@ def test_a_second_opinion_is_requested_given_and_compared(new_context: NewContex
     section.get_by_role("button", name="Ask for a second opinion").press("Enter")
     wait_for_toast(ann, "It is in the inbox of bea.")
     expect(section.get_by_role("listitem")).to_contain_text("Sample kitchen (opinion of bea)")
-    section.scroll_into_view_if_needed()
+    scroll_to(section)
     picture(ann, "opinions-overview")
     assert serious(ann, "overview with second opinions") == []
 

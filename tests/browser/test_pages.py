@@ -5,6 +5,7 @@ import re
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,9 @@ from playwright.sync_api import Page, expect
 
 from app.serve import register_finished
 from tests.app.nouns import finish
-from tests.browser.looks import AXE, serious
+from tests.browser.looks import AXE, scroll_to, serious
 from tests.browser.serving import NewContext, printed_again, served, wait_for_toast
+from tests.waiting import until
 
 REPORT = {
     "certificate": {"passed": True, "findings": [{"rule": "r", "severity": "warning", "where": "drawer_1", "message": "m"}]}
@@ -159,8 +161,8 @@ def test_simulator_code_is_copied_by_keyboard_and_grasps_are_shown(new_context: 
     expect(page.get_by_text("x 1.9, y 0.6 m, lifted 0.1 m: drawer_1_joint")).to_be_visible()
     for name in ("A parallel gripper at drawer_1_joint", "The floor plan with the places where it may stand"):
         picture = page.get_by_role("img", name=name)
-        picture.scroll_into_view_if_needed()
-        page.wait_for_function("image => image.naturalWidth > 0", arg=picture.element_handle())
+        scroll_to(picture)
+        until(partial(picture.evaluate, "image => image.naturalWidth > 0"), f"{name!r} is not loaded")
 
 
 def test_a_button_pressed_while_its_list_rerenders_is_still_clicked(new_context: NewContext, finished: tuple[str, str]) -> None:

@@ -14,7 +14,7 @@ from app.viewer.camera import USUAL_FOV, from_axis
 from r2c2r_core.export.plan import facing, plan_bundle
 from tests.app.finished import keep_results
 from tests.app.nouns import finish
-from tests.browser.looks import picture
+from tests.browser.looks import picture, scroll_to
 from tests.browser.serving import NewContext, box_of, wait_for_toast
 from tests.browser.test_together import sample, say, viewed
 from tests.browser.together import Server, signed_in
@@ -133,8 +133,8 @@ def test_a_hinge_correction_is_previewed_and_marks_results_stale(new_context: Ne
     page.goto(f"{project}/run")
     expect(page.get_by_role("heading", name="Certificate")).to_contain_text("stale")
     warning = page.get_by_text("still overlap by 12 mm")
-    warning.scroll_into_view_if_needed()
-    expect(warning).to_be_in_viewport()
+    expect(warning).to_be_visible()
+    scroll_to(warning)
     picture(page, "warnings")
     assert Path(server.data / "projects" / project.split("/p/")[1] / "work" / "bundle.zip").is_file()  # nothing was recomputed
 

@@ -2,7 +2,7 @@
 
 from playwright.sync_api import expect
 
-from tests.browser.looks import picture
+from tests.browser.looks import picture, scroll_to
 from tests.browser.serving import NewContext
 from tests.browser.together import Server, signed_in
 
@@ -21,5 +21,5 @@ def test_the_seat_list_names_the_objects_of_a_helping_seat(new_context: NewConte
     rows = page.locator("r2c2r-seat-list tbody tr")
     expect(rows.nth(0)).to_contain_text("Kitchen A generate, 40 %")
     expect(rows.nth(1)).to_contain_text("Kitchen A generate, helps: drawer_1, mug_1")
-    rows.nth(1).scroll_into_view_if_needed()
+    scroll_to(rows.nth(1))
     picture(page, "seats")

@@ -2,7 +2,7 @@
 
 from playwright.sync_api import expect
 
-from tests.browser.looks import picture, serious
+from tests.browser.looks import picture, scroll_to, serious
 from tests.browser.serving import NewContext, wait_for_toast
 from tests.browser.test_together import click_frame, pick, ready, rows, sample, say, viewed
 from tests.browser.together import Server, signed_in
@@ -41,7 +41,7 @@ def test_a_template_is_saved_edited_adopted_and_clicked(new_context: NewContext,
     project = sample(page)
     todo = page.get_by_role("region", name="Objects to click")
     expect(todo).to_contain_text("2 of 4 are clicked. Still to click: oven_1, range_hood.")
-    todo.scroll_into_view_if_needed()
+    scroll_to(todo)
     picture(page, "templates-overview")
     assert serious(page, "overview with objects to click") == []
 
