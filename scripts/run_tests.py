@@ -14,7 +14,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 PATIENCE = float(os.environ.get("R2C2R_PATIENCE", "1"))
-LONGEST_S = 900 * PATIENCE  # for one test, including its fixtures
+LONGEST_S = 600 * PATIENCE  # for one test, including its fixtures
+BLOCKED_S = 30 * PATIENCE  # after LONGEST_S, a process that cannot run Python code (a deadlock in a library) is ended
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
 TWO_WORKERS = ("-n", "2", "--dist", "worksteal")  # half of the tests each, then tests that the other has not begun
 WITHOUT_BROWSER = ("not browser", "--ignore=tests/browser")  # ignored folders are not even imported
@@ -76,7 +77,9 @@ def run_pytest(*arguments: str) -> tuple[int, dict[str, str]]:
     """Exit code of one pytest run, and the reports of its failed tests by node id."""
     path = BUILD / "failures.jsonl"
     path.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "pytest", "-p", "tests.suite", f"--failures={path}", f"--timeout={LONGEST_S}", *arguments]
+    blocked = ("-o", f"faulthandler_timeout={LONGEST_S + BLOCKED_S}", "-o", "faulthandler_exit_on_timeout=true")
+    limits = (f"--timeout={LONGEST_S}", *blocked)
+    command = [sys.executable, "-m", "pytest", "-p", "tests.suite", f"--failures={path}", *limits, *arguments]
     code = subprocess.call(command, cwd=ROOT)
     lines = path.read_text().splitlines() if path.exists() else []
     return code, {line["test"]: line["report"] for line in map(json.loads, lines)}

@@ -21,6 +21,18 @@ def test_once():
     before.touch()
     assert seen, "too early"
 """
+BLOCKED = """
+import ctypes
+from pathlib import Path
+
+def test_blocked():
+    before = Path(__file__).with_name("before")
+    seen = before.exists()
+    before.touch()
+    if not seen:
+        mutex, locked = ctypes.create_string_buffer(64), ctypes.PyDLL(None).pthread_mutex_lock
+        locked(mutex), locked(mutex)  # blocks for ever, holding the GIL
+"""
 
 
 @pytest.fixture
@@ -62,6 +74,19 @@ def test_a_repeated_failure_or_a_collection_error_fails_the_run(
     ]
     (tmp_path / "test_b.py").write_text("import nothing_of_this_name\n")
     assert runner.run_python([("-n", "0")], []) != 0
+
+
+def test_a_worker_that_blocks_outside_python_is_ended_and_its_test_is_rerun(
+    runner: ModuleType, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner, "LONGEST_S", 1)
+    monkeypatch.setattr(runner, "BLOCKED_S", 0)
+    (tmp_path / "test_a.py").write_text(BLOCKED)
+    (tmp_path / "test_b.py").write_text("def test_always():\n    pass\n")
+    assert runner.run_python([("-n", "2", "--dist", "worksteal")], []) == 0
+    said = capfd.readouterr().out
+    assert "1 failed, 1 passed" in said
+    assert said.splitlines()[-1] == "FLAKY test_a.py::test_blocked: failed in the suite, passed alone"
 
 
 def test_a_pass_without_tests_succeeds_but_a_run_without_tests_fails(runner: ModuleType, tmp_path: Path) -> None:
