@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points, TextureCoords
+from r2c2r_core.generate.unwrap import unwrap
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.meshes import face_normals, vertex_normals
 from r2c2r_core.geometry.raster import rasterize
@@ -77,11 +78,8 @@ def planar_atlas(vertices: Points, faces: Faces, longest_px: int, finest_m: floa
 
 def unwrapped_atlas(vertices: Points, faces: Faces, size_px: int) -> Atlas:
     """Atlas of xatlas charts on a square texture."""
-    import xatlas
-
-    source, skin_faces, uv = xatlas.parametrize(vertices.astype(np.float32), faces.astype(np.uint32))
-    source, skin_faces = source.astype(np.int64), skin_faces.astype(np.int64)
-    uv = uv.astype(np.float64) * (1.0 - 4.0 / size_px) + 2.0 / size_px
+    source, skin_faces, uv = unwrap(vertices, faces)
+    uv = uv * (1.0 - 4.0 / size_px) + 2.0 / size_px
     points = _uv_raster(uv, skin_faces, vertices[source], size_px)
     normals = _uv_raster(uv, skin_faces, vertex_normals(vertices, faces)[source], size_px)
     covered = _uv_raster(uv, skin_faces, np.ones((len(uv), 3)), size_px)[..., 0] > 0.5
