@@ -163,6 +163,11 @@ def test_simulator_code_is_copied_by_keyboard_and_grasps_are_shown(new_context: 
         picture = page.get_by_role("img", name=name)
         scroll_to(picture)
         until(partial(picture.evaluate, "image => image.naturalWidth > 0"), f"{name!r} is not loaded")
+    play = page.get_by_role("button", name="Play A parallel gripper at drawer_1_joint")
+    for playing in (True, False):
+        play.press("Enter")
+        expect(play).to_have_attribute("aria-pressed", str(playing).lower())
+        assert page.locator(".film img").evaluate("sheet => sheet.getAnimations().length") == playing
 
 
 def test_a_button_pressed_while_its_list_rerenders_is_still_clicked(new_context: NewContext, finished: tuple[str, str]) -> None:

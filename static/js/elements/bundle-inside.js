@@ -51,6 +51,13 @@ function assetTable(inside) {
   return region("Objects to download alone", table(["Object", "Category", "Files", "Zip"], rows));
 }
 
+/** Keyframes that show the moments of a sheet of two rows of four, each for the same time. */
+const MOMENTS = Array.from({ length: 8 }, (_, k) => ({
+  translate: `${-25 * (k % 4)}% ${k < 4 ? 0 : -50}%`,
+  offset: k / 8,
+  easing: "step-end",
+}));
+
 /**
  * Card of one robot: its result for each grip, pictures, and base positions.
  * @param {BundleInside["robots"][number]} robot
@@ -60,7 +67,7 @@ export function robotCard(robot) {
     h(
       "tr",
       {},
-      h("td", {}, grip.picture ? sheet(grip.picture, `${robot.name} at ${grip.name}`) : "–"),
+      h("td", {}, grip.picture ? film(grip.picture, `${robot.name} at ${grip.name}`) : "–"),
       h("th", { scope: "row" }, grip.name),
       h("td", {}, h("span", { class: `chip ${grip.passed ? "good" : "bad"}` }, grip.passed ? "done" : "not done")),
       h("td", {}, grip.method ?? "–"),
@@ -91,7 +98,7 @@ function standing(robot, address) {
   return h(
     "div",
     { class: "split" },
-    sheet(address, "The floor plan with the places where it may stand"),
+    linked(address, sheet(address, "The floor plan with the places where it may stand")),
     h("div", {}, h("h3", {}, "Where to stand"), h("ol", {}, ...places)),
   );
 }
@@ -151,13 +158,49 @@ function copyable(text, what) {
 }
 
 /**
- * Picture that links to its full-size image.
+ * Link with a picture to its full-size image.
+ * @param {string} address
+ * @param {HTMLElement} picture
+ */
+function linked(address, picture) {
+  return h("a", { href: address, target: "_blank" }, picture);
+}
+
+/**
  * @param {string} address
  * @param {string} text
  */
 function sheet(address, text) {
-  const picture = h("img", { src: address, alt: text, loading: "lazy", class: "sheet" });
-  return h("a", { href: address, target: "_blank" }, picture);
+  return h("img", { src: address, alt: text, loading: "lazy", class: "sheet" });
+}
+
+/**
+ * Contact sheet of eight moments with a button that shows them one after another.
+ * @param {string} address
+ * @param {string} text
+ */
+function film(address, text) {
+  const moments = sheet(address, text);
+  const frame = h("div", { class: "film" }, linked(address, moments));
+  /** @type {Animation | undefined} */
+  let shown;
+  const play = h(
+    "button",
+    {
+      class: "quiet",
+      "aria-label": `Play ${text}`,
+      "aria-pressed": "false",
+      "data-at": `film:${address}`,
+      onclick: () => {
+        const playing = frame.classList.toggle("playing");
+        play.setAttribute("aria-pressed", String(playing));
+        shown?.cancel();
+        if (playing) shown = moments.animate(MOMENTS, { duration: 600 * MOMENTS.length, iterations: Infinity });
+      },
+    },
+    "Play",
+  );
+  return h("div", { class: "film-row" }, frame, play);
 }
 
 /**
