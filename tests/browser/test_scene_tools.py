@@ -133,8 +133,8 @@ def test_a_hinge_correction_is_previewed_and_marks_results_stale(new_context: Ne
     page.goto(f"{project}/run")
     expect(page.get_by_role("heading", name="Certificate")).to_contain_text("stale")
     warning = page.get_by_text("still overlap by 12 mm")
-    expect(warning).to_be_visible()
     scroll_to(warning)
+    expect(warning).to_be_in_viewport()
     picture(page, "warnings")
     assert Path(server.data / "projects" / project.split("/p/")[1] / "work" / "bundle.zip").is_file()  # nothing was recomputed
 
