@@ -11,8 +11,8 @@ import ipaddress
 import socket
 import ssl
 import threading
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
 from app.errors import Forbidden
@@ -22,6 +22,9 @@ Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 TOTAL_S = 10.0  # from connecting to the answer's last header
 PORTS = {"http": 80, "https": 443}
 ALLOW = "the server's operator can allow a network: R2C2R_WEBHOOKS_TO=10.1.0.0/16"
+_TRANSLATED = tuple(  # IPv6 addresses that may reach private IPv4 or site-local hosts, which `is_global` does not tell
+    ipaddress.ip_network(prefix) for prefix in ("::/96", "64:ff9b::/96", "64:ff9b:1::/48", "2002::/16", "fec0::/10")
+)
 
 
 def networks(text: str) -> tuple[Network, ...]:
@@ -41,21 +44,19 @@ def post(url: str, content: bytes, headers: Mapping[str, str], allowed: Sequence
     """Status of the answer, whose body is not read. Raises OSError or HTTPException, Forbidden for a private address."""
     parts = urlsplit(url)
     host, port = parts.hostname or "", parts.port or PORTS[parts.scheme]
-    plain = socket.create_connection((_address_of(host, port, allowed), port), timeout=TOTAL_S)
-    ending = threading.Timer(TOTAL_S, _end, (plain,))  # a slow trickle of bytes does not extend the time limit
-    ending.start()
-    try:
-        made = ssl.create_default_context().wrap_socket(plain, server_hostname=host) if parts.scheme == "https" else plain
-        with made:
-            connection = http.client.HTTPConnection(host, port)
-            connection.sock = made
-            at = f"{parts.path or '/'}{'?' + parts.query if parts.query else ''}"
-            named = parts.netloc if port != PORTS[parts.scheme] else parts.netloc.removesuffix(f":{port}")
-            connection.request("POST", at, content, {"Host": named, "Content-Type": "application/json", **headers})
-            return connection.getresponse().status
-    finally:
-        ending.cancel()
-        plain.close()
+    with (
+        socket.create_connection((_address_of(host, port, allowed), port), timeout=TOTAL_S) as plain,
+        _encrypted(plain, host) if parts.scheme == "https" else plain as made,
+        _time_limit(made),
+    ):
+        if isinstance(made, ssl.SSLSocket):
+            made.do_handshake()
+        connection = http.client.HTTPConnection(host, port)
+        connection.sock = made
+        at = f"{parts.path or '/'}{'?' + parts.query if parts.query else ''}"
+        named = parts.netloc if port != PORTS[parts.scheme] else parts.netloc.removesuffix(f":{port}")
+        connection.request("POST", at, content, {"Host": named, "Content-Type": "application/json", **headers})
+        return connection.getresponse().status
 
 
 def _address_of(host: str, port: int, allowed: Sequence[Network]) -> str:
@@ -63,11 +64,28 @@ def _address_of(host: str, port: int, allowed: Sequence[Network]) -> str:
     for text in found:
         address = ipaddress.ip_address(str(text).partition("%")[0])
         address = getattr(address, "ipv4_mapped", None) or address
-        if not (address.is_global and not address.is_multicast) and not any(address in network for network in allowed):
+        public = address.is_global and not address.is_multicast and not any(address in prefix for prefix in _TRANSLATED)
+        if not public and not any(address in network for network in allowed):
             raise Forbidden(f"{host} is {address}, which is not a public address", hint=ALLOW)
     return str(found[0])
 
 
-def _end(connection: socket.socket) -> None:
+def _encrypted(plain: socket.socket, host: str) -> ssl.SSLSocket:
+    """The socket with TLS, before its handshake. It takes over the file descriptor: `plain` no longer has one."""
+    return ssl.create_default_context().wrap_socket(plain, server_hostname=host, do_handshake_on_connect=False)
+
+
+@contextmanager
+def _time_limit(connection: socket.socket) -> Iterator[None]:
+    """Shut the connection down after TOTAL_S, as a slow trickle of bytes never exceeds the socket's own timeout."""
+    ending = threading.Timer(TOTAL_S, _shut_down, (connection,))
+    ending.start()
+    try:
+        yield
+    finally:
+        ending.cancel()
+
+
+def _shut_down(connection: socket.socket) -> None:
     with suppress(OSError):
-        connection.shutdown(socket.SHUT_RDWR)
+        socket.socket.shutdown(connection, socket.SHUT_RDWR)  # an SSLSocket's own would go on without encryption

@@ -122,13 +122,13 @@ def _once(
     endpoint: Endpoint, method: str, path: str, body: bytes | None, content_type: str, progress: Progress
 ) -> tuple[int, bytes, float]:
     """Status, body and Retry-After of one request, which runs in its own thread so that it can be cancelled."""
-    connection, connected = _connection(endpoint), threading.Event()
+    connection, opened = _connection(endpoint), list[socket.socket]()
     outcome: list[tuple[int, bytes, float] | BaseException] = []
 
     def talk() -> None:
         try:
             connection.connect()
-            connected.set()
+            opened.append(connection.sock)  # the connection itself forgets it once the answer begins
             connection.sock.settimeout(endpoint.patience.answer_s)
             headers = {"Content-Type": content_type, "Accept": "*/*", "Connection": "close"}
             if endpoint.token:
@@ -151,9 +151,9 @@ def _once(
                 raise _NoAnswer
             thread.join(_POLL_S)
     finally:
-        _hang_up(connection)
+        _hang_up(opened)
         thread.join(2.0)
-    if isinstance(outcome[0], TimeoutError) and connected.is_set():
+    if isinstance(outcome[0], TimeoutError) and opened:
         raise _NoAnswer from outcome[0]
     if isinstance(outcome[0], BaseException):
         raise outcome[0]
@@ -166,10 +166,11 @@ def _connection(endpoint: Endpoint) -> http.client.HTTPConnection:
     return make(parts.hostname or "", parts.port, timeout=endpoint.patience.connect_s)
 
 
-def _hang_up(connection: http.client.HTTPConnection) -> None:
+def _hang_up(opened: list[socket.socket]) -> None:
     """Shut the connection down, even while a thread reads from it: that thread then finds it closed."""
-    with contextlib.suppress(OSError, AttributeError):  # not connected yet, or closed already
-        connection.sock.shutdown(socket.SHUT_RDWR)
+    for connection in opened:
+        with contextlib.suppress(OSError):  # closed already
+            connection.shutdown(socket.SHUT_RDWR)
 
 
 def _bounded(response: http.client.HTTPResponse) -> bytes:

@@ -29,6 +29,7 @@ from tests.app.conftest import FAKE_COMMANDS
 from tests.app.people import PASSWORD
 from tests.app.served import served
 from tests.app.test_imports import archive
+from tests.app.tls import certificate
 from tests.waiting import PATIENCE_S, until
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
@@ -49,16 +50,6 @@ def free_port() -> int:
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return int(found.getsockname()[1])
-
-
-def certificate(folder: Path) -> tuple[Path, Path]:
-    if shutil.which("openssl") is None:
-        pytest.skip("no openssl here: apt-get install openssl")
-    made, key = folder / "certificate.pem", folder / "key.pem"
-    command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2"]
-    names = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"]
-    subprocess.run([*command, *names, "-keyout", key, "-out", made], check=True, capture_output=True)
-    return made, key
 
 
 def with_line(site: str, known: str, instead: str) -> str:

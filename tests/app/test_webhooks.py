@@ -4,6 +4,7 @@ import hashlib
 import hmac
 import json
 import socket
+import ssl
 import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -21,6 +22,7 @@ from app.services import posting as sender
 from r2c2r_core.errors import InputError
 from tests.app.conftest import Running
 from tests.app.people import signed_in, with_accounts
+from tests.app.tls import certificate
 from tests.waiting import LOOK_S, held
 
 HERE = "127.0.0.0/8"
@@ -157,6 +159,11 @@ def test_a_rolled_back_change_creates_no_delivery(start: Callable[..., Any]) -> 
         "http://0.0.0.0:1/",
         "http://224.0.0.1/",
         "http://[fe80::1]/",
+        "http://[fec0::1]/",
+        "http://[::10.0.0.1]/",
+        "http://[2002:7f00:1::1]/",
+        "http://[64:ff9b::a00:1]/",
+        "http://[64:ff9b:1::a00:1]/",
         "http://2130706433:1/",
     ],
 )
@@ -192,24 +199,56 @@ def test_a_webhook_redirect_is_not_followed(listener: tuple[str, type[Listening]
     assert len(handler.heard) == 1
 
 
-def test_a_slow_response_does_not_exceed_the_total_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
+def _dripping(listening: socket.socket, ended: threading.Event, encrypted: ssl.SSLContext | None) -> None:
+    """Answer one connection with one byte every LOOK_S: no single read times out."""
+    connection, _ = listening.accept()
+    try:
+        with encrypted.wrap_socket(connection, server_side=True) if encrypted else connection as made:
+            while not ended.wait(LOOK_S):
+                made.sendall(b"H")
+    except OSError:  # the other end closed the connection, as expected
+        return
+
+
+@pytest.mark.parametrize("scheme", ["http", "https"])
+def test_a_slow_response_does_not_exceed_the_total_timeout(
+    scheme: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(posting, "TOTAL_S", 0.3)
-
-    def drip(listening: socket.socket) -> None:
-        connection, _ = listening.accept()
-        with connection:
-            try:
-                while not ended.wait(LOOK_S):
-                    connection.sendall(b"H")
-            except OSError:  # the other end closed the connection, as expected
-                return
-
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        thread = threading.Thread(target=drip, args=(listening,))
+    made, key = certificate(tmp_path)
+    trusting, serving = ssl.create_default_context(cafile=made), ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    serving.load_cert_chain(made, key)
+    monkeypatch.setattr(posting.ssl, "create_default_context", lambda: trusting)
+    with socket.create_server(("127.0.0.1", 0)) as listening, held() as ended:
+        given = (listening, ended, serving if scheme == "https" else None)
+        thread = threading.Thread(target=_dripping, args=given, daemon=True)
         thread.start()
-        with held() as ended, pytest.raises((OSError, posting.http.client.HTTPException)):
-            posting.post(f"http://127.0.0.1:{listening.getsockname()[1]}/", b"{}", {}, posting.networks(HERE))
+        with pytest.raises((OSError, posting.http.client.HTTPException)):
+            posting.post(f"{scheme}://127.0.0.1:{listening.getsockname()[1]}/", b"{}", {}, posting.networks(HERE))
         thread.join()
+
+
+def test_a_slow_receiver_delays_only_its_own_messages(start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    under_way: list[str] = []
+
+    def post(url: str, *_: Any) -> int:
+        under_way.append(url)
+        if "slow" in url:
+            ended.wait()
+        return 204
+
+    monkeypatch.setattr(sender, "post", post)
+    monkeypatch.setattr(sender, "STOP_S", 0.1)
+    with held() as ended:
+        with start() as web:
+            for path in ("1", "2", "3", "4", "5"):
+                web.post("/api/webhooks", {"url": f"https://slow.example/{path}"}, 201)
+            quick = web.post("/api/webhooks", {"url": "https://quick.example/"}, 201)["id"]
+            for hook in web.get("/api/webhooks"):
+                web.post(f"/api/webhooks/{hook['id']}/test", None, 201)
+            web.until(lambda: web.get(f"/api/webhooks/{quick}/deliveries")[0]["answer"] == "204")
+            assert sum("slow" in url for url in under_way) == 1  # one message a host
+        assert not ended.is_set()  # the server stopped although a receiver had not answered
 
 
 @pytest.mark.parametrize("url", ["file:///etc/passwd", "ftp://a.example", "https://", "https://a:b@c.example", "http://a b/"])

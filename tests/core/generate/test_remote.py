@@ -1,9 +1,11 @@
 """Remote generator with servers of both protocols, and with misbehaving servers."""
 
 import base64
+import contextlib
 import http.client
 import io
 import json
+import socket
 import threading
 
 import numpy as np
@@ -19,7 +21,7 @@ from r2c2r_core.generate.stage import GENERATORS, GenerateConfig
 from r2c2r_core.geometry.meshes import is_watertight, oriented_extents
 from r2c2r_core.progress import Progress
 from tests.core.generate.stub import QUICK, answering, box_glb, said
-from tests.waiting import PATIENCE_S, held, until
+from tests.waiting import LOOK_S, PATIENCE_S, held, until
 
 
 @pytest.fixture(scope="module")
@@ -144,6 +146,24 @@ def test_a_response_timeout_is_not_retried(evidence):
             Remote(url=f"{address}/v1/infer", patience=impatient).make(evidence, "c0", 0)
         until(lambda: asked)  # the server may accept a request after its client has given up
     assert len(asked) == 1
+
+
+def test_a_server_that_sends_its_answer_byte_by_byte_is_disconnected(evidence):
+    def drip():
+        connection, _ = listening.accept()
+        with connection, contextlib.suppress(OSError):  # the other end closed the connection, as expected
+            connection.sendall(b"HTTP/1.1 200 OK\r\nConnection: close\r\n\r\n")
+            while not ended.wait(LOOK_S):
+                connection.sendall(b"{")
+
+    impatient = Patience(connect_s=0.2, answer_s=0.3, tries=1, first_wait_s=0.05)
+    with socket.create_server(("127.0.0.1", 0)) as listening, held() as ended:
+        thread = threading.Thread(target=drip, daemon=True)
+        thread.start()
+        with pytest.raises(BackendUnavailable, match="gave no answer in"):
+            Remote(url=f"http://127.0.0.1:{listening.getsockname()[1]}/v1/infer", patience=impatient).make(evidence, "c0", 0)
+        thread.join(PATIENCE_S)
+        assert not thread.is_alive()
 
 
 def test_a_connection_timeout_is_retried(evidence, monkeypatch):
