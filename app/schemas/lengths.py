@@ -40,6 +40,7 @@ class TrueLength(Shape):
     metres: float
     measured_m: float | None  # in the finished scene, or between the points; None without a current one
     error_m: float | None  # measured - true
+    compared: bool  # whether the scale is fitted to it: not to sides that a person or the category set
     who: str
     at: float
 
@@ -49,6 +50,6 @@ class TrueLengths(Shape):
 
     lengths: list[TrueLength]
     scale: float  # current scale of the recording
-    scale_wanted: float | None  # best fit of the lengths; None without any that can be compared
-    mean_error: float | None  # mean of |measured - true| / true of those that can be compared
+    scale_wanted: float | None  # best fit of the lengths; None without any that is compared
+    mean_error: float | None  # mean of |measured - true| / true of those that are compared
     mean_error_scaled: float | None  # the same at `scale_wanted`

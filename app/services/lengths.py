@@ -76,10 +76,10 @@ def best_scale(pairs: list[tuple[float, float]]) -> float:
 def _all(context: Context, session: Session, project: Project) -> schemas.TrueLengths:
     rows = session.exec(select(TrueLength).where(TrueLength.project_id == project.id).order_by(col(TrueLength.id))).all()
     names = {item.id: item.result_name for item in queries.live_objects(session, project.id)}
-    scene = fitted(context.files(project)) if rows else None
-    sizes = {entry["name"]: entry["dimensions_m"] for entry in scene["objects"]} if scene else {}
-    lengths = [_shape(row, _measured(row, project, sizes.get(names.get(row.object_id, ""))), project.scale) for row in rows]
-    pairs = [(one.measured_m, one.metres) for one in lengths if one.measured_m]
+    sizes = _sizes(fitted(context.files(project)), project.scale) if rows else {}
+    found = [_measured(row, project, sizes.get(names.get(row.object_id, ""))) for row in rows]
+    lengths = [_shape(row, *one, project.scale) for row, one in zip(rows, found, strict=True)]
+    pairs = [(one.measured_m, one.metres) for one in lengths if one.measured_m and one.compared]
     wanted = best_scale(pairs) if pairs else None
     return schemas.TrueLengths(
         lengths=lengths,
@@ -90,11 +90,29 @@ def _all(context: Context, session: Session, project: Project) -> schemas.TrueLe
     )
 
 
-def _measured(row: TrueLength, project: Project, size: list[float] | None) -> float | None:
+def _sizes(scene: dict[str, Any] | None, scale: float) -> dict[str, list[tuple[float, bool]]]:
+    """The sides of each object at the project's scale, and whether they come from the scan.
+
+    The scene keeps the scale of its run until the next one. Sides that a person or the category set have no scale.
+    """
+    if scene is None:
+        return {}
+    since = scale / (scene["scale"] or scale)
+    return {
+        entry["name"]: [
+            (size, False) if source in ("person", "default") else (since * size, True)
+            for size, source in zip(entry["dimensions_m"], entry["dimension_sources"], strict=True)
+        ]
+        for entry in scene["objects"]
+    }
+
+
+def _measured(row: TrueLength, project: Project, sides: list[tuple[float, bool]] | None) -> tuple[float | None, bool]:
+    """A length's value now, in metres, and whether it comes from the scan."""
     points = points_now(row, project.scale)
     if points is not None:
-        return float(np.linalg.norm(np.subtract(points[1], points[0])))
-    return float(size[_SIDES.index(row.side)]) if size else None
+        return float(np.linalg.norm(np.subtract(points[1], points[0]))), True
+    return sides[_SIDES.index(row.side)] if sides else (None, False)
 
 
 def _mean_error(pairs: list[tuple[float, float]], scale: float) -> float | None:
@@ -106,7 +124,7 @@ def points_now(row: TrueLength, scale: float) -> list[list[float]] | None:
     return row.points_world and [[float(value) * scale / row.scale for value in point] for point in row.points_world]
 
 
-def _shape(row: TrueLength, measured: float | None, scale: float) -> schemas.TrueLength:
+def _shape(row: TrueLength, measured: float | None, of_scan: bool, scale: float) -> schemas.TrueLength:
     side: Any = row.side or None
     return schemas.TrueLength(
         id=row.id or 0,
@@ -117,6 +135,7 @@ def _shape(row: TrueLength, measured: float | None, scale: float) -> schemas.Tru
         metres=row.metres,
         measured_m=measured,
         error_m=None if measured is None else measured - row.metres,
+        compared=of_scan,
         who=row.who,
         at=row.at,
     )

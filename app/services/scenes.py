@@ -85,7 +85,7 @@ def _scene_facts(scene: ArticulatedScene) -> dict[str, Any]:
     objects = [{key: plain(getattr(item, key)) for key in kept} for item in scene.objects]
     for told, item in zip(objects, scene.objects, strict=True):
         told["colour"] = list(item.links[0].colour)
-    return {"objects": objects, "warnings": plain(scene.warnings)}
+    return {"objects": objects, "warnings": plain(scene.warnings), "scale": scene.scale}
 
 
 def _mask_count(track: MaskTrack) -> int:

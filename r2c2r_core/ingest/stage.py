@@ -153,6 +153,7 @@ def level_scan(scan: Scan, overrides: Overrides, config: IngestConfig, *, progre
         notices=(*scan.notices, *levelled.notices),
         poses=_given_in_world(scan.poses, motion),
         depth_noise=scan.depth_noise,
+        scale=config.scale,
     )
 
 

@@ -128,6 +128,7 @@ class Capture:
     notices: tuple[str, ...]  # one line each, for a person
     poses: PoseEvidence | None = None  # None: not examined
     depth_noise: DepthNoise = field(default_factory=DepthNoise)
+    scale: float | None = None  # factor on the recording's lengths when it was read; None: not recorded
 
     @property
     def as_recorded(self) -> "Capture":

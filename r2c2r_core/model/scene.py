@@ -112,3 +112,4 @@ class ArticulatedScene:
     layout_moves_m: dict[str, float]  # displacement of each object by the layout
     warnings: tuple[str, ...]
     failures: dict[str, str] = field(default_factory=dict)  # objects left out, with one line each
+    scale: float | None = None  # of its capture

@@ -136,6 +136,7 @@ def build_scene(
         layout_moves_m=layout.moves_m,
         warnings=(*layout.warnings, *said),
         failures=failures,
+        scale=capture.scale,
     )
 
 

@@ -1419,6 +1419,7 @@ export interface TrueLength {
   metres: number;
   measured_m: number | null;
   error_m: number | null;
+  compared: boolean;
   who: string;
   at: number;
 }

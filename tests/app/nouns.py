@@ -181,4 +181,4 @@ def scene(name: str) -> ArticulatedScene:
         warp_residual_m=0.001,
         warnings=("a warning",),
     )
-    return ArticulatedScene(name="scan", objects=(item,), layout_moves_m={}, warnings=())
+    return ArticulatedScene(name="scan", objects=(item,), layout_moves_m={}, warnings=(), scale=1.0)

@@ -56,6 +56,24 @@ def test_rescaling_the_recording_rescales_the_points_of_true_lengths(measured: t
     assert "every length multiplied by 1.0200" in [entry["text"] for entry in web.get(f"/api/projects/{project}/history")]
 
 
+def test_the_wanted_scale_of_a_side_is_the_same_before_the_next_run(measured: tuple[Running, str, int]) -> None:
+    web, project, number = measured
+    at = f"/api/projects/{project}/lengths"
+    assert web.post(at, {"object": number, "side": "width", "metres": 0.55}, 201)["scale_wanted"] == pytest.approx(1.1)
+    assert web.client.put(f"/api/projects/{project}/reading", json={"scale": 1.1}).status_code == 202
+    web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")
+    found = web.get(at)
+    assert found["scale_wanted"] == pytest.approx(1.1)
+    assert found["lengths"][0]["measured_m"] == pytest.approx(0.55)
+
+
+def test_sides_that_the_category_set_do_not_affect_the_scale(measured: tuple[Running, str, int]) -> None:
+    web, project, number = measured
+    found = web.post(f"/api/projects/{project}/lengths", {"object": number, "side": "depth", "metres": 0.5}, 201)
+    (length,) = found["lengths"]
+    assert (length["measured_m"], length["compared"], found["scale_wanted"]) == (0.6, False, None)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [

@@ -21,9 +21,11 @@ test("a typed length is in millimetres or in its unit, and may be followed by a 
 });
 
 test("the error of the scan is given in millimetres and percent", () => {
-  assert.equal(offBy({ metres: 0.6, error_m: -0.0072 }), "−7 mm, −1.2 %");
-  assert.equal(offBy({ metres: 0.6, error_m: 0.0001 }), "as measured");
-  assert.equal(offBy({ metres: 0.6, error_m: null }), "not in the scene now");
+  assert.equal(offBy({ metres: 0.6, error_m: -0.0072, compared: true }), "−7 mm, −1.2 %");
+  assert.equal(offBy({ metres: 0.6, error_m: 0.0001, compared: true }), "as measured");
+  assert.equal(offBy({ metres: 0.6, error_m: null, compared: false }), "not in the scene now");
+  const typed = offBy({ metres: 0.6, error_m: 0.02, compared: false });
+  assert.equal(typed, "+20 mm, +3.3 % (typed or a default: does not affect the scale)");
 });
 
 test("the notes on a rescale give the change in percent, the new largest sizes and a warning about a single length", () => {
@@ -36,7 +38,7 @@ test("the notes on a rescale give the change in percent, the new largest sizes a
     metres: 0.6,
     measured_m: 0.594,
   };
-  const length = { ...one, error_m: -0.006, who: "ann", at: 0 };
+  const length = { ...one, error_m: -0.006, compared: true, who: "ann", at: 0 };
   const all = {
     lengths: [length],
     scale: 1,

@@ -18,11 +18,12 @@ export function parseLength(typed) {
   return metres > 0.005 && metres <= 100 ? { metres, text: found[3] ?? "" } : null;
 }
 
-/** @param {{ metres: number, error_m: number | null }} length */
-export function offBy({ metres, error_m: error }) {
+/** @param {{ metres: number, error_m: number | null, compared: boolean }} length */
+export function offBy({ metres, error_m: error, compared }) {
   if (error === null) return "not in the scene now";
   const mm = Math.round(1000 * error);
-  return mm === 0 ? "as measured" : `${mm > 0 ? "+" : "−"}${Math.abs(mm)} mm, ${signedPercent(error / metres)}`;
+  const off = mm === 0 ? "as measured" : `${mm > 0 ? "+" : "−"}${Math.abs(mm)} mm, ${signedPercent(error / metres)}`;
+  return compared ? off : `${off} (typed or a default: does not affect the scale)`;
 }
 
 /**
@@ -33,7 +34,7 @@ export function offBy({ metres, error_m: error }) {
 export function rescaleNotes({ lengths, scale, scale_wanted: wanted, mean_error, mean_error_scaled }, items) {
   if (wanted === null) return [];
   const factor = wanted / scale;
-  const compared = lengths.filter(({ measured_m }) => measured_m !== null).length;
+  const supporting = lengths.filter(({ compared }) => compared).length;
   const moved = items
     .toSorted((a, b) => Math.max(...b.dimensions_m) - Math.max(...a.dimensions_m))
     .slice(0, 3)
@@ -45,7 +46,7 @@ export function rescaleNotes({ lengths, scale, scale_wanted: wanted, mean_error,
     `Every length of the recording changes by ${signedPercent(factor - 1)}: depth, the camera's path, all objects.`,
     ...(moved.length ? [`The longest sides become: ${moved.join(", ")}.`] : []),
     `The true lengths are off by ${percent(mean_error)} on average, and by ${percent(mean_error_scaled)} afterwards.`,
-    ...(compared === 1 ? ["Only one true length supports this: measure another one, in another direction."] : []),
+    ...(supporting === 1 ? ["Only one true length supports this: measure another one, in another direction."] : []),
     "The recording is read again; clicks stay, masks and results are computed anew.",
     "Sizes and places that somebody typed stay as they were typed.",
   ];

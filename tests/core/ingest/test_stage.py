@@ -410,4 +410,5 @@ def test_the_scale_option_multiplies_all_lengths_with_a_notice(once, scan, tmp_p
     sizes = [np.ptp(one.surface.vertices_world, axis=0) for one in (once, larger)]
     assert sizes[1] == pytest.approx(1.25 * sizes[0], rel=0.02)  # a voxel of 3 cm is no larger
     assert "all lengths were multiplied by 1.2500, as a person measured" in larger.notices
+    assert (once.scale, larger.scale) == (1.0, 1.25)
     assert not any("multiplied" in notice for notice in once.notices)
