@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from sqlalchemy import Engine
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import SQLAlchemyError
 
 from app.hub import Hub
 
@@ -100,8 +100,8 @@ class Channel:
                         texts = []
                         if self._stopping.is_set() and self._out.empty():
                             return
-            except (DBAPIError, self._failure) as error:
-                _log.warning("messages to other servers wait: %s", error)
+            except Exception as error:  # the edge of a thread: usually the database does not answer
+                self._report("messages to other servers wait", error)
                 if self._stopping.wait(AGAIN_S):
                     return
 
@@ -143,8 +143,8 @@ class Channel:
                         self._take_later(connection)
                         for _ in connection.notifies(timeout=min(self._beat_s, AGAIN_S), stop_after=1):
                             pass
-            except (DBAPIError, self._failure) as error:
-                _log.warning("other servers are not heard: %s", error)
+            except Exception as error:  # the edge of a thread: usually the database does not answer
+                self._report("other servers are not heard", error)
                 self._stopping.wait(AGAIN_S)
 
     def _find_place(self, connection: Any) -> None:
@@ -216,10 +216,11 @@ class Channel:
         finally:
             connection.close()
 
-    @property
-    def _failure(self) -> type[Exception]:
-        failure: type[Exception] = self._engine.dialect.dbapi.Error  # type: ignore[union-attr]
-        return failure
+    def _report(self, effect: str, error: Exception) -> None:
+        """Log an error of the database in one line, any other with its traceback."""
+        of_database: type[Exception] = self._engine.dialect.dbapi.Error  # type: ignore[union-attr]
+        expected = isinstance(error, SQLAlchemyError | of_database)
+        _log.warning("%s: %s", effect, error, exc_info=None if expected else error)
 
 
 def join_hubs(channel: Channel, hub: Hub) -> None:

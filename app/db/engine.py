@@ -10,6 +10,7 @@ from typing import Any
 
 from sqlalchemy import Engine, event
 from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlmodel import Session, create_engine
 
 from app.db import announcing, once, postgres
@@ -17,6 +18,7 @@ from app.db.migrations import migrate, require_tables
 from app.db.sqlite import explained
 from app.db.tables import Bundle, Comment, Event, Project
 from app.db.usable import require_usable
+from app.errors import Unavailable
 from app.settings import BUSY_S
 
 _log = logging.getLogger(__name__)
@@ -130,6 +132,8 @@ def _said_plainly(engine: Engine) -> Iterator[None]:
             raise
         _log.warning("the database: %s", error.orig)
         raise said from error
+    except PoolTimeout as error:
+        raise Unavailable("all connections to the database are in use", hint="try again in a moment") from error
 
 
 def _engine(database: Path, prepare: Callable[[sqlite3.Connection, Any], None], busy_s: float = BUSY_S) -> Engine:

@@ -185,26 +185,36 @@ class LiveSegmenters:
         """Read a process's messages until it ends."""
         while True:
             try:
-                line = session.worker.next_line(timeout=IDLE_LOOK_S)
-            except queue.Empty:
-                if self._idle(session):
-                    session.worker.kill()
-                self._stop_if_left(session)
-                self._store_work(session)
-                continue
-            if line is None:
-                break
-            self._stop_if_left(session)
-            try:
-                session.take(line)
+                if not self._take_next(session):
+                    break
             except OSError as error:  # a full disk must not end the process: masks are shown but not stored
                 _log.warning("live masks of %s: %s", session.project, error)
-            self._store_work(session)
-            if "end" in line:
-                self._keep(session.project)
+            except Exception:  # the edge of a thread: one message must not affect the others
+                _log.exception("live masks of %s", session.project)
         session.worker.close()
         self._gone(session)
         self._store_work(session)
+
+    def _take_next(self, session: LiveSession) -> bool:
+        """Handle the process's next message, or a pause without one; False after the last message."""
+        try:
+            line = session.worker.next_line(timeout=IDLE_LOOK_S)
+        except queue.Empty:
+            if self._idle(session):
+                session.worker.kill()
+            self._stop_if_left(session)
+            self._store_work(session)
+            return True
+        if line is None:
+            return False
+        self._stop_if_left(session)
+        try:
+            session.take(line)
+        finally:
+            self._store_work(session)
+        if "end" in line:
+            self._keep(session.project)
+        return True
 
     def _idle(self, session: LiveSession) -> bool:
         with self._lock:

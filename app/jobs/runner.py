@@ -81,8 +81,9 @@ class Runner:
             thread.start()
             self._threads.append(thread)
         if self.rows.shared:
-            self._threads.append(threading.Thread(target=self._beat, name="jobs-beat", daemon=True))
-            self._threads[-1].start()
+            for do in (self._beat, self._publish_logs):  # apart: a slow store must not delay a sign of life
+                self._threads.append(threading.Thread(target=self._repeat, args=(do,), name=f"jobs{do.__name__}", daemon=True))
+                self._threads[-1].start()
 
     def stop(self) -> None:
         """Stop the running workers; their jobs stay in the queue for the next start."""
@@ -162,22 +163,31 @@ class Runner:
                 unfinished, away = job_id, None
                 self._stopping.wait(1.0)
 
-    def _beat(self) -> None:
-        """Send heartbeats, and check those of other servers."""
+    def _repeat(self, do: Callable[[], None]) -> None:
+        """Do this every `beat_s` until the runner stops."""
         while not self._stopping.wait(self.settings.beat_s):
             try:
-                with self._lock:
-                    running = dict(self._workers)
-                mine, self.draining = self.rows.beat(), self._seat.beat()
-                for job_id, worker in running.items():
-                    if mine.get(job_id, True):  # cancelled at another server, or lost to one
-                        self._stop(job_id, worker)
-                self.rows.recover()
-                for project_id, log in tuple(self._at.values()):
-                    if log is not None:
-                        self._files.keep_log(project_id, log)
-            except R2C2RError as error:  # the database is unavailable: try again
-                _log.warning("sign of life: %s", error)
+                do()
+            except R2C2RError as error:  # the database or the store is unavailable: try again
+                _log.warning("%s: %s", do.__name__.strip("_"), error)
+            except Exception:  # the edge of a thread: without heartbeats, other servers take over this one's jobs
+                _log.exception(do.__name__.strip("_"))
+
+    def _beat(self) -> None:
+        """Send a heartbeat, and check those of other servers."""
+        with self._lock:
+            running = dict(self._workers)
+        mine, self.draining = self.rows.beat(), self._seat.beat()
+        for job_id, worker in running.items():
+            if mine.get(job_id, True):  # cancelled at another server, or lost to one
+                self._stop(job_id, worker)
+        self.rows.recover()
+
+    def _publish_logs(self) -> None:
+        """Upload the logs of the running jobs in their current state."""
+        for project_id, log in tuple(self._at.values()):
+            if log is not None:
+                self._files.keep_log(project_id, log)
 
     def _stop(self, job_id: int, worker: Worker) -> None:
         """Stop the job if it is still run by this worker, and was not queued again."""

@@ -153,6 +153,8 @@ class Sharing:
                         unwanted.set()
                 except R2C2RError as error:  # the database is unavailable: try again
                     _log.warning("sign of life of a part: %s", error)
+                except Exception:  # the edge of a thread: without heartbeats, another seat takes the parts
+                    _log.exception("sign of life of a part")
 
         beating = threading.Thread(target=beat, name=f"jobs-part-{claimed.ids[0]}", daemon=True)
         self._here[claimed.ids[0]] = claimed.project_id

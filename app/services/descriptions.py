@@ -20,7 +20,7 @@ from app.errors import NotFound
 from app.files import ProjectFiles, free_name, project_files
 from app.schemas.description import Description
 from app.settings import Settings
-from r2c2r_core.errors import InputError, R2C2RError
+from r2c2r_core.errors import InputError
 
 _log = logging.getLogger(__name__)
 
@@ -72,14 +72,14 @@ class Descriptions:
         for project_id in projects:
             try:
                 do(project_id)
-            except (R2C2RError, OSError):  # a full disk; the next change or start tries again
+            except Exception:  # a full disk, or anything else; the next change or start tries again
                 _log.exception("project.json of %s", project_id)
 
     def _all(self) -> list[str]:
         try:
             with reading(self._engine) as session:
                 return list(session.exec(select(Project.id)))
-        except R2C2RError:
+        except Exception:  # the edge of the thread
             _log.exception("project.json")
             return []
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from sqlalchemy import create_engine
 
-from app.db.engine import open_engine, opened
+from app.db.engine import open_engine, opened, reading
 from app.db.migrations import migrate, revisions
 from app.db.sqlite import explained
-from app.errors import DatabaseUnusable
+from app.errors import DatabaseUnusable, Unavailable
 from app.services import accounts
 from r2c2r_core.cli import main
 
@@ -116,6 +116,15 @@ def test_a_read_only_database_is_reported_in_one_line(sound: Path, tmp_path: Pat
     finally:
         tmp_path.chmod(0o700)
     assert "may not be" in capsys.readouterr().err
+
+
+def test_exhausted_connections_are_reported_as_unavailable(sound: Path) -> None:
+    engine = create_engine(f"sqlite:///{sound}", pool_size=1, max_overflow=0, pool_timeout=0)
+    with reading(engine) as session:
+        session.connection()
+        with pytest.raises(Unavailable, match="all connections to the database are in use"), reading(engine) as second:
+            second.connection()
+    engine.dispose()
 
 
 def test_sqlite_errors_are_classified_by_error_code(tmp_path: Path) -> None:

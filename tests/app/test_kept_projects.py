@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from app.services import descriptions
 from tests.app.conftest import Running
 
 pytestmark = pytest.mark.both_databases
@@ -53,6 +54,23 @@ def test_tags_and_archiving_are_stored_and_recorded_in_the_history(web: Running)
     assert texts == ["archived", "tags: Flat 3, oak"]
     told = web.settings.data_dir / "projects" / project / "project.json"
     web.until(lambda: told.exists() and json.loads(told.read_text())["project"]["tags"] == ["Flat 3", "oak"])
+
+
+def test_project_files_are_written_again_after_an_unexpected_error(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    project, failures, sound = web.sample(), list[str](), descriptions.describe
+
+    def fail_once(session: Any, row: Any, files: Any) -> Any:
+        if not failures:
+            failures.append(row.id)
+            raise ValueError("unexpected")
+        return sound(session, row, files)
+
+    monkeypatch.setattr(descriptions, "describe", fail_once)
+    web.patch(f"/api/projects/{project}", {"tags": ["oak"]})
+    web.until(lambda: failures)
+    web.patch(f"/api/projects/{project}", {"tags": ["pine"]})
+    told = web.settings.data_dir / "projects" / project / "project.json"
+    web.until(lambda: told.exists() and json.loads(told.read_text())["project"]["tags"] == ["pine"])
 
 
 def test_a_duplicate_is_an_independent_project(web: Running) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from starlette.websockets import WebSocketDisconnect
 
+from app.jobs.live_session import LiveSession
 from app.services import masks, prompts
 from tests.app.conftest import ORIGIN, SOCKETS, Running
 
@@ -81,6 +82,22 @@ def test_the_done_state_is_sent_after_all_mask_updates(web: Running, monkeypatch
         seen, _ = until(socket, type="comments")
     told = [m["object"]["segment"] for m in seen if m["type"] == "object" and m["object"]["id"] == made["id"]]
     assert told[-1] == "done"
+
+
+def test_live_masks_continue_after_an_unexpected_error(web: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    failures, sound = list[dict[str, Any]](), LiveSession.take
+
+    def fail_once(self: LiveSession, line: dict[str, Any]) -> None:
+        if "mask" in line and not failures:
+            failures.append(line)
+            raise RuntimeError("unexpected")
+        sound(self, line)
+
+    monkeypatch.setattr(LiveSession, "take", fail_once)
+    project = web.sample()
+    made = web.post(f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]}, 201)
+    web.until(lambda: _object(web, project, made["id"])["segment"] == "done")
+    assert len(failures) == 1
 
 
 def test_a_newer_click_replaces_the_masks_of_an_older_one(web: Running) -> None:

@@ -23,6 +23,7 @@ from r2c2r_core.cli import main
 from tests.app.conftest import running
 from tests.app.postgres import PostgresServer
 from tests.app.test_jobs import behave, run
+from tests.waiting import LOOK_S, PATIENCE_S, held, until
 
 
 @pytest.fixture
@@ -216,6 +217,33 @@ def test_an_empty_postgres_beside_project_folders_is_refused(
     assert "no project in the database, but 1 project folders" in printed.err
     assert "r2c2r db move" in printed.err
     assert main(["serve", "--port", "0", "--adopt", "--data", str(tmp_path)]) == 0
+    postgres_server.drop_all()
+
+
+def test_heartbeats_continue_after_any_error_and_while_the_store_hangs(
+    postgres_server: PostgresServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beats, published, sound = list[int](), threading.Event(), JobRows.beat
+
+    def beat(self: JobRows) -> dict[int, bool]:
+        beats.append(len(beats))
+        if len(beats) == 1:
+            raise RuntimeError("unexpected")
+        return sound(self)
+
+    def keep_log(self: Folder, project_id: str, log: Path) -> None:
+        published.set()
+        released.wait(PATIENCE_S)
+
+    monkeypatch.setattr(JobRows, "beat", beat)
+    monkeypatch.setattr(Folder, "keep_log", keep_log)
+    with held() as released, running(tmp_path, postgres=postgres_server.of_folder(tmp_path), beat_s=LOOK_S) as web:
+        until(lambda: len(beats) > 1)
+        web.post("/api/projects/sample", {}, 202)
+        assert published.wait(PATIENCE_S)
+        count = len(beats)
+        until(lambda: len(beats) > count + 1)
+        released.set()
     postgres_server.drop_all()
 
 

@@ -20,7 +20,7 @@ from tests.app.object_server import REQUIRED
 from tests.app.postgres import PostgresServer
 from tests.app.test_jobs import run
 from tests.app.test_live import CLICK, listening, until
-from tests.waiting import PATIENCE_S
+from tests.waiting import LOOK_S, PATIENCE_S
 
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
@@ -113,6 +113,32 @@ def test_a_server_that_missed_deleted_messages_detects_a_gap(engine: Engine) -> 
             connection.exec_driver_sql("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid()")
             connection.commit()
         assert gaps.wait(PATIENCE_S)
+
+
+@pytest.mark.parametrize("loop", ["_take_later", "_taken"])
+def test_an_unexpected_error_does_not_end_the_channel(engine: Engine, loop: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    failures, sound = list[str](), getattr(Channel, loop)
+
+    def fail_once(self: Channel, *given: Any) -> Any:
+        if self.name == "a" and not failures:
+            failures.append(loop)
+            raise RuntimeError("unexpected")
+        return sound(self, *given)
+
+    monkeypatch.setattr(Channel, loop, fail_once)
+    monkeypatch.setattr(channels, "AGAIN_S", LOOK_S)
+    heard: list[str] = []
+    with channel(engine, "a") as a, channel(engine, "b") as b:
+        for one in (a, b):
+            one.hears["hello"] = lambda sender, _: heard.append(sender)
+        waiting.until(lambda: failures)
+
+        def is_heard() -> bool:
+            for one in (a, b):
+                one.say("hello", {})
+            return {"a", "b"} <= set(heard)
+
+        waiting.until(is_heard)
 
 
 def test_a_vanished_server_is_forgotten_and_forces_a_refetch(engine: Engine) -> None:
