@@ -78,7 +78,8 @@ class Mirror:
     def __init__(self, objects: Objects, data_dir: Path, quota_bytes: int | None = None) -> None:
         self._objects, self._quota = objects, quota_bytes
         self._projects, self._notes = data_dir / "projects", data_dir / "stored"
-        self._locks: defaultdict[str, threading.RLock] = defaultdict(threading.RLock)
+        self._folders: defaultdict[str, threading.RLock] = defaultdict(threading.RLock)  # note and files; never for a transfer
+        self._storing: defaultdict[str, threading.RLock] = defaultdict(threading.RLock)  # one upload of a project at a time
         self._holders: dict[str, str] = {}  # this machine's holder name in manifests, by project
         self._used: dict[str, float] = {}
         self._seen: set[str] = set()  # projects requested since their last upload
@@ -86,25 +87,21 @@ class Mirror:
 
     def fetch(self, project_id: str, *, recording: bool = False) -> None:
         """Download remote changes since the last synchronisation."""
-        with self._locks[project_id]:
-            self._used[project_id] = time.monotonic()
-            self._seen.add(project_id)
-            held = self._held(project_id)
+        for _ in range(TRIES):
+            with self._folders[project_id]:
+                self._used[project_id] = time.monotonic()
+                self._seen.add(project_id)
+                if not (self._projects / project_id).is_dir():
+                    self._note_path(project_id).unlink(missing_ok=True)  # its files were deleted by hand
+                held = self._held(project_id)
             complete = held.recording or not recording
-            for _ in range(TRIES):
-                try:
-                    found = self._objects.read(_manifest(project_id), unless=held.tag if complete else None)
-                except NotModified:
-                    return
-                if found is None:
-                    return
-                names = _said(found).names
-                wanted = _wanted(names, recording=recording or held.recording)
-                if self._take(project_id, held, names, wanted):
-                    kept = {path: entry for path, entry in held.names.items() if path in names} | wanted
-                    self._note(project_id, Held(kept, found.tag, recording or held.recording))
-                    return
-            raise Unavailable(f"{project_id}: its files keep changing", hint="try again in a moment")
+            try:
+                found = self._objects.read(_manifest(project_id), unless=held.tag if complete else None)
+            except NotModified:
+                return
+            if found is None or self._take(project_id, held, found, recording=recording or held.recording):
+                return
+        raise Unavailable(f"{project_id}: its files keep changing", hint="try again in a moment")
 
     def keep(self, project_id: str) -> None:
         """Upload local changes since the last synchronisation.
@@ -112,8 +109,9 @@ class Mirror:
         Raises NotFound if the project was deleted, and Lost if its job was taken over: its local results are then discarded.
         """
         root = self._projects / project_id
-        with self._locks[project_id]:
-            held, here = self._held(project_id), _lying(root)
+        with self._storing[project_id]:
+            with self._folders[project_id]:
+                held, here = self._held(project_id), _lying(root)
             changed = _read(root, {path: state for path, state in here.items() if held.names.get(path, _NONE)[1:] != state})
             gone = held.names.keys() - here.keys()
             if not changed and not gone:
@@ -125,7 +123,7 @@ class Mirror:
                     raise NotFound(f"{project_id}: the project was deleted", hint="see the list of projects")
                 before, holder = _said(found)
                 if self._holders.get(project_id, holder) != holder:
-                    self._drop(project_id, held, changed, gone)
+                    self._drop(project_id, changed, gone)
                 changed = self._give(project_id, changed, {entry.sha256 for entry in before.values()} | given)
                 given |= {entry.sha256 for entry in changed.values()}
                 names = {path: entry for path, entry in before.items() if path not in gone} | changed
@@ -135,23 +133,25 @@ class Mirror:
                     )
                 except Changed:
                     continue
-                alone = found is None or found.tag == held.tag  # others' uploads are still to be fetched
-                mine = {path: entry for path, entry in held.names.items() if path not in gone} | changed
-                self._note(project_id, Held(mine, tag if alone else None, held.recording))
+                with self._folders[project_id]:
+                    held = self._held(project_id)
+                    alone = found is None or found.tag == held.tag  # others' uploads are still to be fetched
+                    mine = {path: entry for path, entry in held.names.items() if path not in gone} | changed
+                    self._note(project_id, Held(mine, tag if alone else None, held.recording))
                 self._sweep(project_id, names)
                 return
             raise Unavailable(f"{project_id}: its files keep changing", hint="try again in a moment")
 
     def hold(self, project_id: str, holder: str, *, taken: bool = False) -> None:
         """Enter the holder in the manifest; raises NotFound where the project was deleted."""
-        with self._locks[project_id]:
+        with self._storing[project_id]:
             if not taken:
                 self._take_hold(project_id, holder)
             self._holders[project_id] = holder
 
     def keep_log(self, project_id: str, log: Path) -> None:
         """Upload the log in its current state."""
-        if log.is_file():
+        with suppress(FileNotFoundError):  # not written yet, or deleted with its project
             self._objects.put(_log_of(project_id, log), log)
 
     def fetch_log(self, project_id: str, log: Path) -> None:
@@ -166,7 +166,8 @@ class Mirror:
         entry = self._held(project_id).names.get(path.relative_to(root).as_posix())
         if entry is None:
             return None
-        return self._objects.link(_object(project_id, entry), f"projects/{project_id}/downloads/{entry.sha256}/{name}")
+        copy = f"projects/{project_id}/downloads/{entry.sha256}/{name}"
+        return self._objects.link(_object(project_id, entry), copy, fresh=UNNAMED / 2)
 
     def size(self, project_id: str) -> int:
         """Size in bytes of all files in the manifest."""
@@ -175,7 +176,7 @@ class Mirror:
 
     def delete(self, project_id: str) -> None:
         """Delete all objects of the project, its manifest first, so that later uploads are refused."""
-        with self._locks[project_id]:
+        with self._storing[project_id]:
             self._objects.delete([_manifest(project_id)])
             self._objects.delete(self._objects.old(f"projects/{project_id}/", timedelta()))
             self._note_path(project_id).unlink(missing_ok=True)
@@ -197,15 +198,23 @@ class Mirror:
         for project_id in sorted(sizes.keys() - in_use, key=lambda one: self._used.get(one, 0.0)):
             if over <= 0:
                 return
-            if time.monotonic() - self._used.get(project_id, -UNUSED_S) >= UNUSED_S:
+            if self._is_unused(project_id):
                 self._evict(project_id)
                 over -= sizes[project_id]
 
     def _evict(self, project_id: str) -> None:
-        with self._locks[project_id]:
+        with self._storing[project_id]:
             self._keep_or_forget(project_id)
-            self._note_path(project_id).unlink(missing_ok=True)  # first, so that missing files do not count as deletions
-            delete_folder(self._projects / project_id)
+            with self._folders[project_id]:
+                if self._is_unused(project_id):  # it may have been requested during the upload
+                    self._forget(project_id)
+
+    def _forget(self, project_id: str) -> None:
+        self._note_path(project_id).unlink(missing_ok=True)  # first, so that missing files do not count as deletions
+        delete_folder(self._projects / project_id)
+
+    def _is_unused(self, project_id: str) -> bool:
+        return time.monotonic() - self._used.get(project_id, -UNUSED_S) >= UNUSED_S
 
     def _keep_or_forget(self, project_id: str) -> None:
         try:
@@ -213,8 +222,8 @@ class Mirror:
         except Lost as lost:
             _log.warning("%s", lost)
         except NotFound:  # permanently deleted by another machine: remove it from the cache
-            self._note_path(project_id).unlink(missing_ok=True)
-            delete_folder(self._projects / project_id)
+            with self._folders[project_id]:
+                self._forget(project_id)
 
     def _take_hold(self, project_id: str, holder: str) -> None:
         known = self._held(project_id).names
@@ -228,43 +237,54 @@ class Mirror:
                 return
         raise Unavailable(f"{project_id}: its files keep changing", hint="try again in a moment")
 
-    def _drop(self, project_id: str, held: Held, changed: Names, gone: set[str]) -> None:
+    def _drop(self, project_id: str, changed: Names, gone: set[str]) -> None:
         """Discard local results of a lost job; raises Lost."""
-        for path in changed:
-            if path.startswith(_MADE_BY_JOBS):
-                (self._projects / project_id / path).unlink(missing_ok=True)
         stale = {path for path in (*changed, *gone) if path.startswith(_MADE_BY_JOBS)}
-        kept = {path: entry for path, entry in held.names.items() if path not in stale}
-        self._note(project_id, Held(kept, None, held.recording))
+        with self._folders[project_id]:
+            for path in stale & changed.keys():
+                (self._projects / project_id / path).unlink(missing_ok=True)
+            held = self._held(project_id)
+            kept = {path: entry for path, entry in held.names.items() if path not in stale}
+            self._note(project_id, Held(kept, None, held.recording))
         del self._holders[project_id]
         raise Lost(f"{project_id}: another machine goes on with its job")
 
-    def _take(self, project_id: str, held: Held, names: Names, wanted: Names) -> bool:
-        """Download the wanted files; False where one was replaced meanwhile."""
-        root = self._projects / project_id
+    def _take(self, project_id: str, held: Held, found: Read, *, recording: bool) -> bool:
+        """Download the manifest's files that changed since `held`; False where another transfer ended meanwhile."""
+        root, names = self._projects / project_id, _said(found).names
+        wanted = _wanted(names, recording=recording)
         missing = {
             path: entry for path, entry in wanted.items() if held.names.get(path) != entry and _state(root / path) != entry[1:]
         }
+        parts = {path: _part_of(root / path) for path in missing}
         try:
             with ThreadPoolExecutor(AT_ONCE) as pool:
-                list(pool.map(lambda item: self._get(project_id, root / item[0], item[1]), missing.items()))
-        except FileNotFoundError:
+                list(pool.map(lambda path: self._get(project_id, parts[path], missing[path]), missing))
+            with self._folders[project_id]:
+                now = self._held(project_id)
+                others = {path for path in now.names.keys() | names.keys() if now.names.get(path) != held.names.get(path)}
+                for path in missing.keys() - others:
+                    parts[path].replace(root / path)
+                for path in held.names.keys() - names.keys() - others:
+                    if _state(root / path) == held.names[path][1:]:
+                        (root / path).unlink(missing_ok=True)
+                kept = {path: entry for path, entry in now.names.items() if path in names or path in others}
+                kept |= {path: entry for path, entry in wanted.items() if path not in others}
+                alone = now == held
+                self._note(project_id, Held(kept, found.tag if alone else None, recording or now.recording))
+                return alone
+        except FileNotFoundError:  # an object was replaced, or the folder evicted
             return False
-        for path in held.names.keys() - names.keys():
-            if _state(root / path) == held.names[path][1:]:
-                (root / path).unlink(missing_ok=True)
-        return True
-
-    def _get(self, project_id: str, path: Path, entry: Entry) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{path.name}.{threading.get_ident()}.tmp")
-        try:
-            if self._objects.get(_object(project_id, entry), part) != entry.sha256:
-                raise Unavailable(f"{path.name}: the store returned other bytes than were stored", hint="try again in a moment")
-            os.utime(part, ns=(entry.mtime_ns, entry.mtime_ns))
-            part.replace(path)
         finally:
-            part.unlink(missing_ok=True)
+            for part in parts.values():
+                part.unlink(missing_ok=True)
+
+    def _get(self, project_id: str, part: Path, entry: Entry) -> None:
+        part.parent.mkdir(parents=True, exist_ok=True)
+        name = _object(project_id, entry)
+        if self._objects.get(name, part) != entry.sha256:
+            raise Unavailable(f"{name}: the store returned other bytes than were stored", hint="try again in a moment")
+        os.utime(part, ns=(entry.mtime_ns, entry.mtime_ns))
 
     def _give(self, project_id: str, changed: Names, there: set[str]) -> Names:
         """Upload missing objects and return the stored entries. A file written meanwhile is left for the next time."""
@@ -333,6 +353,11 @@ def _lying(root: Path) -> dict[str, tuple[int, int]]:
             if state is not None:
                 found[path.relative_to(root).as_posix()] = state
     return found
+
+
+def _part_of(path: Path) -> Path:
+    """Where this thread downloads a file before it is put in place."""
+    return path.with_name(f".{path.name}.{threading.get_ident()}.tmp")
 
 
 def _state(path: Path) -> tuple[int, int] | None:

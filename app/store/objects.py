@@ -12,6 +12,7 @@ from app.errors import Unavailable
 from r2c2r_core.errors import EnvironmentProblem, InputError
 
 LINK_S = 600  # a download address is valid for ten minutes: to start the download, not to finish it
+RETRIED_S = 10.0  # total time of retries of one call: a store that does not answer must not hold a request for minutes
 _CHUNK = 8 << 20
 _HINT = "s3://BUCKET/PREFIX with AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or file:///FOLDER"
 
@@ -82,14 +83,7 @@ class Objects:
 
     def has(self, name: str) -> bool:
         """Whether the object exists."""
-        import obstore
-
-        with _said():
-            try:
-                obstore.head(self._store, name)
-            except FileNotFoundError:
-                return False
-            return True
+        return self._modified(name) is not None
 
     def old(self, prefix: str, age: timedelta) -> list[str]:
         """Names below the prefix of objects older than `age`."""
@@ -108,16 +102,31 @@ class Objects:
                 with contextlib.suppress(FileNotFoundError):
                     obstore.delete(self._store, name)
 
-    def link(self, name: str, as_name: str) -> str | None:
-        """A presigned address of the object, valid for minutes, ending in `as_name`; None where the store has none."""
+    def link(self, name: str, as_name: str, *, fresh: timedelta) -> str | None:
+        """A presigned address of a copy of the object, valid for LINK_S, ending in `as_name`; None where the store has none.
+
+        A copy older than `fresh` is made again, so that its age tells when it was last linked to.
+        """
         import obstore
 
         if not isinstance(self._store, obstore.store.S3Store | obstore.store.GCSStore | obstore.store.AzureStore):
             return None
         with _said():
-            if not self.has(as_name):
+            made = self._modified(as_name)
+            if made is None or made <= datetime.now(UTC) - fresh:
                 obstore.copy(self._store, name, as_name)
             return str(obstore.sign(self._store, "GET", as_name, timedelta(seconds=LINK_S)))
+
+    def _modified(self, name: str) -> datetime | None:
+        """Time of the last change; None where there is no object."""
+        import obstore
+
+        with _said():
+            try:
+                modified: datetime = obstore.head(self._store, name)["last_modified"]
+            except FileNotFoundError:
+                return None
+            return modified
 
     @contextlib.contextmanager
     def _alone(self) -> Iterator[None]:
@@ -143,7 +152,8 @@ def open_objects(address: str) -> Objects:
     try:
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-        return Objects(obstore.store.from_url(address), folder)
+        retries = {"max_retries": 3, "retry_timeout": timedelta(seconds=RETRIED_S)}
+        return Objects(obstore.store.from_url(address, retry_config=retries), folder)
     except (obstore.exceptions.BaseError, ValueError, OSError) as error:
         raise InputError(f"R2C2R_STORE {address[:80]!r}: {_first_line(error)}", hint=_HINT) from error
 

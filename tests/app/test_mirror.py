@@ -6,6 +6,7 @@ import urllib.request
 from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,6 +15,7 @@ from app.store.mirror import UNUSED_S, Lost, Mirror
 from app.store.objects import Objects, open_objects
 from r2c2r_core.errors import InputError
 from tests.app.object_server import BUCKET, REQUIRED, ObjectServer, object_server
+from tests.waiting import PATIENCE_S, held
 
 LONG = timedelta(days=1)
 
@@ -226,6 +228,88 @@ def test_a_browser_downloads_from_the_store_by_a_link_with_the_file_name(
     assert link.partition("?")[0].endswith("/Kitchen-v1.zip")
     with urllib.request.urlopen(link) as answer:
         assert answer.read() == b"bundle"
+
+
+def test_a_download_copy_is_renewed_before_it_is_old_enough_to_be_deleted(
+    s3: ObjectServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import obstore
+
+    for name, value in s3.environment.items():
+        monkeypatch.setenv(name, value)
+    objects = open_objects(f"s3://{BUCKET}/{tmp_path.name}")
+    objects.put("bundle", write(tmp_path, "bundle", "bundle"))
+    made: list[str] = []
+    monkeypatch.setattr(obstore, "copy", lambda store, name, to, sound=obstore.copy: made.append(to) or sound(store, name, to))
+    for fresh in (LONG, LONG, timedelta()):
+        assert objects.link("bundle", "copy.zip", fresh=fresh) is not None
+    assert made == ["copy.zip"] * 2
+
+
+@pytest.mark.parametrize("recording", [False, True])
+def test_pages_read_a_project_while_its_files_are_transferred(tmp_path: Path, recording: bool) -> None:
+    import obstore
+
+    objects = Objects(obstore.store.MemoryStore())
+    here, there = machines(objects, tmp_path)
+    write(tmp_path / "a", "work/x", "x")
+    write(tmp_path / "a", "source/scan.r3d", "scan")
+    here.keep("p")
+    there.fetch("p")
+    begun, slow = threading.Event(), Objects(objects._store)
+
+    def hang(*given: Any) -> Any:
+        begun.set()
+        assert released.wait(PATIENCE_S)
+        return getattr(objects, call)(*given)
+
+    call = "get" if recording else "put"
+    setattr(slow, call, hang)
+    there._objects = slow
+    write(tmp_path / "b", "masks/1", "mask")
+    transfer = (lambda: there.fetch("p", recording=True)) if recording else (lambda: there.keep("p"))
+    thread = threading.Thread(target=transfer, daemon=True)
+    with held() as released:
+        thread.start()
+        assert begun.wait(PATIENCE_S)
+        there.fetch("p")
+    thread.join()
+    there.keep("p")
+    here.fetch("p")
+    assert ("source/scan.r3d" in read_all(tmp_path / "b")) == recording
+    assert read_all(tmp_path / "a")["masks/1"] == "mask" == read_all(tmp_path / "b")["masks/1"]
+
+
+def test_transfers_at_the_same_time_lose_no_files(tmp_path: Path) -> None:
+    import obstore
+
+    store = obstore.store.MemoryStore()
+    here, there = machines(Objects(store), tmp_path)
+    write(tmp_path / "a", "work/old", "old")
+    here.keep("p")
+    there.fetch("p")
+    begun, slow = threading.Event(), Objects(store)
+
+    def get(name: str, path: Path) -> str:
+        begun.set()
+        assert released.wait(PATIENCE_S)
+        return Objects(store).get(name, path)
+
+    slow.get = get  # type: ignore[method-assign]
+    there._objects = slow
+    write(tmp_path / "a", "work/new", "new")
+    (tmp_path / "a/projects/p/work/old").unlink()
+    here.keep("p")
+    thread = threading.Thread(target=there.fetch, args=("p",), daemon=True)
+    with held() as released:
+        thread.start()
+        assert begun.wait(PATIENCE_S)
+        write(tmp_path / "b", "masks/1", "mask")
+        there.keep("p")
+    thread.join()
+    here.fetch("p")
+    there.fetch("p")
+    assert read_all(tmp_path / "a") == {"work/new": "new", "masks/1": "mask"} == read_all(tmp_path / "b")
 
 
 @pytest.mark.parametrize("address", ["nonsense", "ftp://host/x", "s3://"])

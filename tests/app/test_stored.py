@@ -1,6 +1,7 @@
 """Servers with a data folder each, on one Postgres and one object store."""
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from tests.app.object_server import BUCKET, REQUIRED, object_server
 from tests.app.postgres import PostgresServer
 from tests.app.test_imports import R3D
 from tests.app.test_jobs import behave, run
+from tests.waiting import PATIENCE_S, held
 
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
@@ -89,6 +91,28 @@ def test_an_unreachable_store_is_reported_and_jobs_wait_for_it(
 
 def _raise(error: Exception) -> None:
     raise error
+
+
+def test_a_store_that_hangs_for_one_project_delays_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with held() as released, running(tmp_path / "a", store=f"file://{tmp_path / 'store'}") as web:
+        slow, other = web.sample(), web.sample()
+        fetches, sound = list[str](), Mirror.fetch
+
+        def fetch(self: Mirror, project_id: str, *, recording: bool = False) -> None:
+            fetches.append(project_id)
+            if project_id == slow:
+                assert released.wait(PATIENCE_S)
+            sound(self, project_id, recording=recording)
+
+        monkeypatch.setattr(Mirror, "fetch", fetch)
+        with ThreadPoolExecutor(50) as pool:
+            frames = [pool.submit(web.client.get, f"/media/{slow}/frames/0.jpg") for _ in range(50)]
+            web.until(lambda: slow in fetches)
+            assert web.client.get(f"/media/{other}/frames/0.jpg").status_code == 200
+            assert not released.is_set()
+            released.set()
+            assert {frame.result().status_code for frame in frames} == {200}
+        assert fetches.count(slow) < 50  # requests that arrive together share one
 
 
 def test_the_log_of_a_job_is_readable_at_another_server(two: tuple[Running, Running]) -> None:
