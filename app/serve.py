@@ -18,11 +18,11 @@ from sqlalchemy import Engine
 from sqlmodel import select
 from uvicorn.config import LOGGING_CONFIG
 
-from app.db.engine import opened, writing
+from app.db.engine import opened, reading, writing
 from app.db.tables import Project
 from app.db.usable import require_projects_known
 from app.files import only_server, project_files, running_server
-from app.jobs.outcomes import adopt_bundle, adopt_capture, adopt_prompts
+from app.jobs.outcomes import adopt_bundle, adopt_capture, adopt_prompts, keep_bundle
 from app.logs import log_as
 from app.main import create_app, let_go
 from app.services import accounts, launch_keys
@@ -147,22 +147,26 @@ def register_finished(data_dir: Path, *, name: str, source: Path, prompts: Path,
     if capture is None:
         raise InputError(f"{workdir}: holds no finished run", hint="run it first")
     settings = Settings(data_dir=data_dir)
-    with opened(settings.rows) as engine, writing(engine) as session:
-        found = session.exec(select(Project).where(Project.work_path == str(workdir))).first()
-        project = found or new_project(session, name, source.name, source.resolve(), workdir)
-        project.trashed = None
-        files = project_files(data_dir, project.id, project.work_path)
-        files.root.mkdir(parents=True, exist_ok=True)
-        describe(capture, files.root, source.resolve())
-        document = json.loads(prompts.read_text())
-        write_atomically(files.finished_prompts, json.dumps(document).encode())
-        adopt_capture(project, files)
-        if found is None:
-            adopt_prompts(session, project, checked_prompts(document), settings.user)
+    with opened(settings.rows) as engine:
+        with writing(engine) as session:
+            found = session.exec(select(Project).where(Project.work_path == str(workdir))).first()
+            project = found or new_project(session, name, source.name, source.resolve(), workdir)
+            project.trashed = None
+            files = project_files(data_dir, project.id, project.work_path)
+            files.root.mkdir(parents=True, exist_ok=True)
+            describe(capture, files.root, source.resolve())
+            document = json.loads(prompts.read_text())
+            write_atomically(files.finished_prompts, json.dumps(document).encode())
+            adopt_capture(project, files)
+            if found is None:
+                adopt_prompts(session, project, checked_prompts(document), settings.user)
+            session.add(project)
         if (workdir / "bundle.zip").is_file():
-            adopt_bundle(session, project, files, project.inputs)
-        session.add(project)
-        return project.id
+            with reading(engine) as session:
+                kept = keep_bundle(session, project, files)
+            with writing(engine) as session:
+                adopt_bundle(session, session.get_one(Project, project.id), project.inputs, kept)
+    return project.id
 
 
 def require_database(data_dir: Path) -> None:

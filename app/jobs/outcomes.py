@@ -10,7 +10,7 @@ import zipfile
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sqlalchemy import func
+from sqlalchemy import event, func
 from sqlmodel import Session, select
 
 from app.db import history
@@ -50,9 +50,9 @@ def sample_done(session: Session, job: Job, project: Project, files: ProjectFile
         adopt_prompts(session, project, checked_prompts(json.loads((files.source / "prompts.json").read_text())), job.who)
 
 
-def run_done(session: Session, job: Job, project: Project, files: ProjectFiles, kept: KeptBundle | None = None) -> None:
+def run_done(session: Session, job: Job, project: Project, files: ProjectFiles, kept: KeptBundle) -> None:
     """Store the bundle as a version, unless it equals the newest one."""
-    adopt_bundle(session, project, files, job.payload.get("inputs", ""), kept)
+    adopt_bundle(session, project, job.payload.get("inputs", ""), kept)
     names = files.request(job.id or 0).with_name(NAMES)
     named: dict[str, str] = (
         json.loads(names.read_text()) if names.is_file() else {}
@@ -69,7 +69,7 @@ def vary_done(session: Session, job: Job, project: Project, files: ProjectFiles,
 def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles) -> None:
     """Mark the project as failed, with the reason, after an unsuccessful import.
 
-    The files of an unreadable upload are deleted, as a retry would fail the same way.
+    The files of an unreadable upload are deleted after the commit, as a retry would fail the same way.
     """
     project.updated = time.time()
     if job.kind in READS_RECORDING:
@@ -79,7 +79,7 @@ def job_ended(session: Session, job: Job, project: Project, files: ProjectFiles)
         refused = not project.capture and (job.error or {}).get("kind") == "capture"
         if refused and files.here(project.source_path or "").is_relative_to(files.source):
             project.source_path = None
-            _delete_what_was_read(files)
+            event.listen(session, "after_commit", lambda _: _delete_what_was_read(files))
     session.add(project)
 
 
@@ -115,7 +115,7 @@ def keep_bundle(session: Session, project: Project, files: ProjectFiles) -> Kept
     temporary = kept.with_suffix(".part")
     shutil.copyfile(made, temporary)
     os.replace(temporary, kept)
-    row = bundle_row(project, kept, version)
+    row = bundle_row(project.id, kept, version)
     row.certificate = _with_speed(row.certificate, files.work)
     return KeptBundle(row)
 
@@ -169,11 +169,8 @@ def drawn_in(entry: PromptsFileObject) -> tuple[dict[str, Any] | None, dict[str,
     return front, frames, crop
 
 
-def adopt_bundle(
-    session: Session, project: Project, files: ProjectFiles, inputs: str, kept: KeptBundle | None = None
-) -> Bundle:
+def adopt_bundle(session: Session, project: Project, inputs: str, kept: KeptBundle) -> Bundle:
     """Store the copied bundle as the next version, or these inputs with the newest one if it is equal."""
-    kept = kept or keep_bundle(session, project, files)
     newest = newest_bundle(session, project.id)
     if kept.row is None:
         assert newest is not None
@@ -187,10 +184,10 @@ def adopt_bundle(
     return kept.row
 
 
-def bundle_row(project: Project, kept: Path, version: int) -> Bundle:
-    """The row of a stored bundle, with its certificate."""
+def bundle_row(project_id: str, kept: Path, version: int) -> Bundle:
+    """The row of a stored bundle, with its certificate. It reads the whole file: call it outside of write transactions."""
     size, created = kept.stat().st_size, kept.stat().st_mtime
-    row = Bundle(project_id=project.id, version=version, path=kept.name, sha256=_sha256(kept), size=size, created=created)
+    row = Bundle(project_id=project_id, version=version, path=kept.name, sha256=_sha256(kept), size=size, created=created)
     row.certificate = _certificate_in(kept)
     return row
 

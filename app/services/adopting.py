@@ -8,7 +8,7 @@ import logging
 import re
 import secrets
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,7 +18,7 @@ from sqlmodel import Session, SQLModel, col, delete, select
 
 from app.db import history, keys, queries
 from app.db.description import placed, read_description
-from app.db.engine import writing
+from app.db.engine import reading, writing
 from app.db.keys import stored_entry
 from app.db.queries import clicks_of
 from app.db.tables import Account, Bundle, Comment, Event, Job, Point, Project, ProjectMember, SceneObject, TrueLength, Verdict
@@ -51,12 +51,15 @@ _ID = re.compile(r"[0-9a-f]{12}")
 def adopt_all(engine: Engine, data_dir: Path, who: str) -> list[str]:
     """Adopt every project folder that is not in the database, in place; returns a line about each."""
     said = []
-    for folder in sorted(path for path in (data_dir / "projects").glob("*") if path.is_dir()):
+    with reading(engine) as session:
+        known = set(session.exec(select(Project.id)))
+    for folder in sorted(path for path in (data_dir / "projects").glob("*") if path.is_dir() and path.name not in known):
         try:
+            description = described(folder)
+            bundles = bundles_in(project_files(data_dir, description.id), description)
             with writing(engine) as session:
-                if session.get(Project, folder.name) is None:
-                    project = adopt(session, data_dir, described(folder), who)
-                    said.append(f"{folder.name}: adopted as {project.name}")
+                project = adopt(session, data_dir, description, bundles, who)
+                said.append(f"{folder.name}: adopted as {project.name}")
         except R2C2RError as error:
             said.append(f"{folder.name}: {error}")
     return said
@@ -70,8 +73,8 @@ def described(folder: Path) -> Description:
         return _of_an_older_version(ProjectFiles(folder, folder / "work"))
 
 
-def adopt(session: Session, data_dir: Path, description: Description, who: str) -> Project:
-    """Restore the described project, whose files are in place; an existing one is completed."""
+def adopt(session: Session, data_dir: Path, description: Description, bundles: Sequence[Bundle], who: str) -> Project:
+    """Restore the described project, whose files are in place, with its `bundles_in`; an existing one is completed."""
     files = project_files(data_dir, description.id, description.project.get("work_path"))
     project = session.get(Project, description.id)
     known, now = project is not None, time.time()
@@ -85,7 +88,7 @@ def adopt(session: Session, data_dir: Path, description: Description, who: str) 
     about = _still_known(session, project, description) | items
     _adopt_said(session, project, Comment, description.comments, about)
     _adopt_said(session, project, TrueLength, description.true_lengths or [], about)
-    _adopt_bundles(session, project, files, description)
+    _adopt_bundles(session, project, bundles)
     _adopt_people(session, project, description)
     if not known:
         _read_again(session, project, files, who)
@@ -190,16 +193,23 @@ def _adopt_said(
             session.add(table(**{**_fields(table, entry), "project_id": project.id, "object_id": item.id if item else None}))
 
 
-def _adopt_bundles(session: Session, project: Project, files: ProjectFiles, description: Description) -> None:
-    """Add rows for existing bundle files without one."""
-    stored = set(session.exec(select(Bundle.version).where(Bundle.project_id == project.id)))
+def bundles_in(files: ProjectFiles, description: Description) -> list[Bundle]:
+    """Rows of the bundle files of a described project. It reads the files: call it outside of write transactions."""
     told = {entry.get("path"): entry for entry in description.bundles}
-    for kept in files.bundles.glob("v*.zip"):
+    rows = []
+    for kept in sorted(files.bundles.glob("v*.zip")):
         number = kept.stem[1:]
-        if number.isdecimal() and int(number) not in stored:
-            row = bundle_row(project, kept, int(number))
+        if number.isdecimal():
+            row = bundle_row(description.id, kept, int(number))
             row.sqlmodel_update({key: told[kept.name][key] for key in ("created", "inputs") if key in told.get(kept.name, {})})
-            session.add(row)
+            rows.append(row)
+    return rows
+
+
+def _adopt_bundles(session: Session, project: Project, bundles: Sequence[Bundle]) -> None:
+    """Add the rows of bundles that the project does not have."""
+    stored = set(session.exec(select(Bundle.version).where(Bundle.project_id == project.id)))
+    session.add_all(row for row in bundles if row.version not in stored)
 
 
 def _adopt_people(session: Session, project: Project, description: Description) -> None:

@@ -66,9 +66,10 @@ def duplicate(
     try:
         _copy_files(files, copy, recording_only)
         context.store.keep(description.id)
+        bundles = adopting.bundles_in(copy, description)
         with writing(context.engine) as session:
             quotas.check_project(context, session)
-            made = adopting.adopt(session, context.settings.data_dir, description, context.who)
+            made = adopting.adopt(session, context.settings.data_dir, description, bundles, context.who)
             made.owner_id, made.review_state, made.archived = imports.account_of(context, session), "draft", False
             mark(session, made)
     except BaseException:

@@ -35,9 +35,9 @@ def listed(context: Context) -> list[schemas.Honeypot]:
 
 def slip(context: Context, project_id: str, body: schemas.HoneypotIn) -> schemas.Honeypot:
     """Create a project from a sample kitchen's recording, assigned to a user without access to its ground truth."""
+    context.store.fetch(project_id, recording=True)
     with reading(context.engine) as session:
         sample = queries.project_row(session, project_id)
-        context.store.fetch(project_id, recording=True)
         if not (context.files(sample).source / TRUTH).is_file():
             raise Conflict(f"the truth of {sample.name} is not known", hint="choose a sample kitchen")
         person = accounts.row(session, body.person.lower())

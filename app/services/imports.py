@@ -50,19 +50,24 @@ def require_awaited(context: Context, project_id: str) -> None:
 def into_project(context: Context, project_id: str, upload: Upload, received: Path) -> schemas.Project:
     """Add the recording of a project that has none; it is refused if its frames do not match."""
     name = safe_name(upload.file_name)
-    with writing(context.engine) as session:
-        project = queries.project_row(session, project_id)
-        if not project_shapes.awaits_recording(project):
-            raise Conflict(f"{project.name} got a recording in the meantime", hint="look at it again")
-        target = context.files(project).source / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        received.replace(target)
+    with reading(context.engine) as session:
+        target = context.files(queries.project_row(session, project_id)).source / name
+    target.parent.mkdir(parents=True, exist_ok=True)
+    received.replace(target)
+    try:
         context.store.keep(project_id)  # before a job can read it
-        now = time.time()
-        project.source_path, project.source_name, project.status, project.error = str(target), name, "importing", None
-        session.add(Event(project_id=project_id, scope="project", action="recording", text=name, who=context.who, at=now))
-        session.delete(session.merge(upload))
-        job = queue_job(context, session, project, "import", {})
+        with writing(context.engine) as session:
+            project = queries.project_row(session, project_id)
+            if not project_shapes.awaits_recording(project):
+                raise Conflict(f"{project.name} got a recording in the meantime", hint="look at it again")
+            now = time.time()
+            project.source_path, project.source_name, project.status, project.error = str(target), name, "importing", None
+            session.add(Event(project_id=project_id, scope="project", action="recording", text=name, who=context.who, at=now))
+            session.delete(session.merge(upload))
+            job = queue_job(context, session, project, "import", {})
+    except BaseException:  # any error: nothing refers to the file, and it need not be sent again
+        target.replace(received)
+        raise
     return _started(context, project_id, job)
 
 

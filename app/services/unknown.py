@@ -44,10 +44,10 @@ def adopt(context: Context, entry: str) -> schemas.Project:
         files.root.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(folder, files.root)
     try:
+        bundles = adopting.bundles_in(files, description)
         with writing(context.engine) as session:
-            adopting.adopt(
-                session, context.settings.data_dir, description, context.who
-            ).trashed = None  # restored also from the trash
+            project = adopting.adopt(session, context.settings.data_dir, description, bundles, context.who)
+            project.trashed = None  # restored also from the trash
     except BaseException:
         if not only_said:
             shutil.move(files.root, folder)
@@ -56,11 +56,11 @@ def adopt(context: Context, entry: str) -> schemas.Project:
         delete_folder(folder)  # all its content is in the database
     (files.root / LEFT).unlink(missing_ok=True)
     crossing.sees_changed(context)
-    project = projects.get_project(context, description.id)
-    if project.job is not None:  # a job reads its recording again
-        context.runner.queued(project.job.id)
-    projects.tell(context, project.id)
-    return project
+    shown = projects.get_project(context, description.id)
+    if shown.job is not None:  # a job reads its recording again
+        context.runner.queued(shown.job.id)
+    projects.tell(context, shown.id)
+    return shown
 
 
 def leave(context: Context, entry: str) -> schemas.UnknownFolder:

@@ -95,8 +95,8 @@ def give(context: Context, project_id: str, body: schemas.RecordingIn) -> schema
 
     It waits for a process: call it behind the gate of looks.
     """
-    imports.require_awaited(context, project_id)
-    with context.uploads.on(body.upload, "finished"):
+    with context.uploads.on(project_id, "finished"), context.uploads.on(body.upload, "finished"):
+        imports.require_awaited(context, project_id)
         row, received = _complete(context, body.upload)
         try:
             probing.check_recording(context, received, safe_name(row.file_name))

@@ -13,7 +13,7 @@ from sqlmodel import select
 from app.db.engine import opened, writing
 from app.db.queries import project_row
 from app.db.tables import Job, Project
-from app.jobs.outcomes import adopt_bundle
+from app.jobs.outcomes import adopt_bundle, keep_bundle
 from app.settings import DATABASE
 from r2c2r_core.model.report import Certificate
 from r2c2r_core.workspace import Workspace
@@ -60,7 +60,7 @@ def finished_kitchen(web: Running, certificate: Certificate, *bundles: Path) -> 
         keep_nouns(files.work, certificate)
         for bundle in bundles:
             shutil.copyfile(bundle, files.work / "bundle.zip")
-            adopt_bundle(session, row, files, "inputs")
+            adopt_bundle(session, row, "inputs", keep_bundle(session, row, files))
     return project
 
 

@@ -115,7 +115,7 @@ def test_a_project_folder_stores_the_assignee_of_the_project(kept: Kept) -> None
     assert "assignee_id" not in description.project
     with writing(context.engine) as session:
         project_row(session, kept.project).assignee_id = None
-        adopting.adopt(session, context.settings.data_dir, description, "root")
+        adopting.adopt(session, context.settings.data_dir, description, [], "root")
     assert kept.of["bob"].get(f"/api/projects/{kept.project}").json()["assignee"] == "bob"
 
 
@@ -176,5 +176,5 @@ def test_a_folder_stores_object_assignees_and_a_duplicate_has_none(kept: Kept) -
     kept.of["alice"].patch(f"{at}/objects/{number}", json={"assignee": None})
     description.objects[1].assignee = "stranger"  # an account of another server
     with writing(context.engine) as session:
-        adopting.adopt(session, context.settings.data_dir, description, "root")
+        adopting.adopt(session, context.settings.data_dir, description, [], "root")
     assert [item["assignee"] for item in kept.of["alice"].get(f"{at}/objects").json()] == ["bob", None]

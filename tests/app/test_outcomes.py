@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from sqlite3 import connect
@@ -56,6 +57,24 @@ def test_the_database_is_not_locked_while_a_bundle_is_copied(web: Running, monke
     assert [bundle["current"] for bundle in web.get(f"/api/projects/{project}/bundles")] == [True]
     web.job(run(web, project), "done")
     assert [bundle["version"] for bundle in web.get(f"/api/projects/{project}/bundles")][-1] == 1
+    count = len(looked)
+    web.post(f"/api/projects/{project}/duplicate", status=201)
+    assert len(looked) > count
+
+
+@pytest.mark.parametrize("commits", [False, True])
+def test_an_unreadable_upload_is_deleted_only_with_its_committed_failure(web: Running, commits: bool) -> None:
+    project, files = web.sample(), web.context.files
+    with suppress(ZeroDivisionError), writing(web.context.engine) as session:
+        row = session.get_one(Project, project)
+        row.capture, source = {}, files(row).source
+        error = {"kind": "capture", "message": "no depth in it", "hint": "record again"}
+        failed = Job(project_id=project, kind="import", state="failed", created=0.0, error=error)
+        outcomes.job_ended(session, failed, row, files(row))
+        assert any(source.iterdir())
+        if not commits:
+            raise ZeroDivisionError
+    assert source.exists() is not commits
 
 
 @pytest.mark.parametrize("stored_as_pairs", [False, True])

@@ -6,13 +6,16 @@ import stat
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from sqlite3 import connect
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
+from app.errors import Unavailable
 from app.jobs.ingest import refuse_another
 from app.services import accounts, project_export, uploads
+from app.store.protocol import Folder
 from r2c2r_core.errors import CaptureError
 from tests.app.conftest import ORIGIN, Running, running
 from tests.app.test_imports import R3D, archive, left_behind, upload
@@ -154,6 +157,30 @@ def test_a_project_file_without_recording_waits_for_its_upload(first: tuple[Runn
     assert given(second, made["id"])[0] == given(*first)[0]
     assert second.get("/api/uploads") == []
     assert second.client.put(f"{at}/recording", json={"upload": sent}).json()["kind"] == "conflict"
+
+
+def test_a_recording_is_not_sent_again_after_the_store_failed(
+    first: tuple[Running, str], second: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = take_in(second, exported(first, recording=False))
+    sent = second.post("/api/uploads", {"file_name": "scan.r3d", "size": len(R3D)}, 201)["id"]
+    second.client.patch(f"/api/uploads/{sent}", content=R3D, headers={"Upload-Offset": "0"})
+    written: list[str] = []
+
+    def fail_once(_: Any, project_id: str) -> None:
+        with connect(second.settings.database, timeout=0) as other:
+            other.execute("BEGIN IMMEDIATE")  # raises if another connection is writing
+            other.rollback()
+        written.append(project_id)
+        if len(written) == 1:
+            raise Unavailable("the store of files: it does not answer", hint="try again in a moment")
+
+    monkeypatch.setattr(Folder, "keep", fail_once)
+    at = f"/api/projects/{made['id']}"
+    assert second.client.put(f"{at}/recording", json={"upload": sent}).status_code == 503
+    assert second.get(at)["awaits_recording"]
+    assert second.client.put(f"{at}/recording", json={"upload": sent}).status_code == 202
+    second.until(lambda: second.get(at)["status"] == "ready")
 
 
 def test_the_export_offer_reports_the_size_of_the_file(first: tuple[Running, str]) -> None:

@@ -74,5 +74,5 @@ def test_a_duplicate_and_a_project_folder_keep_the_checklist(web: Running) -> No
         description = describe(session, row, web.context.files(row))
     web.client.put(f"/api/projects/{project}/checklist", json={"template": None})
     with writing(web.context.engine) as session:
-        adopting.adopt(session, web.context.settings.data_dir, description, "tester")
+        adopting.adopt(session, web.context.settings.data_dir, description, [], "tester")
     assert web.get(f"/api/projects/{project}")["checklist"] == OBJECTS

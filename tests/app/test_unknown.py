@@ -303,7 +303,7 @@ def test_adopting_does_not_duplicate_comments_and_lengths(web: Running) -> None:
         for told in (*session.exec(select(Comment)), *session.exec(select(TrueLength).where(TrueLength.metres > 1.0))):
             session.delete(told)
         session.flush()
-        adopt(session, web.settings.data_dir, description, "tester")
+        adopt(session, web.settings.data_dir, description, [], "tester")
     after = known(web, project)
     assert after["comments"] == before["comments"]
     assert sorted(after["lengths"]["lengths"], key=lambda row: row["at"]) == before["lengths"]["lengths"]
