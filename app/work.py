@@ -1,6 +1,7 @@
 """`r2c2r work`: a machine that computes jobs from a shared database without serving."""
 
 import contextlib
+import logging
 import signal
 import sys
 import threading
@@ -27,6 +28,7 @@ from app.traces import open_traces
 from r2c2r_core.disk import keep_private, resolved
 from r2c2r_core.errors import EnvironmentProblem, R2C2RError
 
+_log = logging.getLogger(__name__)
 TIDY_S = 5.0
 
 
@@ -68,8 +70,12 @@ def run_jobs(settings: Settings, commands: Commands, stopping: threading.Event, 
         sys.stdout.flush()
         try:
             while not stopping.wait(min(TIDY_S, settings.beat_s)) and not (runner.draining and not runner.projects):
-                with contextlib.suppress(R2C2RError):  # the store is unavailable; the next iteration tries again
+                try:
                     store.tidy(runner.projects | (segmenters.projects if segmenters else frozenset()))
+                except R2C2RError as error:  # the store is unavailable: try again
+                    _log.warning("tidying: %s", error)
+                except Exception:  # a seat must not stop because its cache could not be tidied
+                    _log.exception("tidying")
         finally:
             runner.stop()
             if segmenters is not None:

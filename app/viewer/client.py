@@ -4,19 +4,20 @@ Each session has its own view of each project, independent of other users' views
 """
 
 import hashlib
+import itertools
 import queue
 import secrets
 import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from app.errors import Forbidden, TooMany, Unavailable
-from app.process import Worker, python_module
+from app.process import Line, Worker, python_module
 from app.settings import Settings
 from r2c2r_core.errors import InputError, R2C2RError
 
@@ -46,11 +47,51 @@ class Opened:
     used: float = field(default_factory=time.monotonic)
     watching: int = 0
     shown: dict[str, Any] | None = None  # shown again after a restart of the process
+    opening: threading.RLock = field(default_factory=threading.RLock, repr=False, compare=False)
 
     @property
     def name(self) -> str:
         """Name of the view in the viewer's process."""
         return f"{self.project}/{hashlib.sha256(self.session.encode()).hexdigest()[:16]}"
+
+
+class _Process(Worker):
+    """The viewer's process; many threads may wait for its answers, which come in any order."""
+
+    def __init__(self, command: tuple[str, ...], log: Path) -> None:
+        super().__init__(command, log)
+        self._lock = threading.Lock()
+        self._numbers = itertools.count(1)
+        self._waiting: dict[int, queue.SimpleQueue[Line | None]] = {}  # by command number; None once it has ended
+        self._ended = False
+        threading.Thread(target=self._hear, name="viewer-answers", daemon=True).start()
+
+    def ask(self, command: Line, answer_s: float) -> Line | None:
+        """The answer to a command; None where the process ended, or took longer."""
+        number, answer = next(self._numbers), queue.SimpleQueue[Line | None]()
+        with self._lock:  # lines must not mix
+            self._waiting[number] = answer
+            sent = not self._ended and self.say({"id": number, **command})
+        try:
+            return answer.get(timeout=answer_s) if sent else None
+        except queue.Empty:
+            return None
+        finally:
+            del self._waiting[number]
+
+    def _hear(self) -> None:
+        while (line := self._next()) is not None:
+            if (waiting := self._waiting.get(line.get("id", 0))) is not None:
+                waiting.put(line)
+        with self._lock:
+            self._ended = True
+            for waiting in tuple(self._waiting.values()):
+                waiting.put(None)
+
+    def _next(self) -> Line | None:
+        while True:
+            with suppress(queue.Empty):
+                return self.next_line(timeout=threading.TIMEOUT_MAX)
 
 
 class Viewer:
@@ -61,10 +102,9 @@ class Viewer:
         self._settings, self._command = settings, command
         self.key = secrets.token_urlsafe(24)
         self._views: dict[tuple[str, str], Opened] = {}
-        self._worker: Worker | None = None
-        self._lock = threading.RLock()
+        self._worker: _Process | None = None
+        self._lock = threading.RLock()  # of the process and the table of views; nothing waits for an answer under it
         self._connections: Counter[str] = Counter()  # by person; used on the event loop
-        self._number = 0
         self._stopped = False
 
     def open(self, project: str, workdir: Path, session: str) -> str:
@@ -147,7 +187,7 @@ class Viewer:
             self._connections += Counter()  # removes users without connections
 
     def stop(self) -> None:
-        """End the process permanently; takes no lock, as a caller waiting for an answer holds it and is woken by this."""
+        """End the process permanently; callers that wait for an answer are woken by this."""
         self._stopped = True
         worker = self._worker
         if worker is not None:
@@ -186,11 +226,12 @@ class Viewer:
             found = self._views.get((project, session))
             view = found if found is not None and found.until > time.monotonic() else Opened(project, session, workdir)
             view.used = time.monotonic()
+            self._views[project, session] = view
+        with view.opening:
             if port := self._port_of(view):
                 return view, port
             self._make_room()
             port = view.port = int(self._ask({"cmd": "open", "view": view.name, "workdir": str(workdir)})["port"])
-            self._views[project, session] = view
             self._show_again(view)
             return view, port
 
@@ -230,55 +271,39 @@ class Viewer:
                 return
 
     def _ask(self, command: dict[str, Any]) -> dict[str, Any]:
-        with self._lock:
-            worker = self._running()
-            self._number += 1
-            if not worker.say({"id": self._number, **command}):
-                self._forget(worker)
-                raise self._down()
-            answer = self._answer(worker)
+        worker = self._running()
+        answer = worker.ask(command, self._settings.viewer_answer_s)
+        if answer is None:
+            self._forget(worker)
+            raise Unavailable("the 3D view has stopped", hint="try again: it restarts; its log is logs/viewer.log")
         if "error" in answer:
             error = answer["error"]
             raise _FAILURES.get(error["kind"], InputError)(error["message"], hint=error["hint"])
         result: dict[str, Any] = answer["ok"]
         return result
 
-    def _answer(self, worker: Worker) -> dict[str, Any]:
-        deadline = time.monotonic() + self._settings.viewer_answer_s
-        while time.monotonic() < deadline:
-            try:
-                line = worker.next_line(timeout=deadline - time.monotonic())
-            except queue.Empty:
-                break
-            if line is None:
-                break
-            if line.get("id") == self._number:
-                return line
-        self._forget(worker)
-        raise self._down()
-
-    def _forget(self, worker: Worker) -> None:
+    def _forget(self, worker: _Process) -> None:
+        with self._lock:
+            if self._worker is not worker:  # another thread has done it
+                return
+            self._worker = None
+            for view in tuple(self._views.values()):
+                view.port = None
         worker.kill()
         worker.close()
-        self._worker = None
-        for view in tuple(self._views.values()):
-            view.port = None
 
-    def _running(self) -> Worker:
+    def _running(self) -> _Process:
         if not self.enabled:
             raise Unavailable("the 3D view is switched off", hint="use the picture and the mesh instead")
         if self._stopped:
             raise Unavailable("the server stops", hint="try again in a moment")
-        if self._worker is not None and not self._worker.alive:
-            self._forget(self._worker)
-        if self._worker is None:
-            self._worker = Worker(self._command, self._settings.data_dir / "logs" / "viewer.log")
-            if (
-                self._stopped
-            ):  # checked after assignment: either stop() sees the worker, or this check sees that stop() was called
+        with self._lock:
+            if self._worker is not None and not self._worker.alive:
+                self._forget(self._worker)
+            if self._worker is None:
+                worker = _Process(self._command, self._settings.data_dir / "logs" / "viewer.log")
+                worker.say({"key": self.key})
+                self._worker = worker
+            if self._stopped:  # checked after assignment: either stop() sees the worker, or this check sees the stop
                 self._worker.kill()
-            self._worker.say({"key": self.key})
-        return self._worker
-
-    def _down(self) -> Unavailable:
-        return Unavailable("the 3D view has stopped", hint="try again: it restarts; its log is logs/viewer.log")
+            return self._worker

@@ -15,6 +15,7 @@ from app.db.engine import reading
 from app.db.tables import Job
 from app.jobs import seats
 from app.settings import Settings
+from app.store.mirror import Mirror
 from r2c2r_core.errors import EnvironmentProblem
 from tests.app.conftest import FAKE_COMMANDS, ORIGIN, SOCKETS, Running, running
 from tests.app.object_server import REQUIRED
@@ -69,6 +70,23 @@ def test_a_server_that_runs_no_jobs_shows_results_of_seats(shared: dict[str, Any
         with reading(web.context.engine) as session:
             owners = set(session.exec(select(Job.owner)))
         assert web.context.runner.rows.owner not in owners
+
+
+def test_a_seat_continues_after_an_unexpected_error(
+    shared: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tidied, sound = list[int](), Mirror.tidy
+
+    def fail_once(self: Mirror, in_use: frozenset[str]) -> None:
+        tidied.append(len(tidied))
+        if len(tidied) == 1:
+            raise RuntimeError("unexpected")
+        sound(self, in_use)
+
+    with running(tmp_path / "web", **shared, heavy_jobs=0) as web:
+        monkeypatch.setattr(Mirror, "tidy", fail_once)
+        with seat(web, tmp_path / "one"):
+            web.until(lambda: len(tidied) > 1)
 
 
 def test_a_run_continues_at_another_seat_after_its_seat_ends(shared: dict[str, Any], tmp_path: Path) -> None:

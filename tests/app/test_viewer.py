@@ -1,5 +1,8 @@
 import http.client
+import io
+import json
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +15,7 @@ from websockets.sync.client import connect
 
 from app.errors import Unavailable
 from app.settings import Settings
-from app.viewer import contract
+from app.viewer import contract, worker
 from app.viewer.client import Viewer
 from tests.app.conftest import ORIGIN, PATIENT, SOCKETS, Running, fake, running
 from tests.app.nouns import finish
@@ -178,6 +181,41 @@ def test_each_session_has_its_own_view(seen: Running) -> None:
     assert seen.post(show, {"mode": "cloud"})["text"] == "shown 1 times"
     assert other.post(show, json={"mode": "cloud"}).json()["text"] == "shown 1 times"
     assert seen.post(show, {"mode": "cloud"})["text"] == "shown 2 times"
+
+
+def test_a_slow_scene_delays_no_other_view(seen: Running) -> None:
+    viewer, folder = seen.context.viewer, seen.settings.data_dir
+    for session in ("a", "b"):
+        viewer.open("p", folder, session)
+    shown: list[dict[str, Any]] = []
+    wish = {"mode": "cloud", "opacity": 0.222}  # answered after the next command
+    thread = threading.Thread(target=lambda: shown.append(viewer.show("p", folder, "a", wish)), daemon=True)
+    thread.start()
+    process = viewer._worker
+    assert process is not None
+    seen.until(lambda: process._waiting)
+    assert viewer.move("p", folder, "b", {"door": 0.5})["text"] == "moved"
+    thread.join(PATIENCE_S)
+    assert [answer["mode"] for answer in shown] == ["cloud"]
+
+
+def test_the_viewer_process_answers_other_views_during_a_slow_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = [{"key": "k"}, {"id": 1, "cmd": "show", "view": "a"}, {"id": 2, "cmd": "camera", "view": "b"}]
+    answered = threading.Event()
+
+    def show(*_: Any) -> dict[str, Any]:
+        return {"after": answered.wait(PATIENCE_S)}
+
+    def camera(*_: Any) -> dict[str, Any]:
+        answered.set()
+        return {}
+
+    monkeypatch.setattr(worker, "_COMMANDS", {"show": show, "camera": camera})
+    monkeypatch.setattr("sys.stdin", io.StringIO("".join(json.dumps(line) + "\n" for line in lines)))
+    monkeypatch.setattr("sys.stdout", said := io.StringIO())
+    assert worker.main() == 0
+    answers = {answer["id"]: answer for answer in map(json.loads, said.getvalue().splitlines())}
+    assert answers == {1: {"id": 1, "ok": {"after": True}}, 2: {"id": 2, "ok": {}}}
 
 
 def test_a_restarted_view_shows_its_last_content(seen: Running) -> None:

@@ -1,4 +1,7 @@
-"""Stand-in viewer with an echoing upstream; opacity 0.123 kills it, 0.321 blocks it for ever; views not open are an error."""
+"""Stand-in viewer with an echoing upstream; views not open are an error.
+
+Opacity 0.123 kills it, 0.321 blocks it for ever, 0.222 delays the answer until after the next one.
+"""
 
 import json
 import signal
@@ -38,6 +41,7 @@ threading.Thread(target=server.serve_forever, daemon=True).start()
 port = server.socket.getsockname()[1]
 shown: dict[str, int] = {}  # number of times, by view
 opened: set[str] = set()
+answers: list[dict[str, Any]] = []  # not sent yet
 for line in sys.stdin:
     command = json.loads(line)
     if command.get("opacity") == 0.123:
@@ -66,5 +70,9 @@ for line in sys.stdin:
         answer = {"number": 1, "name": "drawer_1", "point": [0.0, 0.0, 1.0]}
     if command["cmd"] == "camera":
         answer = {"position": [0.0, -2.0, 1.5], "target": [0.0, 0.0, 1.0]}
-    sys.stdout.write(json.dumps({"id": command["id"], "ok": answer}) + "\n")
-    sys.stdout.flush()
+    answers.append({"id": command["id"], "ok": answer})
+    if command.get("opacity") != 0.222:
+        for each in reversed(answers):
+            sys.stdout.write(json.dumps(each) + "\n")
+        sys.stdout.flush()
+        answers.clear()
