@@ -3,13 +3,16 @@
 import csv
 import io
 import json
+import threading
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from sqlalchemy import event
 
+from app.store.protocol import Folder
 from tests.app.test_opinions import click
 from tests.app.test_project_members import Kept, kept
 
@@ -79,6 +82,18 @@ def test_a_honeypot_without_ground_truth_is_refused(kept: Kept) -> None:
     refused = kept.of["root"].post(f"/api/projects/{kept.project}/honeypot", json=body)
     assert (refused.status_code, refused.json()["message"]) == (409, "the truth of Sample kitchen is not known")
     assert len(kept.of["root"].get("/api/projects").json()) == 1
+
+
+def test_no_database_connection_is_open_while_the_recording_is_fetched(kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
+    engine, taken, fetches = kept.web.context.engine, dict[int, int](), list[bool]()
+    event.listen(engine, "checkout", lambda connection, *_: taken.update({id(connection): threading.get_ident()}))
+    event.listen(engine, "checkin", lambda connection, *_: taken.pop(id(connection), None))
+    monkeypatch.setattr(Folder, "fetch", lambda *_, **__: fetches.append(threading.get_ident() in taken.values()))
+    write_truth(kept.web.settings.data_dir / "projects" / kept.project / "source")
+    body = {"person": "alice", "name": "Flat 9"}
+    made = kept.of["root"].post(f"/api/projects/{kept.project}/honeypot", json=body).json()["project"]
+    assert kept.of["root"].get(f"/api/projects/{made}/honeypot").status_code == 200
+    assert set(fetches) == {False}
 
 
 def test_honeypot_objects_are_scored_by_mask_iou_and_category(kept: Kept, slipped: str) -> None:
