@@ -152,8 +152,8 @@ def open_objects(address: str) -> Objects:
     try:
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-        retries = {"max_retries": 3, "retry_timeout": timedelta(seconds=RETRIED_S)}
-        return Objects(obstore.store.from_url(address, retry_config=retries), folder)
+        store = obstore.store.from_url(address, retry_config={"max_retries": 3, "retry_timeout": timedelta(seconds=RETRIED_S)})
+        return Objects(store, folder)
     except (obstore.exceptions.BaseError, ValueError, OSError) as error:
         raise InputError(f"R2C2R_STORE {address[:80]!r}: {_first_line(error)}", hint=_HINT) from error
 
