@@ -95,7 +95,7 @@ def merged(result: Path, new: list[Trial], views: dict[str, object] | None = Non
     with (result.with_suffix(".lock")).open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         held = json.loads(result.read_text()) if result.exists() else {}
-        code = source_key("align", "geometry", "model")
+        code = source_key("align")
         known = held.get("trials", []) if held.get("code") == code else []
         by_number = {t.number: t for t in [*(Trial(**t) for t in known), *new]}  # parts may overlap
         trials = [by_number[number] for number in sorted(by_number)]

@@ -124,7 +124,7 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
 def _measure_case(case: Case, options: argparse.Namespace, end: float) -> None:
     every = {(path, f.name) for room in ROOMS for path in modules_with_numbers(room) for f in fields(params_of(path))}
     read = {entry for reads in case.read.values() for entry in reads}
-    key = [source_key(*ROOMS, "ingest", "model"), options.frames, case.name, sorted(case.prompts)]
+    key = [source_key(*ROOMS, "ingest"), options.frames, case.name, sorted(case.prompts)]
     said = {
         "usual": case.figures(case.made, frozenset(case.prompts)),
         "untouched": sorted(f"{path}.{name}" for path, name in every - read),

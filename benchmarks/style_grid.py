@@ -66,7 +66,7 @@ def draw(folder: Path, seed: int, choice: Choice) -> Path:
 
 def measured(kitchen: Path, clicks: int) -> Row:
     """The kitchen's figures, cached beside it while the code that finds fronts is unchanged."""
-    key, kept = f"{source_key('segment', 'kitchen', 'geometry', 'model')}-{clicks}", kitchen / "grid.json"
+    key, kept = f"{source_key('segment')}-{clicks}", kitchen / "grid.json"
     if kept.exists():
         row: Row = json.loads(kept.read_text(encoding="utf-8"))
         if row["key"] == key:

@@ -5,7 +5,7 @@ stage's source and its inputs, so the arguments of the call define the dependenc
 """
 
 import logging
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +15,7 @@ from r2c2r_core.errors import EnvironmentProblem
 from r2c2r_core.failing import OBJECT_FAILS, apart, record
 from r2c2r_core.pool import Failed, Pool, Task
 from r2c2r_core.progress import SILENT, Progress
-from r2c2r_core.sources import source_key
+from r2c2r_core.sources import modules_of, source_key
 from r2c2r_core.tuning import in_force, tuning
 from r2c2r_core.workspace import Workspace, content_key
 
@@ -24,7 +24,6 @@ T = TypeVar("T")
 Stage = Literal["ingest", "segment", "generate", "align", "synthesize", "warp", "export"]
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
-_STANDS_ON = {"generate": ("align",)}  # it calls the placement of candidates
 _log = logging.getLogger(__name__)
 
 
@@ -187,7 +186,8 @@ class Ledger:
         return results
 
     def _job(self, stage: Stage, name: str, compute: Callable[..., Any], inputs: tuple[Any, ...]) -> "_Job":
-        return _Job(self.work.root, stage, name, compute, inputs, in_force(*_rooms(stage)))
+        code = (stage, *sorted(set(_modules_in(inputs))))
+        return _Job(self.work.root, stage, name, compute, inputs, code, in_force(modules_of(*code)))
 
     def _found(self, job: "_Job") -> Kept[Any] | None:
         found = self.work.find(job.stage, job.name, job.key)
@@ -217,18 +217,25 @@ class _Job:
     name: str
     compute: Callable[..., Any]
     inputs: tuple[Any, ...]
-    numbers: Mapping[str, Any]  # changed tuned numbers, by module, of the stage and its dependencies
+    code: tuple[str, ...]  # the stage's package, and the modules of functions and objects among its inputs
+    numbers: Mapping[str, Any]  # changed tuned numbers of this code, by module
 
     @property
     def key(self) -> str:
-        """Content key of the stage's source, its dependencies, its tuned numbers and the inputs."""
-        source = source_key(*_rooms(self.stage), "model")
-        return content_key(self.stage, self.name, self.compute.__name__, source, self.numbers, _keys(self.inputs))
+        """Content key of the source, its tuned numbers and the inputs."""
+        function = self.compute.__name__
+        return content_key(self.stage, self.name, function, source_key(*self.code), self.numbers, _keys(self.inputs))
 
 
-def _rooms(stage: str) -> tuple[str, ...]:
-    """The packages whose code and numbers determine a stage's result."""
-    return (stage, *_STANDS_ON.get(stage, ()), "kitchen", "geometry")
+def _modules_in(inputs: Iterable[Any]) -> Iterator[str]:
+    """Modules of the core whose functions and objects are passed to a stage, which need not import them."""
+    for item in inputs:
+        if isinstance(item, tuple | list):
+            yield from _modules_in(item)
+        elif isinstance(item, Shared):
+            yield from _modules_in((item.make, *item.inputs))
+        elif not isinstance(item, Kept) and (module := getattr(item, "__module__", "")).startswith(f"{__package__}."):
+            yield module.removeprefix(f"{__package__}.")
 
 
 def store_noun(job: _Job, *, progress: Progress) -> None:

@@ -10,7 +10,7 @@ A module's parameters are addressed by its path in the core: `kitchen.fronts` ar
 """
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
@@ -73,10 +73,9 @@ def changed(changes: Changes) -> dict[type, Any]:
     return {(of := params_of(path)): dataclasses.replace(of(), **values) for path, values in changes.items()}
 
 
-def in_force(*rooms: str) -> dict[str, Any]:
-    """Changed parameters of these packages by module path, for other processes and for content keys."""
-    found = {path_of(of): numbers for of, numbers in _active.get().items()}
-    return {path: numbers for path, numbers in found.items() if path.partition(".")[0] in rooms}
+def in_force(modules: Collection[str]) -> dict[str, Any]:
+    """Changed parameters of these modules by path, for other processes and for content keys."""
+    return {path: numbers for of, numbers in _active.get().items() if (path := path_of(of)) in modules}
 
 
 def params_of(path: str) -> type[Any]:

@@ -11,12 +11,14 @@ import cv2
 import numpy as np
 import pytest
 
+from r2c2r_core.align.stage import Placer
 from r2c2r_core.disk import explained_io
 from r2c2r_core.errors import BackendUnavailable, Cancelled, EnvironmentProblem, ObjectNotSeen
 from r2c2r_core.geometry.masks import PackedMask, pack_mask
 from r2c2r_core.ledger import Kept, Ledger, Reached, Stage
 from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.tuning import Changes, changed, tuning
 from r2c2r_core.workspace import Workspace, content_key, file_key, write_atomically
 
 
@@ -57,6 +59,21 @@ def test_a_changed_pixel_in_a_painted_mask_recomputes_the_object(tmp_path: Path)
     assert computed(painted) == ["segment/a"]
     assert computed(painted) == []
     assert computed(other) == ["segment/a"]
+
+
+def test_the_code_of_an_object_passed_to_a_stage_determines_its_results(tmp_path: Path) -> None:
+    """Candidates are ranked by a Placer of another package, whose numbers then apply; without it they do not."""
+
+    def computed(work: str, placer: Placer | None, numbers: Changes) -> list[str]:
+        kept = Workspace(tmp_path / work)
+        with tuning(changed(numbers)):
+            Ledger(kept, SILENT).one("generate", lambda placer, progress: noun(1), placer)
+        return kept.computed
+
+    numbers: Changes = {"align.judge": {"slab_m": 0.02}}
+    for work, placer, again in (("placed", Placer(), ["generate/scene"]), ("unplaced", None, [])):
+        assert computed(work, placer, {}) == ["generate/scene"]
+        assert computed(work, placer, numbers) == again
 
 
 def test_a_damaged_stored_result_is_recomputed(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ from r2c2r_core.segment.proposals.propose import propose_steps
 from r2c2r_core.segment.protocol import Glimpse, SegmentConfig, Segmenter
 from r2c2r_core.segment.runs.run import Run, make_run
 from r2c2r_core.segment.scene import Scene, prepare_scene
-from r2c2r_core.sources import source_key
+from r2c2r_core.sources import modules_of, source_key
 from r2c2r_core.threads import in_threads
 from r2c2r_core.tuning import in_force
 
@@ -290,10 +290,10 @@ def _import_heavy() -> None:
 
 def _cache_key(capture: Capture, config: SegmentConfig) -> str:
     parts = (
-        source_key("segment", "kitchen", "geometry", "model"),
+        source_key("segment"),
         capture.sha256,
         config,
-        in_force("segment", "kitchen", "geometry"),
+        in_force(modules_of("segment")),
         capture.world_from_capture.matrix.round(9).tolist(),
         len(capture.surface.vertices_world),
         len(capture.surface.faces),
