@@ -10,6 +10,7 @@ from pathlib import Path
 
 import app
 from r2c2r_core.errors import InputError
+from r2c2r_core.threads import usable_cores
 
 BUSY_S = 10.0
 MEBIBYTE = 1024 * 1024
@@ -102,7 +103,7 @@ class Settings:
         """Processes that one job may start; 0: determined by cores and memory."""
         if self.on_ray:  # which reserves this many cores for it
             return self.workers or 1
-        shared = max(1, len(os.sched_getaffinity(0)) // max(1, self.heavy_jobs))
+        shared = max(1, usable_cores() // max(1, self.heavy_jobs))
         return self.workers or (0 if self.heavy_jobs <= 1 else shared)
 
     @property

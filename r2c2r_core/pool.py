@@ -4,7 +4,6 @@ A worker lives as long as its pool, as importing takes a second or two, and its 
 pool closes its end of the socket, or the parent process dies.
 """
 
-import os
 import pickle
 import signal
 import socket
@@ -21,6 +20,7 @@ import psutil
 
 from r2c2r_core.errors import Cancelled, EnvironmentProblem
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.threads import usable_cores
 
 WORKER_BYTES = 1500 << 20  # memory per process: the measured peak was 1.1 GB, on samples of 180 and of 600 frames alike
 _POLL_S = 0.2  # interval of checks for cancellation
@@ -47,7 +47,7 @@ class WorkerLost(RuntimeError):
 def usual_workers() -> int:
     """Default number of workers: limited by the available cores and memory."""
     room = psutil.virtual_memory().available // WORKER_BYTES
-    return int(max(1, min(len(os.sched_getaffinity(0)), room)))
+    return int(max(1, min(usable_cores(), room)))
 
 
 @dataclass(slots=True, eq=False)
@@ -76,9 +76,19 @@ class Pool:
 
     def _begin(self, waiting: list[tuple[str, Task]]) -> None:
         while waiting and len(self._busy) < self.workers:
-            worker = self._idle.pop() if self._idle else _Worker()
-            worker.begin(*waiting.pop(0))
+            worker = self._with(*waiting.pop(0))
             self._busy[worker.channel] = worker
+
+    def _with(self, name: str, task: Task) -> "_Worker":
+        """A worker that has the task: an idle one, unless it was killed meanwhile, else a new one."""
+        while self._idle:
+            worker = self._idle.pop()
+            if worker.begin(name, task):
+                return worker
+            worker.end()
+        worker = _Worker()
+        worker.begin(name, task)  # one that ends at once is found lost when its answer is read
+        return worker
 
     def _results(self, waiting: list[tuple[str, Task]], count: int, progress: Progress) -> Iterator[tuple[str, Any | Failed]]:
         shares: dict[str, float] = {}
@@ -116,10 +126,14 @@ class _Worker:
         self.channel = Connection(ours.detach())
         self.name = ""
 
-    def begin(self, name: str, task: Task) -> None:
-        """Send a task to the idle worker."""
+    def begin(self, name: str, task: Task) -> bool:
+        """Send a task to the idle worker; False if its process has ended."""
         self.name = name
-        self.channel.send(task)
+        try:
+            self.channel.send(task)
+        except (BrokenPipeError, ConnectionResetError):
+            return False
+        return True
 
     def answer(self) -> tuple[Any, ...]:
         """("at", share, text), ("done", value), ("failed", error, where), or ("lost", error, where) of a dead process."""

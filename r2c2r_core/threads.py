@@ -1,10 +1,10 @@
 """Parallel map on threads, since numpy, OpenCV and blocking calls release the GIL."""
 
+import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import copy_context
-from os import cpu_count
 from typing import TypeVar
 
 A = TypeVar("A")
@@ -20,7 +20,7 @@ def in_threads(work: Callable[[A], B], items: Iterable[A]) -> Iterator[B]:
     The threads use the caller's tuned numbers.
     """
     context = copy_context()
-    threads = min(4, cpu_count() or 1)
+    threads = min(4, usable_cores())
     pool = ThreadPoolExecutor(threads)
     waiting: deque[Future[B]] = deque()
     try:
@@ -32,3 +32,8 @@ def in_threads(work: Callable[[A], B], items: Iterable[A]) -> Iterator[B]:
             yield waiting.popleft().result()
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def usable_cores() -> int:
+    """Number of CPU cores that this process may use; all of them where no process can be restricted, as on macOS."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

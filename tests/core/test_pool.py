@@ -1,7 +1,9 @@
 """Tasks in worker processes: results, failures, and no process that outlives its pool."""
 
 import os
+import shutil
 import signal
+import sys
 from collections.abc import Iterator
 
 import numpy as np
@@ -68,6 +70,22 @@ def test_a_killed_worker_process_loses_only_its_task(pool: Pool) -> None:
     assert isinstance(lost.error, WorkerLost)
     assert "SIGKILL" in str(lost.error)
     assert answers == {"b": 2, "c": 4}
+
+
+def test_an_idle_worker_killed_meanwhile_is_replaced() -> None:
+    with Pool(1) as pool:
+        assert dict(pool.run({"a": Task(double, (1,))})) == {"a": 2}
+        (idle,) = pool._idle
+        idle._process.kill()
+        idle._process.wait()
+        assert dict(pool.run({"b": Task(double, (2,)), "c": Task(double, (3,))})) == {"b": 4, "c": 6}
+
+
+def test_a_worker_that_cannot_start_loses_its_task_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", shutil.which("false"))
+    with Pool(1) as pool:
+        answer = dict(pool.run({"a": Task(double, (bytes(1 << 20),))}))["a"]  # larger than the socket's buffer
+    assert isinstance(answer.error, WorkerLost)
 
 
 def test_cancelling_stops_all_worker_processes() -> None:

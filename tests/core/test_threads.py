@@ -1,7 +1,10 @@
+import os
 import threading
 from itertools import count
 
-from r2c2r_core.threads import in_threads
+import pytest
+
+from r2c2r_core.threads import in_threads, usable_cores
 from tests.waiting import PATIENCE_S
 
 
@@ -24,3 +27,13 @@ def test_work_runs_ahead_of_the_consumer_by_a_limited_amount() -> None:
     assert [next(results), next(results)] == [0, 1]
     results.close()
     assert len(begun) <= 12
+
+
+def test_all_cores_count_where_a_process_cannot_be_restricted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1, 2}, raising=False)
+    assert usable_cores() == 3
+    monkeypatch.delattr(os, "sched_getaffinity")  # macOS and Windows have none
+    monkeypatch.setattr(os, "cpu_count", lambda: 10)
+    assert usable_cores() == 10
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert usable_cores() == 1
