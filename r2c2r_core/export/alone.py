@@ -50,7 +50,7 @@ def _by_body(model: Any, moved: np.ndarray) -> dict[str, float]:
     worst: dict[str, float] = {}
     for geom, distance in enumerate(moved):
         name = body_name(model, int(model.geom_bodyid[geom]))
-        worst[name] = max(worst.get(name, 0.0), float(distance))
+        worst[name] = float(np.maximum(worst.get(name, 0.0), distance))  # unlike max, it keeps NaN: the body diverged
     return worst
 
 

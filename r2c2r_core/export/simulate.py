@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from r2c2r_core.export.alone import Left, leave_alone
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, Touch, body_name, free_bodies, joint_names, touches
 from r2c2r_core.export.rules.table import finding
@@ -44,7 +46,7 @@ class Simulation:
     @property
     def most_drift_m(self) -> float:
         """Maximum drift over all bodies, in metres."""
-        return max(self.drift_m.values(), default=_NAN)
+        return float(np.max([*self.drift_m.values()] or _NAN))
 
 
 def simulate(mjcf: Path, *, progress: Progress = SILENT) -> Simulation:

@@ -162,6 +162,20 @@ def test_a_scene_mujoco_cannot_compile_gives_one_finding(tmp_path: Path) -> None
     assert np.isnan(result.most_drift_m)
 
 
+def test_a_diverging_scene_has_no_drift_instead_of_none(tmp_path: Path) -> None:
+    """Its positions are NaN, which is neither small nor large."""
+    (tmp_path / "scene.xml").write_text(
+        """<mujoco><option gravity="0 0 -1e300"><flag autoreset="disable"/></option><worldbody>
+        <body name="a"><freejoint/><geom size="0.1"/></body><body name="b" pos="1 0 0"><geom size="0.1"/></body>
+        </worldbody></mujoco>"""
+    )
+    result = simulate(tmp_path / "scene.xml")
+    assert np.isnan(result.drift_m["a"])
+    assert result.drift_m["b"] == 0
+    assert np.isnan(result.most_drift_m)
+    assert {"drift", "unstable"} <= {f.rule for f in result.findings}
+
+
 def test_the_good_kitchen_has_no_contacts(tmp_path: Path) -> None:
     folder = write_folder(kitchen(), tmp_path / "b")
     model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
