@@ -93,7 +93,7 @@ def _grips(title: str, grips: Sequence[Grip]) -> list[str]:
     return [
         table((title, "how", "done", "grip N", "open %", "slip mm", "force N"), rows) if rows else "nothing to grasp",
         "",
-        *(f"{grip.name}: {grip.why} (the {grip.blame})" for grip in grips if grip.why),
+        *(f"{grip.name}: {grip.why}{f' (the {grip.blame})' * (grip.blame is not None)}" for grip in grips if grip.why),
     ]
 
 

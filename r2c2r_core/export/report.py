@@ -1,7 +1,7 @@
 """report.json and report.html: the certificate and the accuracy of a bundle, for programs and for people."""
 
 import html
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ def report_of(
 ) -> dict[str, Any]:
     """The report as a JSON document, without the simulation speed, which depends on this machine.
 
-    `gripper` and `arm` are their certificates as JSON; None where they were not tried.
+    `gripper` and `arm` are their certificates as JSON, or `why` they tried nothing; None where they were not to try.
     """
     judged = certificate_to_json(certificate)
     judged.pop("realtime_factor")
@@ -66,8 +66,8 @@ def report_html(manifest: dict[str, Any], report: dict[str, Any], pictures: dict
             _joints(manifest["objects"], certificate["joints"]),
             _things(certificate["things"]),
             _colliders(certificate["colliders"]),
-            _gripper(report["gripper"]),
-            _arm(report["arm"]),
+            _robot("A gripper", report["gripper"], _gripper),
+            _robot("An arm", report["arm"], _arm),
             _loaders(certificate["loaders"]),
             _stages(manifest["stages"]),
             _losses(report["losses"]),
@@ -297,10 +297,15 @@ def _colliders(colliders: list[dict[str, Any]]) -> str:
     )
 
 
-def _gripper(gripper: dict[str, Any] | None) -> str:
-    """Gripper results, with a contact sheet of each trial."""
-    if gripper is None or not gripper["grips"]:
+def _robot(title: str, trials: dict[str, Any] | None, results: Callable[[dict[str, Any]], str]) -> str:
+    """Section of a robot: its results, or why it tried nothing."""
+    if trials is None or trials.get("grips") == []:
         return ""
+    return f"<h2>{title}</h2>" + (f"<p>Not tried: {_text(trials['why'])}</p>" if "why" in trials else results(trials))
+
+
+def _gripper(gripper: dict[str, Any]) -> str:
+    """Gripper results, with a contact sheet of each trial."""
     about = gripper["gripper"]
     said = (
         f"A floating parallel gripper ({1000 * about['stroke_m']:.0f} mm stroke, {about['grips_n'][0]:.0f} N, "
@@ -309,15 +314,11 @@ def _gripper(gripper: dict[str, Any] | None) -> str:
         f"free things by 10 cm. push: no handle; pressed, then taken as thrown out {1000 * about['latch_throw_m']:.0f} mm by a "
         "push latch, which is no part of the bundle, and pulled by its edge."
     )
-    return f'<h2>A gripper</h2><p class="quiet">{said}</p>' + _grips("gripper", gripper["grips"])
+    return f'<p class="quiet">{said}</p>' + _grips("gripper", gripper["grips"])
 
 
-def _arm(arm: dict[str, Any] | None) -> str:
+def _arm(arm: dict[str, Any]) -> str:
     """Arm base positions on the floor plan, and results from there."""
-    if arm is None or arm.get("grips") == []:
-        return ""
-    if "why" in arm:
-        return f"<h2>An arm</h2><p>Not tried: {_text(arm['why'])}</p>"
     about = arm["arm"]
     said = (
         f"A {_text(about['name'])} ({_text(about['source'])}) on a lifting column reaches {arm['joints_in_reach']} of "
@@ -327,7 +328,7 @@ def _arm(arm: dict[str, Any] | None) -> str:
     picture = (
         f'<img src="arm/{MAP}" alt="The floor plan with the places where the arm stands, numbered; they are listed in it">'
     )
-    return f'<h2>An arm</h2><p class="quiet">{said}</p><figure>{picture}</figure>' + _grips("arm", arm["grips"])
+    return f'<p class="quiet">{said}</p><figure>{picture}</figure>' + _grips("arm", arm["grips"])
 
 
 def _grips(folder: str, grips: list[dict[str, Any]]) -> str:
@@ -341,7 +342,7 @@ def _grips(folder: str, grips: list[dict[str, Any]]) -> str:
             _percent(grip["opened"]),
             _millimetres(grip["slip_m"] if grip["kind"] == "joint" else grip["off_m"]),
             "–" if grip["force_n"] is None else f"{grip['force_n']:.0f} N",
-            _text(f"{grip['why']} (the {grip['blame']})" if grip["why"] else "–"),
+            _text(f"{grip['why']} (the {grip['blame']})" if grip["blame"] else grip["why"] or "–"),
         ]
         for grip in grips
     ]

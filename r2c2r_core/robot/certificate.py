@@ -43,7 +43,7 @@ class Grip:
     off_m: float = _NAN  # final distance of an object from its goal
     touched: tuple[tuple[str, float], ...] = ()  # other bodies touched, and the maximum force in N
     why: str = ""
-    blame: Blame | None = None
+    blame: Blame | None = None  # None: it passed, or the trial itself failed
     film: str | None = None  # file name without extension
 
 
@@ -81,17 +81,30 @@ def try_share(
     """Trials of every `step`-th joint or free object of a scene.xml from index `first`, joints before objects."""
     rig = gripper_in(scene)
     surfaces = surfaces_of(rig.model) if films is not None else None
-    joints, things = joints_of(rig.model), {body_words(rig.model, body): body for body in things_of(rig.model)}
-    grips = []
-    for name in progress.each([*joints, *things][first::step], "gripper"):
+    things, grips = _things(rig), list[Grip]()
+    for name in progress.each([*joints_of(rig.model), *things][first::step], "gripper"):
         failed: dict[str, str] = {}
         with apart("gripper", name, failed):
             grip, film = _thing(rig, things[name], surfaces) if name in things else _joint(rig, name, surfaces)
             grips.append(filmed_to(grip, film, films, moving))
-        if failed:
-            kind: Kind = "thing" if name in things else "joint"
-            grips.append(Grip(kind=kind, name=name, method=None, passed=False, why=failed[name], blame="gripper"))
+        grips += [_without_trial(name, why, name in things) for why in failed.values()]
     return grips
+
+
+def untried(scene: Path, why: str, first: int, step: int) -> list[Grip]:
+    """The trials of `try_share` as failed ones, for a process that was lost."""
+    rig = gripper_in(scene)
+    things = _things(rig)
+    return [_without_trial(name, why, name in things) for name in [*joints_of(rig.model), *things][first::step]]
+
+
+def _things(rig: Rig) -> dict[str, int]:
+    """Bodies of the free objects by name."""
+    return {body_words(rig.model, body): body for body in things_of(rig.model)}
+
+
+def _without_trial(name: str, why: str, thing: bool) -> Grip:
+    return Grip(kind="thing" if thing else "joint", name=name, method=None, passed=False, why=why)
 
 
 def gripper_to_json(certificate: GripperCertificate) -> dict[str, Any]:

@@ -7,7 +7,8 @@ import pytest
 
 from r2c2r_core.export.gripping import begin_gripping
 from r2c2r_core.model.report import Certificate
-from r2c2r_core.pool import Pool
+from r2c2r_core.pool import Failed, Pool, WorkerLost
+from r2c2r_core.robot.certificate import Grip
 
 Bundle = tuple[Path, Certificate]
 
@@ -28,10 +29,25 @@ def test_one_and_two_workers_give_the_same_gripper_results(kitchen_bundle: Bundl
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_gripping_returns_none_for_a_scene_mujoco_cannot_load(tmp_path: Path, workers: int) -> None:
+def test_gripping_says_why_mujoco_cannot_load_the_scene(tmp_path: Path, workers: int) -> None:
     (tmp_path / "scene.xml").write_text("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>")
     with Pool(workers) as pool:
-        assert begin_gripping(tmp_path, pool)() is None
+        told = begin_gripping(tmp_path, pool)()
+    assert list(told) == ["why"]
+    assert "the gripper: ValueError: " in told["why"]
+
+
+def test_a_lost_process_loses_only_its_own_trials(kitchen_bundle: Bundle, monkeypatch: pytest.MonkeyPatch) -> None:
+    lost = Failed(WorkerLost("its process ended (SIGKILL)"), "")
+    kept = Grip(kind="joint", name="first", method="pinch", passed=True)
+    with Pool(2) as pool:
+        monkeypatch.setattr(Pool, "run", lambda *_: iter({"0": [kept], "1": lost}.items()))
+        told = begin_gripping(kitchen_bundle[0].with_suffix(""), pool)()
+    first, *others = told["grips"]
+    assert (first["name"], first["passed"]) == ("first", True)
+    assert others
+    assert all(not grip["passed"] and "its process ended (SIGKILL)" in grip["why"] for grip in others)
+    assert all(grip["blame"] is None for grip in others)
 
 
 def test_gripping_starts_before_its_result_is_requested(kitchen_bundle: Bundle) -> None:

@@ -9,6 +9,7 @@ from r2c2r_core.export.report import report_html, report_of
 from r2c2r_core.export.rules.table import finding
 from r2c2r_core.export.writers.table import FORMATS
 from r2c2r_core.model.report import ALIKE, Blocker, Certificate, JointResult, LoaderResult, ThingResult
+from r2c2r_core.robot.certificate import Grip, GripperCertificate, gripper_to_json
 from tests.core.export.kitchen import kitchen, reconstruction
 
 EVIL = '<script>alert("x")</script>'
@@ -115,6 +116,16 @@ def test_the_report_groups_findings_by_rule_and_warnings_by_object() -> None:
     noted = report_html(manifest, report_of(manifest, certificate(), {}), {})
     assert '<tr class="noted"><td rowspan="2">' in noted
     assert '<td colspan="9"><ul class="quiet"><li>&lt;script&gt;' in noted
+
+
+def test_the_report_shows_why_the_gripper_tried_nothing_and_why_a_trial_has_no_result() -> None:
+    manifest = manifest_of(reconstruction(), plan_bundle(kitchen()), None)
+    text = report_html(manifest, report_of(manifest, certificate(), {}, {"why": f"a process was lost {EVIL}"}), {})
+    assert "<h2>A gripper</h2><p>Not tried: a process was lost &lt;script&gt;" in text
+    lost = gripper_to_json(GripperCertificate(grips=(Grip(kind="joint", name="a", method=None, passed=False, why="lost"),)))
+    text = report_html(manifest, report_of(manifest, certificate(), {}, lost), {})
+    assert "opened and closed 0 of 1 joints" in text
+    assert "<td>lost</td>" in text
 
 
 def test_the_report_shows_the_arm_map_or_why_it_was_not_tried() -> None:
