@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.errors import StageError
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.robot.handles import Part, part_of
 from r2c2r_core.robot.rig import Rig
@@ -65,13 +66,16 @@ class Hold:
 
 
 def travel_of(rig: Rig, joint: str) -> Travel | None:
-    """Travel of a joint of the rig's scene; None where no moved body has a board."""
+    """Travel of a joint of the rig's scene; None where no moved body has a board. Raises StageError if it cannot open from 0."""
     import mujoco
 
     part = part_of(rig.model, joint)
     if part is None:
         return None
     entry = rig.model.joint(joint)
+    lower, upper = map(float, entry.range)
+    if not lower <= 0 < upper:
+        raise StageError(f"{joint}: its range is {lower:.4g} .. {upper:.4g}", hint="0 is closed, and positive opens")
     data = mujoco.MjData(rig.model)
     mujoco.mj_kinematics(rig.model, data)
     return Travel(
@@ -80,7 +84,7 @@ def travel_of(rig: Rig, joint: str) -> Travel | None:
         axis=data.xaxis[entry.id].copy(),
         anchor=data.xanchor[entry.id].copy(),
         world_from_closed=Rigid3(data.xmat[part.body].reshape(3, 3).copy(), data.xpos[part.body].copy()),
-        upper=float(entry.range[1]),
+        upper=upper,
         address=int(entry.qposadr[0]),
     )
 

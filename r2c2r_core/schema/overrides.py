@@ -39,10 +39,10 @@ def _is_rigid(rows: list[list[float]]) -> list[list[float]]:
     return rows
 
 
-def _is_ordered(limits: tuple[float | None, float | None]) -> tuple[float | None, float | None]:
+def _opens_from_closed(limits: tuple[float | None, float | None]) -> tuple[float | None, float | None]:
     lower, upper = limits
-    if lower is not None and upper is not None and lower > upper:
-        raise ValueError(f"{lower:g} lies above {upper:g}")
+    if lower or (upper is not None and upper <= 0):
+        raise ValueError(f"[{lower}, {upper}] does not open from 0, the closed state, in the positive direction")
     return limits
 
 
@@ -55,7 +55,7 @@ Dimensions: TypeAlias = Annotated[tuple[Size, Size, Size], Strict(False)]
 Pose: TypeAlias = Annotated[list[_Row], Field(min_length=4, max_length=4), AfterValidator(_is_rigid)]
 Direction: TypeAlias = Annotated[_Three, AfterValidator(_is_direction)]
 Wall: TypeAlias = Annotated[_Three, AfterValidator(_is_wall)]
-Limits: TypeAlias = Annotated[tuple[Opening | None, Opening | None], Strict(False), AfterValidator(_is_ordered)]
+Limits: TypeAlias = Annotated[tuple[Opening | None, Opening | None], Strict(False), AfterValidator(_opens_from_closed)]
 CategoryName: TypeAlias = Annotated[str, Field(min_length=1, max_length=200)]
 _Share: TypeAlias = Annotated[float, Field(ge=0.0, le=1.0)]
 Colour: TypeAlias = Annotated[tuple[_Share, _Share, _Share], Strict(False)]
@@ -64,7 +64,7 @@ JointName: TypeAlias = Annotated[str, Field(min_length=1, max_length=200)]
 
 SIZE_SAID = f"[width, depth, height]: three numbers of metres, positive, at most {LARGEST_M:g}"
 POSE_SAID = f"a 4x4 world_from_object: a rotation, and a translation within {FARTHEST_M:g} m"
-LIMITS_SAID = f"[lower, upper] in rad or m within ±{FULL_TURN:g}, null for what stays computed"
+LIMITS_SAID = f"[0, upper]: closed, and rad or m above 0 up to {FULL_TURN:g}; null for what stays computed"
 JOINTS_SAID = f"a table of joints, each by its name or its part's, with {LIMITS_SAID}"
 STATES_SAID = "a table of joints as under joints, each with the frames in which a person marked how far it stands open"
 HINGE_SAID = "left, right, top or bottom, as seen by a person facing the front; of a sliding door: where it slides to"
@@ -78,7 +78,7 @@ class MarkedState(Document):
     """How far a joint stands open in one frame."""
 
     frame: int = Field(ge=0, lt=MOST_FRAMES, description="the frame's number")
-    state: Opening = Field(description=f"rad or m within ±{FULL_TURN:g}; 0 is closed")
+    state: float = Field(ge=0, le=FULL_TURN, description=f"rad or m up to {FULL_TURN:g}; 0 is closed")
 
 
 Marks: TypeAlias = Annotated[list[MarkedState], Field(max_length=MOST_MARKS)]

@@ -167,7 +167,7 @@ def test_corrections_are_validated_stored_and_cleared(reviewed: Reviewed) -> Non
     web.patch(address, {"dimensions_m": None, "rerun": False})
     assert (web.get(address)["hinge"], web.get(address)["dimensions_m"]) == ("left", None)
     for wrong in (
-        {"joint_lower": 1.0, "joint_upper": 0.5},
+        {"joint_lower": 1.0, "joint_upper": 1.5},
         {"candidate": "c9"},
         {"candidate": "/etc/passwd"},
         {"candidate": "pyproject.toml"},
@@ -183,8 +183,8 @@ def test_corrections_are_validated_stored_and_cleared(reviewed: Reviewed) -> Non
         {"regenerate": 10**9},
     ):
         assert web.patch(address, wrong, 422)["kind"] == "invalid", wrong
-    web.patch(address, {"joint_lower": 0.2, "joints": {"left_door": [None, 1.2]}, "rerun": False})
-    assert (web.get(address)["joint_lower"], web.get(address)["joints"]) == (0.2, {"left_door": [None, 1.2]})
+    web.patch(address, {"joint_lower": 0.0, "joints": {"left_door": [None, 1.2]}, "rerun": False})
+    assert (web.get(address)["joint_lower"], web.get(address)["joints"]) == (0.0, {"left_door": [None, 1.2]})
     outside = f"{web.settings.data_dir}/projects/{project}/uploads/../frames.json"
     assert web.patch(address, {"candidate": outside}, 403)["kind"] == "forbidden"
     assert web.patch(address, {"hinge": "diagonal"}, 422)["kind"] == "invalid"

@@ -46,14 +46,20 @@ def test_a_mesh_file_is_resolved_relative_to_the_overrides_file(tmp_path: Path) 
         ({"objects": {"door": {"paint": 1}}}, "unknown key 'paint'"),
         ({"objects": {"door": {"dimensions_m": [1, 2]}}}, "three numbers"),
         ({"objects": {"door": {"dimensions_m": [1, 2, -1]}}}, "positive"),
-        ({"objects": {"door": {"joint_limits": [2, 1]}}}, r"lower, upper"),
+        (
+            {"objects": {"door": {"joint_limits": [0.3, 1.2]}}},
+            r"door.joint_limits: \[0.3, 1.2\] does not open from 0, the closed",
+        ),
+        ({"objects": {"door": {"joint_limits": [-1.57, 0]}}}, "does not open from 0"),
+        ({"objects": {"door": {"joint_limits": [None, 0]}}}, "does not open from 0"),
+        ({"objects": {"door": {"states": {"door": [{"frame": 1, "state": -0.1}]}}}}, "state is -0.1"),
         ({"objects": {"door": {"pose": [[1]]}}}, "4x4"),
         ({"objects": {"door": {"pose": [[0] * 4] * 4}}}, "rigidly"),
         ({"objects": {"door": {"pose": [[float("nan")] * 4] * 4}}}, "NaN"),
         ({"objects": {"door": {"pose": [[1, 0, 0, 1e12], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}}}, "within 1000 m"),
         ({"objects": {"door": {"dimensions_m": [1e9, 1e9, 1e9]}}}, r"door.dimensions_m\[0\] is 1000000000.0; .* at most 10"),
-        ({"objects": {"door": {"joint_limits": [0, 1e9]}}}, "lower, upper"),
-        ({"objects": {"door": {"joints": {"left_door": [2, 1]}}}}, "joints.left_door: 2 lies above 1"),
+        ({"objects": {"door": {"joint_limits": [0, 1e9]}}}, "0, upper"),
+        ({"objects": {"door": {"joints": {"left_door": [2, 1]}}}}, r"joints.left_door: \[2.0, 1.0\] does not open from 0"),
         ({"objects": {"door": {"candidate": 5}}}, "door.candidate is 5; expected a candidate's id"),
         ({"objects": {"door": {"candidate": ["c1"]}}}, "door.candidate is"),
         ({"objects": {"door": {"rejected": 5}}}, "door.rejected is 5"),
@@ -69,7 +75,7 @@ def test_a_mesh_file_is_resolved_relative_to_the_overrides_file(tmp_path: Path) 
         ({"objects": {"door": {"pose": [[1], [1, 2], 3, 4]}}}, "4x4"),
         ({"objects": {"door": {"front": [0, -1, 0]}}}, "unknown key 'front'"),
         ({"scene": {"up": ["a", 0, 0]}}, "three numbers"),
-        ({"objects": {"door": {"joint_limits": [0, "far"]}}}, "lower, upper"),
+        ({"objects": {"door": {"joint_limits": [0, "far"]}}}, "0, upper"),
         ({"scene": {"floor": "low"}}, "scene.floor is 'low'"),
         ({"scene": {"manhattan_yaw": [1]}}, "scene.manhattan_yaw"),
         ({"scene": {"gravity": 1}}, "unknown key 'gravity'"),
@@ -84,9 +90,9 @@ def test_invalid_overrides_raise_a_one_line_error(tmp_path: Path, document: obje
 
 
 def test_joint_limits_can_be_per_joint_and_open_ended(tmp_path: Path) -> None:
-    entry = {"joint_limits": [0.2, None], "joints": {"left_door": [None, 1.2]}}
+    entry = {"joint_limits": [0, None], "joints": {"left_door": [None, 1.2]}}
     door = read_overrides(write(tmp_path, {"objects": {"door": entry}})).of("door")
-    assert (door.joint_lower, door.joint_upper) == (0.2, None)
+    assert (door.joint_lower, door.joint_upper) == (0.0, None)
     assert door.joints == {"left_door": (None, 1.2)}
 
 

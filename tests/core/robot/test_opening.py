@@ -58,6 +58,15 @@ def test_the_gripper_force_is_limited_to_its_maximum(tmp_path: Path) -> None:
     assert grip.force_n <= np.sqrt(3) * 80.0 + 1e-6
 
 
+@pytest.mark.parametrize("ends", ["0.3 1.2", "-1.57 0"])
+def test_a_joint_that_cannot_open_from_closed_is_no_failure_of_the_gripper(tmp_path: Path, ends: str) -> None:
+    path = scene(tmp_path, kind="hinge", bar=Bar())
+    path.write_text(path.read_text().replace('range="0 1.92"', f'range="{ends}"'))
+    (grip,) = certify_with_gripper(path).grips
+    assert (grip.passed, grip.blame) == (False, None)
+    assert f"front_joint: its range is {ends.replace(' ', ' .. ')}; 0 is closed" in grip.why
+
+
 def test_a_stiff_joint_is_reported_as_the_reason(tmp_path: Path) -> None:
     (grip,) = certify_with_gripper(scene(tmp_path, kind="hinge", bar=Bar(), frictionloss=60.0)).grips
     assert not grip.passed
