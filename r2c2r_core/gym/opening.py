@@ -35,27 +35,34 @@ class OpenEnv(RobotEnv):
         grip_n: float = 40.0,
         render_mode: str | None = None,
     ) -> None:
-        super().__init__(bundle, STATE, observation=observation, grip_n=grip_n, render_mode=render_mode)
         self.joint = joint
+        super().__init__(bundle, STATE, observation=observation, grip_n=grip_n, render_mode=render_mode)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset to a scene with this joint and those in its way closed; all others as in the scene."""
-        rig = self.begin(seed, options)
+        self.begin(seed, options)
+        opens = self.way.opens
+        self.rig.data.qpos[self.travel.address] = opens.starts
+        self.put_before(opens.world_from_tool(self.travel, opens.starts), 2 * BACK_M)
+        self._before = self._progress()
+        return self.observed(self._state()), self._info()
+
+    def prepare(self) -> str | None:
+        """Close the joint and plan how to open it."""
+        rig = self.rig
         if self.joint not in joints_of(rig.model):
             raise BundleError(f"joint {self.joint}: no such joint", hint=f"choose one of: {', '.join(joints_of(rig.model))}")
         travel = travel_of(rig, self.joint)
-        rig.data.qpos[rig.model.joint(self.joint).qposadr[0]] = 0.0
-        if travel is not None:
-            close_in_the_way(rig, travel)
-        way = None if travel is None else best_way(rig, travel)
-        if travel is None or way is None:
-            raise BundleError(f"joint {self.joint}: it cannot be grasped or pushed", hint="r2c2r check --gripper says why")
+        if travel is None:
+            return f"joint {self.joint} moves no flat board"
+        rig.data.qpos[travel.address] = 0.0
+        close_in_the_way(rig, travel)
+        way = best_way(rig, travel)
+        if way is None:
+            return f"joint {self.joint} cannot be grasped or pushed"
         self.travel: Travel = travel
         self.way: Way = replace(way, presses=None)
-        rig.data.qpos[travel.address] = way.opens.starts
-        self.put_before(way.opens.world_from_tool(travel, way.opens.starts), 2 * BACK_M)
-        self._before = self._progress()
-        return self.observed(self._state()), self._info()
+        return None
 
     def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """0.05 s."""

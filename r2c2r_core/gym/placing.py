@@ -33,14 +33,23 @@ class PickPlaceEnv(RobotEnv):
         grip_n: float = 40.0,
         render_mode: str | None = None,
     ) -> None:
-        super().__init__(bundle, STATE, observation=observation, grip_n=grip_n, render_mode=render_mode)
         self.thing = thing
+        super().__init__(bundle, STATE, observation=observation, grip_n=grip_n, render_mode=render_mode)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset to a scene with a goal 10 cm beside the object."""
+        self.begin(seed, options)
+        self._start = self.rig.data.xpos[self.pick.body].copy()
+        self._lifted_m = 0.0
+        self.put_before(self.pick.grasp, 1.5 * BACK_M)
+        self._before = self._distances()
+        return self.observed(self._state()), self._info()
+
+    def prepare(self) -> str | None:
+        """Plan how to pick the object up and where to put it."""
         import mujoco
 
-        rig = self.begin(seed, options)
+        rig = self.rig
         mujoco.mj_forward(rig.model, rig.data)
         things = {body_words(rig.model, body): body for body in things_of(rig.model)}
         body = next((b for name, b in things.items() if name == self.thing or name.startswith(f"{self.thing}_")), None)
@@ -48,13 +57,9 @@ class PickPlaceEnv(RobotEnv):
             raise BundleError(f"thing {self.thing}: no such object", hint=f"free objects: {', '.join(things) or 'none'}")
         pick = plan_pick(rig, body)
         if isinstance(pick, str):
-            raise BundleError(f"thing {self.thing}: {pick}", hint="take another thing or variant")
+            return f"thing {self.thing}: {pick}"
         self.pick: Pick = pick
-        self._start = rig.data.xpos[body].copy()
-        self._lifted_m = 0.0
-        self.put_before(pick.grasp, 1.5 * BACK_M)
-        self._before = self._distances()
-        return self.observed(self._state()), self._info()
+        return None
 
     def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """0.05 s."""

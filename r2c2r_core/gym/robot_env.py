@@ -1,5 +1,6 @@
 """Base class of the environments: the gripper in a bundle's scene or one of its variants, actions and observations."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,7 +32,8 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
     """Environment that starts with the gripper in front of its goal; see docs/how-to/robots.md for spaces, reward, success.
 
     `bundle` is a bundle's folder, or an output folder of `r2c2r vary`: then each episode uses a random variant, or the one
-    named in `reset(options={"variant": "00003"})`.
+    named in `reset(options={"variant": "00003"})`. Variants without a solution are passed over; raises BundleError if none has
+    one, or if the named one has none.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012  # gymnasium's own way
@@ -43,30 +45,50 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         self.render_mode = render_mode
         self._pictures = observation == "rgbd"
         self._grip_n = grip_n
-        self._rigs: dict[Path, Gripper] = {}
+        self._loaded: Path | None = None
+        self._unfit: dict[Path, str] = {}  # reason by scene
         self._surfaces: Surfaces | None = None
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
         state = spaces.Box(-_MOST, _MOST, (state_size,), np.float32)
         self.observation_space = spaces.Dict({"state": state, **_picture_spaces()}) if self._pictures else state
+        self._enter(self.scenes)  # a task that cannot be done is an error now, not hours into a training run
 
-    def begin(self, seed: int | None, options: dict[str, Any] | None) -> Gripper:
-        """The scene of the next episode in its initial state."""
+    def begin(self, seed: int | None, options: dict[str, Any] | None) -> None:
+        """Enter the scene of the next episode."""
         super().reset(seed=seed)
         wanted = (options or {}).get("variant")
         number = int(self.np_random.integers(len(self.scenes)))
-        if wanted is not None and wanted not in (scene.stem for scene in self.scenes):
+        scenes = [*self.scenes[number:], *self.scenes[:number]]
+        if wanted is not None:
+            scenes = [scene for scene in scenes if scene.stem == wanted]
+        if not scenes:
             raise BundleError(f"variant {wanted}: no such variant", hint=f"there are {len(self.scenes)} scenes")
-        scene = next(s for s in self.scenes if s.stem == wanted) if wanted is not None else self.scenes[number]
-        if scene not in self._rigs:
-            self._rigs = {scene: gripper_in(scene, None if self._drawn else without_visuals)}  # one at a time: they are large
-            self._surfaces = None
-        self.rig = self._rigs[scene]
+        self._enter(scenes)
+
+    def prepare(self) -> str | None:
+        """Plan the task in the rig's scene; the reason if it cannot be done there. Raises BundleError if it is in no scene."""
+        raise NotImplementedError
+
+    def _enter(self, scenes: Sequence[Path]) -> None:
+        """Load the first scene in which the task can be done, in its initial state."""
+        for scene in scenes:
+            if scene not in self._unfit:
+                self._load(scene)
+                if (why := self.prepare()) is None:
+                    return
+                self._unfit[scene] = why
+        where = f"{scenes[0].stem}: " if len(scenes) == 1 else f"none of {len(scenes)} variants can be used; {scenes[0].stem}: "
+        raise BundleError(f"{where}{self._unfit[scenes[0]]}", hint="see r2c2r check --gripper")
+
+    def _load(self, scene: Path) -> None:
+        if scene != self._loaded:
+            self.rig: Gripper = gripper_in(scene, None if self._drawn else without_visuals)  # one at a time: they are large
+            self._loaded, self._surfaces = scene, None
         self.rig.grip_with(self._grip_n)
         reset(self.rig)
         start = [k for k in range(self.rig.model.nkey) if self.rig.model.key(k).name == START]
         if start:
             self.rig.data.qpos[:] = self.rig.model.key_qpos[start[0]]
-        return self.rig
 
     def put_before(self, goal: Rigid3, back_m: float) -> None:
         """Place the open gripper `back_m` in front of a pose, with a random offset and rotation."""

@@ -66,7 +66,7 @@ class Hold:
 
 
 def travel_of(rig: Rig, joint: str) -> Travel | None:
-    """Travel of a joint of the rig's scene; None where no moved body has a board. Raises StageError if it cannot open from 0."""
+    """Travel of a joint of the scene; None where no moved body has a board. Raises StageError if it cannot open from 0."""
     import mujoco
 
     part = part_of(rig.model, joint)

@@ -103,9 +103,36 @@ def test_an_episode_uses_the_requested_variant(tmp_path: Path) -> None:
         env.reset(seed=0, options={"variant": "7"})
 
 
-def test_a_missing_joint_or_bundle_file_raises_a_clear_error(door: Path, tmp_path: Path) -> None:
+def test_an_episode_passes_over_variants_without_a_solution(tmp_path: Path) -> None:
+    (tmp_path / "variants").mkdir()
+    for name, radius in (("00000", 0.05), ("00001", 0.03), ("00002", 0.05)):  # the stroke is 80 mm
+        shutil.copy(table(tmp_path, radius=radius), tmp_path / "variants" / f"{name}.xml")
+    env = _pick(tmp_path)
+    for seed in range(4):
+        env.reset(seed=seed)
+        model = env.unwrapped.rig.model
+        assert model.geom_size[model.body("block").geomadr[0], 0] == 0.03
+    with pytest.raises(BundleError, match="00002: thing block: wider than 76 mm all round"):
+        env.reset(options={"variant": "00002"})
+    env.reset(options={"variant": "00001"})
+
+
+def test_a_task_that_no_variant_allows_is_an_error_of_make(tmp_path: Path) -> None:
+    (tmp_path / "variants").mkdir()
+    for name in ("00000", "00001"):
+        shutil.copy(table(tmp_path, radius=0.05), tmp_path / "variants" / f"{name}.xml")
+    with pytest.raises(BundleError, match="none of 2 variants can be used; 00000: thing block: wider than"):
+        _pick(tmp_path)
+
+
+def test_a_missing_thing_is_an_error_of_make(block: Path) -> None:
+    with pytest.raises(BundleError, match="thing mug: no such object; free objects: block"):
+        gymnasium.make("r2c2r/PickPlace-v0", bundle=block, thing="mug")
+
+
+def test_a_missing_joint_or_bundle_file_is_an_error_of_make(door: Path, tmp_path: Path) -> None:
     with pytest.raises(BundleError, match="joint lid: no such joint; choose one of: front_joint"):
-        gymnasium.make("r2c2r/Open-v0", bundle=door, joint="lid").reset()
+        gymnasium.make("r2c2r/Open-v0", bundle=door, joint="lid")
     (tmp_path / "empty").mkdir()
     with pytest.raises(BundleError, match=r"neither scene\.xml nor variants/"):
         gymnasium.make("r2c2r/Open-v0", bundle=tmp_path / "empty", joint="lid")
