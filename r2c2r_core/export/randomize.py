@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from r2c2r_core.kitchen.names import category_of
-from r2c2r_core.model.materials import ARMATURE, SURFACE_FRICTION
+from r2c2r_core.model.materials import ARMATURE
 from r2c2r_core.model.motion import JointMotion, Source
 from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.scene import Joint, SceneObject
 
 _BOARD_KG_M3 = (640.0, 800.0)  # materials.py, _BOARD: ANSI A208.1 grade M
-_FRICTION = (0.2, 0.5)  # materials.py, SURFACE_FRICTION: wood on wood and laminate in friction tables
+_FRICTION = (0.2, 0.62)  # materials.py, SURFACE_FRICTION; up to oak on oak, static, along the grain (Marks' Handbook)
 _RESISTANCE = (0.5, 2.0)  # times a joint's damping, friction and armature
 _WIDER: dict[Source, float] = {"measured": 0.01, "person": 0.0, "inferred": 0.05, "at_least": 0.05, "default": 0.1}
 """Half the width of what a size or a limit may be, as a share of it, by how it was found."""
@@ -38,10 +38,10 @@ def of_object(item: SceneObject, mass_kg: float, placement: Placement | None) ->
         "mass_kg": _mass(item, mass_kg),
         "friction": Range(
             distribution="uniform",
-            low=min(_FRICTION[0], SURFACE_FRICTION),
-            high=max(_FRICTION[1], SURFACE_FRICTION),
+            low=_FRICTION[0],
+            high=_FRICTION[1],
             source="sourced",
-            why="dry wood on wood 0.25-0.5, laminate 0.2-0.4 in friction tables",
+            why="dry wood on wood 0.25-0.5, laminate 0.2-0.4, oak on oak up to 0.62 in friction tables",
         ),
         "dimensions_m": [
             _size(float(size), source, placement)

@@ -10,7 +10,7 @@ from r2c2r_core.export.rules.table import finding
 from r2c2r_core.model.report import Blocker, Finding, JointResult
 from r2c2r_core.robot.rig import corners_of
 
-POSITIONS = 21
+_POSITIONS = 21
 DRIVE_FORCE_N = 30.0  # about what one hand gives a drawer, or a door at its free edge
 DRIVE_SECONDS = 6.0
 NEEDED_TRAVEL = 0.98
@@ -70,7 +70,7 @@ def things_in_the_way(solid: Any, name: str) -> list[Blocker]:
     movers, scratch = movers_of(solid, name), mujoco.MjData(solid)
     free = free_bodies(solid) - carried_by(solid, movers)
     first: dict[str, float] = {}
-    for position in _positions(solid, name) if free else ():
+    for position in sweep_of(solid, name) if free else ():
         for touch in touches(solid, {name: position}, scratch):
             if touch.depth_m > ALLOWED_PENETRATION_M and touch.between(movers, free):
                 thing = body_name(solid, next(body for body in touch.bodies if body in free))
@@ -84,7 +84,7 @@ def _swept(strict: Any, name: str) -> tuple[float, list[Finding]]:
 
     movers, scratch = movers_of(strict, name), mujoco.MjData(strict)
     deepest, at, worst = 0.0, 0.0, ""
-    for position in _positions(strict, name):
+    for position in sweep_of(strict, name):
         for touch in touches(strict, {name: position}, scratch):
             if movers & set(touch.bodies) and touch.depth_m > deepest:
                 deepest, at, worst = touch.depth_m, position, touch.names
@@ -93,6 +93,7 @@ def _swept(strict: Any, name: str) -> tuple[float, list[Finding]]:
     return deepest, [finding("penetration-sweep", name, f"{worst} overlap by {1000 * deepest:.1f} mm at {at:.3g}")]
 
 
-def _positions(model: Any, name: str) -> list[float]:
+def sweep_of(model: Any, name: str) -> list[float]:
+    """Positions at which a joint is tested, from closed to open."""
     lower, upper = (float(value) for value in model.joint(name).range)
-    return [float(position) for position in np.linspace(lower, upper, POSITIONS)]
+    return [float(position) for position in np.linspace(lower, upper, _POSITIONS)]

@@ -98,7 +98,7 @@ def _albedo(surfaces: Surfaces, number: np.ndarray, uv: np.ndarray) -> np.ndarra
     colour = np.concatenate([surfaces.colours, np.full((1, 3), _SKY, np.float32)])[number]
     for geom, texture in enumerate(surfaces.textures):
         if texture is not None and (own := number == geom).any():
-            colour[own] = texture_colours(texture, uv[own])
+            colour[own] = texture_colours(texture, uv[own]) * (surfaces.colours[geom] / 255)  # tinted by its material
     return np.asarray(colour)
 
 

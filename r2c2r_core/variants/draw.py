@@ -1,7 +1,8 @@
-"""Random sampling of variants from the bundle's uncertainties and from fixed ranges."""
+"""Random sampling of variants from the ranges in the bundle's manifest; what it does not state is an own choice here."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -9,17 +10,8 @@ import numpy as np
 from r2c2r_core.variants.textures import TEXTURES
 
 NOT_VARIED = ("arm", "gripper", "pictures")  # result folders of a bundle that its variants do not have
-GUESSED = 0.02
-"""Standard deviation, share of a side, where it was inferred or a category's default: own choice, 12 mm of 0.6 m."""
-LEAST_MEASURED = 0.001  # where the bundle gives no spread
-MOST_SIGMAS = 2.0
-MASS = (0.8, 1.25)  # factor; own choice: boards of one size weigh 600 to 800 kg/m3
-DAMPING = (0.5, 2.0)  # factor; own choice: within it every joint still comes to rest
-FRICTION = (0.5, 2.0)  # factor on the joint's dry friction, own choice
-SURFACE = (0.3, 0.7)  # sliding friction of surfaces: wood and laminate in friction tables
 AJAR, AJAR_MOST = 0.2, 0.3  # fraction of joints initially ajar, and maximum opening as a fraction of their travel
 SHIFT_M = 0.25  # maximum shift of a free object on its support
-TINT = 0.12  # relative change of each colour channel
 RETEXTURED = 0.5  # fraction of variants whose fronts get a procedural surface
 
 KIND_OF = {
@@ -38,8 +30,9 @@ class Change:
 
     name: str
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of width, depth, height; the front and the underside are fixed
-    mass: float = 1.0
-    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    mass: float = 1.0  # factor
+    friction: float | None = None  # of its surfaces; None: the scene's
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)  # factor of each channel
     texture: str | None = None  # of TEXTURES; None: the scan's own
     shift_m: tuple[float, float] = (0.0, 0.0)  # of a free object, horizontal
     turn_rad: float = 0.0
@@ -51,29 +44,41 @@ class Variation:
     """Variation of a scene."""
 
     changes: tuple[Change, ...]
-    damping: Mapping[str, float]  # factor, by joint
-    friction: Mapping[str, float]
+    joints: Mapping[str, Mapping[str, float]]  # damping, friction, armature and upper limit, by joint
     ajar: Mapping[str, float]  # initial opening of a joint as a fraction of its travel
-    surface: float
 
 
 def draw(rng: np.random.Generator, objects: Sequence[Mapping[str, Any]]) -> Variation:
     """A random variation of the objects of a manifest."""
-    fronts = _finish(rng, "wood") if rng.random() < RETEXTURED else (None, _tint(rng))
-    stone = _finish(rng, "stone") if rng.random() < RETEXTURED else (None, _tint(rng))
-    changes = [_change(rng, entry, fronts, stone) for entry in objects]
-    shapes = _shapes(rng, objects)
-    joints = [joint["name"] for entry in objects for joint in entry["joints"]]
+    finishes = {kind: _finish(rng, kind) for kind in ("wood", "stone")}
+    shapes, entries = _shapes(rng, objects), {entry["name"]: entry for entry in objects}
+    changes = [_change(rng, entry, entries[shapes.get(entry["name"], entry["name"])], finishes) for entry in objects]
+    joints = {
+        joint["name"]: {name: _value(stated, rng.random()) for name, stated in joint["randomize"].items()}
+        for entry in objects
+        for joint in entry["joints"]
+    }
     return Variation(
-        changes=tuple(replace(change, shape=shapes.get(change.name)) for change in changes),
-        damping={name: _times(rng, DAMPING) for name in joints},
-        friction={name: _times(rng, FRICTION) for name in joints},
+        changes=tuple(changes),
+        joints=joints,
         ajar={name: float(rng.uniform(0.0, AJAR_MOST)) for name in joints if rng.random() < AJAR},
-        surface=float(rng.uniform(*SURFACE)),
     )
 
 
-Finish = tuple[str | None, tuple[float, float, float]]
+Finish = tuple[str | None, np.ndarray]
+"""Texture, and quantiles of the three channels' ranges."""
+
+
+def _value(stated: Mapping[str, Any], quantile: float) -> float:
+    """The quantile of a manifest's distribution; a normal one lies about the middle of its ends, where it is cut off."""
+    low, high = stated["low"], stated["high"]
+    if stated["distribution"] == "normal" and high > low:
+        normal = NormalDist((low + high) / 2, stated["sigma"])
+        first, last = normal.cdf(low), normal.cdf(high)
+        return normal.inv_cdf(first + quantile * (last - first))
+    if stated["distribution"] == "loguniform":
+        return float(low * (high / low) ** quantile)
+    return float(low + quantile * (high - low))
 
 
 def _shapes(rng: np.random.Generator, objects: Sequence[Mapping[str, Any]]) -> dict[str, str]:
@@ -91,45 +96,38 @@ def _loose(entry: Mapping[str, Any]) -> bool:
     return bool(entry["movable"] and entry.get("carried_by") is None)
 
 
-def _change(rng: np.random.Generator, entry: Mapping[str, Any], fronts: Finish, stone: Finish) -> Change:
+def _change(
+    rng: np.random.Generator, entry: Mapping[str, Any], like: Mapping[str, Any], finishes: Mapping[str, Finish]
+) -> Change:
+    """Change of an object that has the shape and the mass of another of its category, or its own."""
     kind = KIND_OF.get(entry["category"], "thing" if entry["movable"] else "wood")
-    texture, tint = {"wood": fronts, "stone": stone}.get(kind, (None, _tint(rng)))
+    texture, channels = finishes.get(kind, (None, rng.random(3)))
+    red, green, blue = (1.0 + _value(entry["randomize"]["colour"], quantile) for quantile in channels)
     loose = _loose(entry)
     level = rng.uniform(-SHIFT_M, SHIFT_M, 2) if loose else np.zeros(2)
     return Change(
         name=entry["name"],
-        scale=_scale(rng, entry),
-        mass=_times(rng, MASS),
-        tint=tint,
+        scale=_scale(rng, like),
+        mass=_value(like["randomize"]["mass_kg"], rng.random()) / like["mass_kg"],
+        friction=_value(entry["randomize"]["friction"], rng.random()),
+        tint=(red, green, blue),  # a channel is at most 1, so this moves it by no more than the stated offset
         texture=texture,
         shift_m=(float(level[0]), float(level[1])),
         turn_rad=float(rng.uniform(-np.pi, np.pi)) if loose else 0.0,
+        shape=None if like is entry else like["name"],
     )
 
 
 def _scale(rng: np.random.Generator, entry: Mapping[str, Any]) -> tuple[float, float, float]:
-    """Normally distributed scale of each side about 1, within two standard deviations; a free object keeps its shape."""
-    spread = (entry["placement"] or {}).get("spread") or {}
-    measured = max(spread.get("scale") or 0.0, LEAST_MEASURED)
-    sources = entry["dimension_source"]
-    sigmas = [measured if source in ("measured", "person") else GUESSED for source in sources]
-    steps = np.clip(rng.normal(size=3), -MOST_SIGMAS, MOST_SIGMAS)
+    """Scale of each side; a free object keeps its shape, so its least uncertain side decides."""
+    stated = list(zip(entry["randomize"]["dimensions_m"], entry["dimensions_m"], rng.random(3), strict=True))
     if entry["movable"]:
-        steps, sigmas = np.full(3, steps[0]), [measured] * 3
-    width, depth, height = (float(1.0 + sigma * step) for sigma, step in zip(sigmas, steps, strict=True))
+        stated = [min(stated, key=lambda side: (side[0]["high"] - side[0]["low"]) / side[1])] * 3
+    width, depth, height = (_value(side, quantile) / size_m for side, size_m, quantile in stated)
     return width, depth, height
 
 
 def _finish(rng: np.random.Generator, kind: str) -> Finish:
+    """One finish for all objects of a kind: the scan's, or a procedural texture."""
     names = [name for name, texture in TEXTURES.items() if texture.kind == kind]
-    return str(rng.choice(names)), _tint(rng)
-
-
-def _tint(rng: np.random.Generator) -> tuple[float, float, float]:
-    red, green, blue = (float(value) for value in 1.0 - rng.uniform(0.0, 2 * TINT, 3))
-    return red, green, blue
-
-
-def _times(rng: np.random.Generator, ends: tuple[float, float]) -> float:
-    """A log-uniform factor between the ends."""
-    return float(np.exp(rng.uniform(*np.log(ends))))
+    return str(rng.choice(names)) if rng.random() < RETEXTURED else None, rng.random(3)

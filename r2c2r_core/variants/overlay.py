@@ -10,6 +10,7 @@ from r2c2r_core.variants.draw import Change, Variation
 
 BASE, SURFACES = "../base", "../textures"  # relative to a variant's file
 START = "start"  # the initial keyframe, with some joints ajar
+_DRAWN = {"damping": "damping", "frictionloss": "friction", "armature": "armature"}
 
 
 def varied(scene: ET.Element, variation: Variation, halves: Mapping[str, np.ndarray], links: Mapping[str, str]) -> ET.Element:
@@ -33,12 +34,10 @@ def varied(scene: ET.Element, variation: Variation, halves: Mapping[str, np.ndar
                 _take_shape(body, bodies[change.shape], float(half[2] - halves[change.name][2]))
             _vary_body(root, body, change, half, top=body in list(_world(root)))
     for joint in root.iter("joint"):
-        name = joint.get("name", "")
-        _multiply(joint, "damping", variation.damping.get(name, 1.0))
-        _multiply(joint, "frictionloss", variation.friction.get(name, 1.0))
-    for geom in root.iter("geom"):
-        if geom.get("friction") is not None:
-            _set_friction(geom, variation.surface)
+        if (drawn := variation.joints.get(joint.get("name", ""))) is not None:
+            joint.set("range", _text([0.0, drawn["upper"]]))
+            for key, name in _DRAWN.items():
+                joint.set(key, _text(drawn[name]))
     _add_surfaces(root, changes.values())
     return root
 
@@ -65,9 +64,6 @@ def _vary_body(root: ET.Element, body: ET.Element, change: Change, half: np.ndar
     for inertial in body.findall("inertial"):
         _scale_inertial(inertial, scale, change.mass)
     for joint in body.findall("joint"):
-        if joint.get("type") == "slide":
-            stretched = float(np.abs(_numbers(joint, "axis")) @ scale)
-            joint.set("range", _text(_numbers(joint, "range") * stretched))
         if joint.get("pos") is not None:
             joint.set("pos", _text(_numbers(joint, "pos") * scale))
     for geom in body.findall("geom"):
@@ -77,10 +73,12 @@ def _vary_body(root: ET.Element, body: ET.Element, change: Change, half: np.ndar
             geom.set("size", _text(_numbers(geom, "size") * scale))
         if geom.get("type") == "mesh":
             _scale_mesh(root, geom.get("mesh", ""), scale)
+        if geom.get("class") == "collision" and change.friction is not None:
+            geom.set("friction", _text(change.friction))  # sliding; the others are those of the class
         if geom.get("material") is not None:
             _dress(root, geom, change)
         elif geom.get("class") == "visual" and geom.get("rgba") is not None:
-            geom.set("rgba", _text([*(_numbers(geom, "rgba")[:3] * change.tint), 1.0]))
+            geom.set("rgba", _text([*np.minimum(_numbers(geom, "rgba")[:3] * change.tint, 1.0), 1.0]))
     for site in body.findall("site"):
         if site.get("pos") is not None:
             site.set("pos", _text(_numbers(site, "pos") * scale))
@@ -138,25 +136,15 @@ def _scale_mesh(root: ET.Element, name: str, scale: np.ndarray) -> None:
 
 
 def _scale_inertial(inertial: ET.Element, scale: np.ndarray, mass: float) -> None:
-    """Scale the mass by `mass` and the volume factor, and the second moments by the squared scale of each axis."""
+    """Scale the mass by `mass`, and the second moments also by the squared scale of each axis."""
     inertial.set("pos", _text(_numbers(inertial, "pos") * scale))
-    factor = mass * float(np.prod(scale))
-    _multiply(inertial, "mass", factor)
+    inertial.set("mass", _text(_numbers(inertial, "mass") * mass))
     xx, yy, zz, xy, xz, yz = _numbers(inertial, "fullinertia")
     full = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     moments = 0.5 * np.trace(full) * np.eye(3) - full  # second moments of mass about the coordinate planes
-    moments *= factor * np.outer(scale, scale)
+    moments *= mass * np.outer(scale, scale)
     full = np.trace(moments) * np.eye(3) - moments
     inertial.set("fullinertia", _text([full[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]))
-
-
-def _set_friction(geom: ET.Element, sliding: float) -> None:
-    geom.set("friction", _text([sliding, *_numbers(geom, "friction")[1:]]))
-
-
-def _multiply(element: ET.Element, key: str, factor: float) -> None:
-    if element.get(key) is not None:
-        element.set(key, _text(_numbers(element, key) * factor))
 
 
 def _world(root: ET.Element) -> ET.Element:

@@ -24,7 +24,7 @@ from r2c2r_core.variants.overlay import add_start, varied
 from r2c2r_core.variants.textures import write_textures
 from r2c2r_core.variants.wall import WALL, write_wall
 
-VARIANTS_VERSION = 1
+VARIANTS_VERSION = 2
 CERTIFIED = 20  # number of random variants that undergo the complete simulation tests
 _ATTEMPTS = 40  # maximum draws per variant
 
@@ -94,6 +94,8 @@ def base_of(folder: Path) -> Base:
         objects = tuple(json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["objects"])
     except (OSError, ValueError, KeyError, ET.ParseError) as error:
         raise BundleError(f"{folder}: no bundle to vary ({fault_of(error)})", hint="give one that r2c2r run wrote") from error
+    if any(each.get("randomize") is None for entry in objects for each in (entry, *entry["joints"])):
+        raise BundleError(f"{folder}: its manifest states no ranges to vary within", hint="write the bundle again: r2c2r run")
     names = sorted((entry["name"] for entry in objects), key=len, reverse=True)
     links = {}
     for body in scene.iter("body"):

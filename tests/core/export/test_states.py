@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core.export import randomize
+from r2c2r_core.model.materials import SURFACE_FRICTION
 from r2c2r_core.model.placement import Spread
 from r2c2r_core.schema.manifest import Manifest
 from tests.core.export.kitchen import bottle, cabinet, drawer, reconstruction
@@ -54,6 +55,7 @@ def test_manifest_values_lie_within_their_randomization_ranges(good_folder: Path
         ranges = item.randomize
         assert ranges is not None
         assert ranges.mass_kg.low <= item.mass_kg <= ranges.mass_kg.high
+        assert ranges.friction.low < SURFACE_FRICTION < ranges.friction.high
         for size, found in zip(item.dimensions_m, ranges.dimensions_m, strict=True):
             assert found.low <= size <= found.high
         for joint in item.joints:

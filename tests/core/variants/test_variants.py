@@ -1,16 +1,19 @@
 import json
 import shutil
 import xml.etree.ElementTree as ET
+from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
 
-from r2c2r_core.errors import StageError
+from r2c2r_core.errors import BundleError, StageError
 from r2c2r_core.export.simulate import compiled
 from r2c2r_core.robot.handles import part_of
-from r2c2r_core.variants.draw import MASS, SURFACE, Change, Variation, draw
+from r2c2r_core.robot.view import aimed, look, surfaces_of
+from r2c2r_core.variants.draw import Change, Variation, draw
 from r2c2r_core.variants.judge import unfit
 from r2c2r_core.variants.overlay import varied
 from r2c2r_core.variants.stage import Variants, base_of, make_variants
@@ -64,15 +67,14 @@ def test_the_variants_manifest_lists_changes_and_rejections(made: Variants) -> N
     assert sum(entry["draws"] - 1 for entry in document["variants"]) == sum(made.rejected.values())
     first = document["variants"][0]
     assert {change["name"] for change in first["changes"]} == {item.name for item in kitchen().objects}
-    assert SURFACE[0] <= first["surface"] <= SURFACE[1]
+    assert set(first["joints"]["drawer_1_slide"]) == {"damping", "friction", "armature", "upper"}
 
 
 def test_a_scaled_object_keeps_its_front_and_bottom_planes(bundle: Path, tmp_path: Path) -> None:
     base = base_of(bundle)
     change = Change(name="cabinet_1", scale=(1.01, 1.05, 0.98), mass=1.2)
     rest = [Change(name=name) for name in base.halves if name != "cabinet_1"]
-    joints: dict[str, float] = {}
-    variation = Variation(changes=(change, *rest), damping=joints, friction=joints, ajar=joints, surface=0.5)
+    variation = Variation(changes=(change, *rest), joints={}, ajar={})
     folder = tmp_path / "v" / "variants"
     folder.mkdir(parents=True)
     shutil.copytree(bundle, tmp_path / "v" / "base")
@@ -87,7 +89,7 @@ def test_a_scaled_object_keeps_its_front_and_bottom_planes(bundle: Path, tmp_pat
     grip, grip_after = (_grip(model) for model in (before, after))
     np.testing.assert_allclose(grip_after, grip * change.scale, rtol=1e-6)  # the site has other axes: x is vertical
     mass, mass_after = (model.body("cabinet_1_base").mass[0] for model in (before, after))
-    assert mass_after == pytest.approx(1.2 * 1.01 * 1.05 * 0.98 * mass)
+    assert mass_after == pytest.approx(1.2 * mass)
 
 
 def test_a_scaled_box_has_the_inertia_of_its_new_size(tmp_path: Path) -> None:
@@ -97,31 +99,99 @@ def test_a_scaled_box_has_the_inertia_of_its_new_size(tmp_path: Path) -> None:
         f'<mujoco><compiler/><asset/><worldbody><body name="a_b" pos="0 0 0" quat="1 0 0 0"><inertial pos="0 0 0" mass="12" '
         f'fullinertia="{inertia[0]} {inertia[1]} {inertia[2]} 0 0 0"/></body></worldbody></mujoco>'
     )
-    change = Change(name="a", scale=tuple(scale))
-    variation = Variation(changes=(change,), damping={}, friction={}, ajar={}, surface=0.5)
+    change = Change(name="a", scale=tuple(scale), mass=1.5)
+    variation = Variation(changes=(change,), joints={}, ajar={})
     inertial = varied(body, variation, {"a": size / 2}, {"a_b": "a"}).find(".//inertial")
     assert inertial is not None
     stretched = size * scale
-    expected = 12.0 * np.prod(scale) / 12 * ((stretched**2).sum() - stretched**2)
+    expected = 1.5 * ((stretched**2).sum() - stretched**2)
     given = [float(value) for value in inertial.get("fullinertia", "").split()][:3]
     np.testing.assert_allclose(given, expected, rtol=1e-6)
 
 
-def test_measured_dimensions_vary_less_than_inferred_ones() -> None:
-    entry = {
-        "name": "cabinet_1",
-        "category": "cabinet",
-        "movable": False,
-        "placement": {"spread": {"scale": 0.002}},
-        "dimension_source": ["measured", "inferred", "default"],
-        "joints": [{"name": "cabinet_1_door_joint"}],
-    }
-    drawn = [draw(np.random.default_rng(seed), [entry]).changes[0] for seed in range(300)]
-    width, depth, height = np.array([change.scale for change in drawn]).std(axis=0)
-    assert width == pytest.approx(0.002, rel=0.2)
-    assert depth > 5 * width
-    assert height > 5 * width
-    assert all(MASS[0] <= change.mass <= MASS[1] for change in drawn)
+def test_everything_is_drawn_from_the_whole_of_the_range_in_the_manifest(bundle: Path) -> None:
+    objects = {entry["name"]: entry for entry in base_of(bundle).objects}
+    joints = {joint["name"]: joint["randomize"] for entry in objects.values() for joint in entry["joints"]}
+    ranges, drawn = dict[tuple[str, ...], dict[str, Any]](), defaultdict[tuple[str, ...], list[float]](list)
+    for variation in (draw(np.random.default_rng(seed), list(objects.values())) for seed in range(1000)):
+        for change in variation.changes:
+            like = objects[change.shape or change.name]
+            stated = like["randomize"]
+            numbers = {"mass_kg": change.mass * like["mass_kg"], "friction": change.friction}
+            numbers |= {f"colour {channel}": tint - 1 for channel, tint in enumerate(change.tint)}
+            numbers |= {
+                f"size {side}": s * size for side, (s, size) in enumerate(zip(change.scale, like["dimensions_m"], strict=True))
+            }
+            for name, number in numbers.items():
+                what, _, side = name.partition(" ")
+                ranges[change.name, name] = stated["dimensions_m"][int(side)] if what == "size" else stated[what]
+                drawn[change.name, name].append(number)
+        for joint, values in variation.joints.items():
+            for name, value in values.items():
+                ranges[joint, name] = joints[joint][name]
+                drawn[joint, name].append(value)
+    assert {name for _, name in drawn} >= {"mass_kg", "friction", "size 2", "colour 0", "damping", "armature", "upper"}
+    free = {entry["name"] for entry in objects.values() if entry["movable"]}
+    for key, numbers in drawn.items():
+        low, high = ranges[key]["low"], ranges[key]["high"]
+        assert low - 1e-9 <= min(numbers), key
+        assert max(numbers) <= high + 1e-9, key
+        if not (key[0] in free and key[1].startswith("size")):  # its least uncertain side decides
+            assert max(numbers) - min(numbers) >= 0.9 * (high - low), key
+
+
+def test_a_written_variant_has_the_drawn_masses_frictions_and_limits(made: Variants) -> None:
+    said = json.loads((made.folder / "variants.json").read_text())["variants"][0]
+    model = compiled(made.folder / "variants" / f"{said['name']}.xml")
+    for name, drawn in said["joints"].items():
+        joint = model.joint(name)
+        dof = int(joint.dofadr[0])
+        found = [model.dof_damping[dof], model.dof_frictionloss[dof], model.dof_armature[dof], joint.range[1]]
+        assert found == pytest.approx([drawn[key] for key in ("damping", "friction", "armature", "upper")], abs=1e-5)
+    for entry, change in zip(base_of(made.folder / "base").objects, said["changes"], strict=True):
+        bodies = [b for b in range(model.nbody) if model.body(b).name.startswith(f"{change['name']}_")]
+        assert model.body_mass[bodies].sum() == pytest.approx(change["mass"] * entry["mass_kg"], rel=1e-3)
+        geoms = np.isin(model.geom_bodyid, bodies)
+        assert model.geom_friction[geoms, 0] == pytest.approx(change["friction"], abs=1e-5)
+        assert (model.geom_friction[geoms, 1:] == [0.01, 0.001]).all()
+
+
+def test_a_normal_range_is_drawn_with_its_standard_deviation(bundle: Path) -> None:
+    entry = base_of(bundle).objects[0]
+    (width, *_), ranges = entry["dimensions_m"], entry["randomize"]
+    normal = {"distribution": "normal", "low": width - 0.006, "high": width + 0.006, "sigma": 0.002}
+    entry = entry | {"randomize": ranges | {"dimensions_m": [normal, *ranges["dimensions_m"][1:]]}}
+    drawn = [width * draw(np.random.default_rng(seed), [entry]).changes[0].scale[0] for seed in range(300)]
+    assert np.mean(drawn) == pytest.approx(width, abs=0.0005)
+    assert np.std(drawn) == pytest.approx(0.002, rel=0.15)
+
+
+def test_tints_lighten_and_darken_photographed_surfaces(bundle: Path, tmp_path: Path) -> None:
+    base, folder, brightness = base_of(bundle), tmp_path / "v" / "variants", []
+    folder.mkdir(parents=True)
+    shutil.copytree(bundle, tmp_path / "v" / "base")
+    for tint in (0.9, 1.0, 1.1):
+        changes = tuple(Change(name=name, tint=(tint, tint, tint)) for name in base.halves)
+        root = varied(base.scene, Variation(changes=changes, joints={}, ajar={}), base.halves, base.links)
+        (folder / "0.xml").write_text(ET.tostring(root, encoding="unicode"))
+        model = mujoco.MjModel.from_xml_path(str(folder / "0.xml"))
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        surfaces = surfaces_of(model)
+        photographed = [g for g, texture in zip(surfaces.geoms, surfaces.textures, strict=True) if texture is not None]
+        camera = aimed(model.stat.center + np.array([0.0, -3.0, 1.0]), model.stat.center, (160, 120), 0.8)
+        seen = look(surfaces, model, data, *camera)
+        brightness.append(seen.rgb[np.isin(seen.body, model.geom_bodyid[photographed])].mean())
+    assert brightness == pytest.approx(brightness[1] * np.array([0.9, 1.0, 1.1]), rel=0.03)  # but for white pixels
+
+
+def test_a_bundle_without_ranges_is_refused(bundle: Path, tmp_path: Path) -> None:
+    old = shutil.copytree(bundle, tmp_path / "old")
+    manifest = json.loads((old / "manifest.json").read_text())
+    del manifest["objects"][0]["randomize"]
+    (old / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(BundleError, match="states no ranges to vary within"):
+        base_of(old)
 
 
 def test_a_bundle_with_overlapping_parts_raises_a_stage_error(bundle: Path, tmp_path: Path) -> None:
@@ -151,7 +221,7 @@ def _box(model: object) -> tuple[np.ndarray, np.ndarray]:
     return (data.geom_xpos[own] - half).min(axis=0), (data.geom_xpos[own] + half).max(axis=0)
 
 
-@pytest.mark.parametrize(("gap_mm", "reason"), [(0.5, None), (15.0, "an object hangs over an edge")])
+@pytest.mark.parametrize(("gap_mm", "reason"), [(0.3, None), (15.0, "an object hangs over an edge")])
 def test_an_object_must_stand_on_its_support(gap_mm: float, reason: str | None) -> None:
     """A mesh whose bounding box is not centred on its centre of mass, as most are."""
     model = mujoco.MjModel.from_xml_string(f"""
@@ -165,10 +235,23 @@ def test_an_object_must_stand_on_its_support(gap_mm: float, reason: str | None) 
     assert unfit(model, {}) == reason
 
 
-def test_bottles_exchange_their_shapes_and_stay_on_their_support() -> None:
-    free = {"movable": True, "placement": None, "dimension_source": ["measured"] * 3, "joints": []}
+@pytest.mark.parametrize(("above_mm", "reason"), [(0.1, None), (-0.2, "a joint collides with something")])
+def test_a_drawer_that_scrapes_along_a_board_is_rejected(above_mm: float, reason: str | None) -> None:
+    """Friction jams it long before the overlap is visible."""
+    model = mujoco.MjModel.from_xml_string(f"""
+<mujoco>
+  <worldbody>
+    <body pos="0 0 {0.1 + above_mm / 1000}"><geom type="box" size="0.2 0.2 0.02" pos="0 0 0.02"/></body>
+    <body><joint name="slide" type="slide" axis="0 -1 0" range="0 0.3"/><geom type="box" size="0.1 0.2 0.1"/></body>
+  </worldbody>
+</mujoco>""")
+    assert unfit(model, {}) == reason
+
+
+def test_bottles_exchange_their_shapes_and_stay_on_their_support(bundle: Path) -> None:
+    free = next(entry for entry in base_of(bundle).objects if entry["movable"])
     categories = {"bottle_1": "bottle", "bottle_2": "bottle", "mug_1": "mug"}
-    objects = [{"name": name, "category": category, **free} for name, category in categories.items()]
+    objects = [free | {"name": name, "category": category} for name, category in categories.items()]
     drawn = [draw(np.random.default_rng(seed), objects) for seed in range(10)]
     shapes = [{change.name: change.shape for change in variation.changes} for variation in drawn]
     assert {"bottle_1": "bottle_2", "bottle_2": "bottle_1", "mug_1": None} in shapes
@@ -184,8 +267,7 @@ def test_bottles_exchange_their_shapes_and_stay_on_their_support() -> None:
     scene = ET.fromstring(f"<mujoco><compiler/><asset/><worldbody>{bodies}</worldbody></mujoco>")
     swapped = {"bottle_1": "bottle_2", "bottle_2": "bottle_1"}
     changes = tuple(Change(name=name, shape=shape) for name, shape in swapped.items())
-    joints: dict[str, float] = {}
-    variation = Variation(changes=changes, damping=joints, friction=joints, ajar=joints, surface=0.5)
+    variation = Variation(changes=changes, joints={}, ajar={})
     root = varied(scene, variation, halves, {f"{name}_base": name for name in halves})
     model = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
     for name, shape in swapped.items():
