@@ -8,7 +8,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import BundleError
-from r2c2r_core.gym.robot_env import Observation, RobotEnv, tool_state
+from r2c2r_core.gym.robot_env import RobotEnv, tool_state
 from r2c2r_core.robot.grasps import BACK_M, Way, best_way
 from r2c2r_core.robot.motion import Travel, travel_of
 from r2c2r_core.robot.opening import OPEN_SHARE, joints_of
@@ -26,17 +26,9 @@ class OpenEnv(RobotEnv):
     base in 100 N. Reward: 5 times the fraction gained, and the metres by which the tool approached its grasp; 1 at success.
     """
 
-    def __init__(
-        self,
-        bundle: str | Path,
-        joint: str,
-        *,
-        observation: Observation = "state",
-        grip_n: float = 40.0,
-        render_mode: str | None = None,
-    ) -> None:
+    def __init__(self, bundle: str | Path, joint: str, **options: Any) -> None:
         self.joint = joint
-        super().__init__(bundle, STATE, observation=observation, grip_n=grip_n, render_mode=render_mode)
+        super().__init__(bundle, STATE, **options)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset to a scene with this joint and those in its way closed; all others as in the scene."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import BundleError
-from r2c2r_core.gym.robot_env import Observation, RobotEnv, tool_state
+from r2c2r_core.gym.robot_env import RobotEnv, tool_state
 from r2c2r_core.robot.grasps import BACK_M, body_words
 from r2c2r_core.robot.picking import NEAR_M, Pick, plan_pick, things_of
 
@@ -24,17 +24,9 @@ class PickPlaceEnv(RobotEnv):
     tool approached its grasp, 5 times those by which the object approached its goal; 1 at success.
     """
 
-    def __init__(
-        self,
-        bundle: str | Path,
-        thing: str,
-        *,
-        observation: Observation = "state",
-        grip_n: float = 40.0,
-        render_mode: str | None = None,
-    ) -> None:
+    def __init__(self, bundle: str | Path, thing: str, **options: Any) -> None:
         self.thing = thing
-        super().__init__(bundle, STATE, observation=observation, grip_n=grip_n, render_mode=render_mode)
+        super().__init__(bundle, STATE, **options)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset to a scene with a goal 10 cm beside the object."""

@@ -39,7 +39,13 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012  # gymnasium's own way
 
     def __init__(
-        self, bundle: str | Path, state_size: int, *, observation: Observation, grip_n: float, render_mode: str | None
+        self,
+        bundle: str | Path,
+        state_size: int,
+        *,
+        observation: Observation = "state",
+        grip_n: float = 40.0,
+        render_mode: str | None = None,
     ) -> None:
         self.scenes = scenes_of(Path(bundle))
         self.render_mode = render_mode
