@@ -117,6 +117,24 @@ def rotation_about_z(angle_rad: float) -> Matrix3:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def rotation_about(axis: Vector3, angle_rad: float) -> Matrix3:
+    """Rotation about a unit axis by the right-hand rule (Rodrigues)."""
+    cross = _cross(axis)
+    return np.asarray(np.eye(3) + np.sin(angle_rad) * cross + (1.0 - np.cos(angle_rad)) * cross @ cross)
+
+
+def rotation_of(quat_wxyz: np.ndarray) -> Matrix3:
+    """Rotation of a unit quaternion."""
+    cross = _cross(quat_wxyz[1:])
+    return np.asarray(np.eye(3) + 2.0 * quat_wxyz[0] * cross + 2.0 * cross @ cross)
+
+
+def _cross(vector: Vector3) -> Matrix3:
+    """The matrix that takes a point to its cross product with the vector, vector first."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
 def rotation_between(source: Vector3, target: Vector3) -> Matrix3:
     """The smallest rotation from direction `source` to direction `target`; for opposite ones, one of the half turns."""
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
@@ -128,8 +146,7 @@ def rotation_between(source: Vector3, target: Vector3) -> Matrix3:
         axis = axis - float(axis @ a) * a
         half_turn = 2.0 * np.outer(axis, axis) / float(axis @ axis) - np.eye(3)
         return np.asarray(rotation_between(-a, b) @ half_turn)
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    cross = _cross(axis / np.linalg.norm(axis))
     return np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross  # Rodrigues
 
 
@@ -137,9 +154,7 @@ def joint_transform(axis: Vector3, pivot: Vector3, state: float, *, turns: bool)
     """Motion of a body from its joint's zero to a state: about the line through `pivot` along unit `axis`, or along it."""
     if not turns:
         return Rigid3(np.eye(3), axis * state)
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    rotation = np.eye(3) + np.sin(state) * cross + (1.0 - np.cos(state)) * cross @ cross  # Rodrigues
+    rotation = rotation_about(axis, state)
     return Rigid3(rotation, pivot - rotation @ pivot)
 
 

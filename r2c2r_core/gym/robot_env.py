@@ -11,8 +11,7 @@ from gymnasium import spaces
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import BundleError
 from r2c2r_core.export.simulate import without_visuals
-from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.robot.motion import about
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about, rotation_about_z
 from r2c2r_core.robot.opening import reset
 from r2c2r_core.robot.rig import STROKE_M, Gripper, gripper_in, pose_of
 from r2c2r_core.robot.view import Surfaces, aimed, look, surfaces_of
@@ -101,7 +100,7 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         import mujoco
 
         aside = self.np_random.uniform(-0.03, 0.03, 3)
-        turn = about(np.array([0.0, 0.0, 1.0]), float(self.np_random.uniform(-0.2, 0.2)))
+        turn = rotation_about_z(float(self.np_random.uniform(-0.2, 0.2)))
         target = goal.translation - back_m * goal.rotation[:, 0] + aside
         self.target, self.width_m = Rigid3(turn @ goal.rotation, target), STROKE_M
         self.rig.put(self.target, self.width_m)
@@ -111,7 +110,9 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
         """Apply one action: shift and rotate the target in the world, drive the fingers to a width."""
         wanted = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
         turn, angle = wanted[3:6], float(np.linalg.norm(wanted[3:6]))
-        rotation = about(turn / angle, TURN_RAD * angle) @ self.target.rotation if angle > 1e-9 else self.target.rotation
+        rotation = (
+            rotation_about(turn / angle, TURN_RAD * angle) @ self.target.rotation if angle > 1e-9 else self.target.rotation
+        )
         at = self.rig.world_from_tool.translation
         away = self.target.translation + SHIFT_M * wanted[:3] - at
         length = float(np.linalg.norm(away))

@@ -7,15 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.robot import panda
 from r2c2r_core.robot.kinematics import Chain, chain_of, solve
-from r2c2r_core.robot.motion import about
 from r2c2r_core.robot.rig import PREFIX, Rig, compiled_with, hand_of
 
 _FOLLOWED = 2  # IK iterations from one command to the next
 _FOUND = 60  # IK iterations from an arbitrary start
-_UP = np.array([0.0, 0.0, 1.0])
 
 
 class Stand(NamedTuple):
@@ -29,7 +27,7 @@ class Stand(NamedTuple):
     @property
     def world_from_base(self) -> Rigid3:
         """Pose of the arm's root."""
-        return Rigid3(about(_UP, self.yaw_rad), np.array([self.x_m, self.y_m, self.lift_m]))
+        return Rigid3(rotation_about_z(self.yaw_rad), np.array([self.x_m, self.y_m, self.lift_m]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,7 +51,7 @@ class Arm(Rig):
     def world_from_base(self) -> Rigid3:
         """Current pose of the root."""
         w, _, _, z = self.data.mocap_quat[self.mocap]
-        return Rigid3(about(_UP, 2 * float(np.arctan2(z, w))), self.data.mocap_pos[self.mocap].copy())
+        return Rigid3(rotation_about_z(2 * float(np.arctan2(z, w))), self.data.mocap_pos[self.mocap].copy())
 
     @property
     def base_force_n(self) -> float:

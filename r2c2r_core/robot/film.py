@@ -9,8 +9,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Image, Vector3
 from r2c2r_core.geometry.camera import Intrinsics
-from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.robot.motion import about
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.robot.rig import Rig
 from r2c2r_core.robot.view import Poses, Surfaces, aimed, look, poses_now
 
@@ -73,7 +72,7 @@ def film_of(surfaces: Surfaces, rig: Rig, target: Vector3, outward: Vector3, rea
     Seen from the left in front, or the next of a few directions from which nothing in the rig's scene hides the target.
     """
     distance_m = reach_m / np.tan(_FIELD_RAD / 2)
-    views = [target + distance_m * (about(_UP, turn) @ outward * 1.25 + 0.45 * _UP) for turn in _TURNS]
+    views = [target + distance_m * (rotation_about_z(turn) @ outward * 1.25 + 0.45 * _UP) for turn in _TURNS]
     eye = next((view for view in views if _sees(rig, view, target)), views[0])
     camera, camera_from_world = aimed(eye, target + 0.3 * reach_m * outward, SIZE, _FIELD_RAD)
     return Film(surfaces=surfaces, model=rig.model, camera=camera, camera_from_world=camera_from_world)

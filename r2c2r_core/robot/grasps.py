@@ -7,9 +7,9 @@ from typing import Any, Literal
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about
 from r2c2r_core.robot.handles import Board, Part
-from r2c2r_core.robot.motion import Hold, Travel, about
+from r2c2r_core.robot.motion import Hold, Travel
 from r2c2r_core.robot.rig import HALF_PAD_M, STROKE_M, TIP_M, Rig, find_contacts, tool_rotation
 
 BACK_M = 0.12  # distance from the handle at which an approach begins
@@ -156,7 +156,7 @@ def _pinch(part: Part, bar: Board, side: int, along: float, tilt: float, beside_
     place[1] = tip
     place[2 - side] += along * bar.size[2 - side]
     stroke = np.eye(3)[side] * (-1.0 if side == 0 else 1.0)  # to the left when looking along the approach, or up
-    approach = about(stroke, tilt) @ _INTO
+    approach = rotation_about(stroke, tilt) @ _INTO
     width = float(bar.size[side])
     return Hold(
         body_from_tool=Rigid3(tool_rotation(approach, stroke), place - TIP_M * approach),

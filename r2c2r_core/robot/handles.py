@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
+from r2c2r_core.geometry.transforms import rotation_of
 
 _BOX = 6  # mjtGeom
 
@@ -61,11 +62,7 @@ def part_of(model: Any, joint: str) -> Part | None:
 
 def _grips(model: Any, body: int) -> Iterator[Board]:
     """Grips of a body's handles: box sites of scene.xml, whose axes are a permutation of the body's."""
-    import mujoco
-
     for site in range(model.nsite):
         if model.site_bodyid[site] == body and model.site_type[site] == _BOX:
-            turn = np.zeros(9)
-            mujoco.mju_quat2Mat(turn, model.site_quat[site])
-            half = np.abs(turn.reshape(3, 3)) @ model.site_size[site]
+            half = np.abs(rotation_of(model.site_quat[site])) @ model.site_size[site]
             yield Board(low=model.site_pos[site] - half, high=model.site_pos[site] + half)

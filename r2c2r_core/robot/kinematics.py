@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, rotation_of
 
 _DAMPING = 0.02  # of the least squares, m: slows down near singularities
 _TURN_M = 0.3  # weight of a radian of rotation error, in m
@@ -124,7 +123,4 @@ def _error(wanted: np.ndarray, now: np.ndarray) -> np.ndarray:
 
 
 def _matrix(position: np.ndarray, quat_wxyz: np.ndarray) -> np.ndarray:
-    w, vector = float(quat_wxyz[0]), np.asarray(quat_wxyz[1:], dtype=np.float64)
-    length = float(np.linalg.norm(vector))
-    axis = vector / length if length > 0 else vector
-    return Rigid3(np.asarray(cv2.Rodrigues(axis * 2 * np.arctan2(length, w))[0]), np.array(position)).matrix
+    return Rigid3(rotation_of(quat_wxyz), np.array(position)).matrix

@@ -2,12 +2,11 @@
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
-from r2c2r_core.arrays import Matrix3, Vector3
+from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import StageError
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, joint_transform, rotation_about
 from r2c2r_core.robot.handles import Part, part_of
 from r2c2r_core.robot.rig import Rig
 
@@ -28,11 +27,7 @@ class Travel:
 
     def world_from_body(self, position: float) -> Rigid3:
         """The part's pose at a joint position."""
-        if not self.hinged:
-            return Rigid3(self.world_from_closed.rotation, self.world_from_closed.translation + position * self.axis)
-        turn = about(self.axis, position)
-        shift = self.anchor + turn @ (self.world_from_closed.translation - self.anchor)
-        return Rigid3(turn @ self.world_from_closed.rotation, shift)
+        return joint_transform(self.axis, self.anchor, position, turns=self.hinged) @ self.world_from_closed
 
     def radius_of(self, point_body: Vector3) -> float:
         """Metres travelled by a point of the part per radian, or per metre."""
@@ -61,7 +56,7 @@ class Hold:
         pose = travel.world_from_body(position) @ self.body_from_tool
         rotation = pose.rotation
         if travel.hinged and self.follow < 1.0:
-            rotation = about(travel.axis, (self.follow - 1.0) * position) @ rotation
+            rotation = rotation_about(travel.axis, (self.follow - 1.0) * position) @ rotation
         return Rigid3(rotation, pose.translation - back_m * rotation[:, 0])
 
 
@@ -87,8 +82,3 @@ def travel_of(rig: Rig, joint: str) -> Travel | None:
         upper=upper,
         address=int(entry.qposadr[0]),
     )
-
-
-def about(axis: Vector3, angle: float) -> Matrix3:
-    """Rotation about a unit axis by the right-hand rule."""
-    return np.asarray(cv2.Rodrigues(np.asarray(axis, dtype=np.float64) * angle)[0])

@@ -11,7 +11,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Matrix3, Points, Vector3
 from r2c2r_core.geometry.boxes import box_corners
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about, rotation_about_z
 
 GRIPPER = Path(__file__).with_name("gripper.xml")
 STROKE_M = 0.08
@@ -204,7 +204,7 @@ def axes_of(pose: Rigid3, near_yaw: float = 0.0) -> np.ndarray:
 def pose_of(axes: np.ndarray) -> Rigid3:
     """Pose from the six axis positions."""
     yaw, pitch, roll = axes[3:]
-    return Rigid3(_about(2, yaw) @ _about(1, pitch) @ _about(0, roll), np.array(axes[:3], dtype=np.float64))
+    return Rigid3(_turned(yaw, pitch) @ rotation_about(np.eye(3)[0], roll), np.array(axes[:3], dtype=np.float64))
 
 
 def tool_rotation(approach: Vector3, stroke: Vector3) -> Matrix3:
@@ -215,15 +215,10 @@ def tool_rotation(approach: Vector3, stroke: Vector3) -> Matrix3:
     return np.column_stack([x, y, np.cross(x, y)])
 
 
-def _about(axis: int, angle: float) -> Matrix3:
-    c, s = np.cos(angle), np.sin(angle)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    turn = np.eye(3)
-    turn[[i, j], [i, j]] = c
-    turn[i, j], turn[j, i] = -s, s
-    return turn
+def _turned(yaw: float, pitch: float) -> Matrix3:
+    return rotation_about_z(yaw) @ rotation_about(np.eye(3)[1], pitch)
 
 
 def _roll_left(rotation: Matrix3, yaw: float, pitch: float) -> float:
-    rest = (_about(2, yaw) @ _about(1, pitch)).T @ rotation
+    rest = _turned(yaw, pitch).T @ rotation
     return float(np.arctan2(rest[2, 1], rest[1, 1]))

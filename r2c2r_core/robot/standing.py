@@ -56,7 +56,7 @@ def free_floor(model: Any, data: Any, own: frozenset[int], handles: list[Vector3
     for x, y in ((x, y) for y in ys for x in xs):
         away = at - (x, y)
         near = np.linalg.norm(away, axis=1) < REACH_M
-        if near.any() and not furniture.dwithin(shapely.Point(x, y), PEDESTAL_RADIUS_M):
+        if near.any() and not furniture.distance(shapely.Point(x, y)) <= PEDESTAL_RADIUS_M:  # NaN without furniture
             dx, dy = away[near].mean(axis=0)
             found.append(Stand(round(float(x), 3), round(float(y), 3), float(np.arctan2(dy, dx)), LIFTS_M[0]))
     return Floor(stands=tuple(found), furniture=furniture)

@@ -8,7 +8,7 @@ import numpy as np
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.failing import spared
 from r2c2r_core.geometry.boxes import Boxes, box_penetration
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, joint_transform
 from r2c2r_core.kitchen.walls import depths_in, floor_height
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.scene import Box, Joint, Link, SceneObject
@@ -129,18 +129,8 @@ def _shortened(free: float, joint: Joint) -> float:
 def motion_at(item: SceneObject, joint: Joint, position: float) -> Rigid3:
     """World motion of the joint's child from closed to `position`."""
     axis = item.world_from_object.rotation @ joint.axis_object
-    if joint.type == "prismatic":
-        return Rigid3(np.eye(3), axis * position)
     pivot = item.world_from_object.apply(joint.origin_object)
-    rotation = rotation_about(axis, position)
-    return Rigid3(rotation, pivot - rotation @ pivot)
-
-
-def rotation_about(axis: Vector3, angle_rad: float) -> np.ndarray:
-    """Rotation about a unit axis by the right-hand rule (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross)
+    return joint_transform(axis, pivot, position, turns=joint.type == "revolute")
 
 
 def _blockers(

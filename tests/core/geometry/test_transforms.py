@@ -12,8 +12,10 @@ from r2c2r_core.geometry.transforms import (
     Similarity3,
     front_rotation,
     nearest_rotation,
+    rotation_about,
     rotation_about_z,
     rotation_between,
+    rotation_of,
 )
 
 Transform = Rigid3 | Similarity3
@@ -180,6 +182,14 @@ def test_rotations_about_z_add_up_and_are_right_handed() -> None:
     np.testing.assert_allclose(rotation_about_z(np.pi / 2) @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=ATOL)
     for a, b in [(0.3, 0.4), (2.0, -3.0), (1e-9, 1e-9)]:
         np.testing.assert_allclose(rotation_about_z(a) @ rotation_about_z(b), rotation_about_z(a + b), atol=ATOL)
+
+
+def test_rotations_about_an_axis_and_of_a_quaternion_are_those_of_scipy(rng: np.random.Generator) -> None:
+    for vector in rng.normal(size=(10, 3)):
+        angle = float(np.linalg.norm(vector))
+        axis, half = vector / angle, angle / 2
+        np.testing.assert_allclose(rotation_about(axis, angle), turned(vector), atol=ATOL)
+        np.testing.assert_allclose(rotation_of(np.array([np.cos(half), *(np.sin(half) * axis)])), turned(vector), atol=ATOL)
 
 
 @pytest.mark.parametrize("opening_rad", [0.0, 1e-7, 1e-3, 1.0, np.pi - 1e-3, np.pi - 1e-6, np.pi - 1e-9, np.pi])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core.errors import StageError
-from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about
 from r2c2r_core.kitchen.categories import CATEGORIES
 from r2c2r_core.model.capture import Capture, Wall
 from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
@@ -14,7 +14,6 @@ from r2c2r_core.model.materials import HEAVY_DOOR_FEEL, SLIDE_FEEL
 from r2c2r_core.model.motion import Inside
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
 from r2c2r_core.model.track import MaskTrack
-from r2c2r_core.robot.motion import about
 from r2c2r_core.synthesize import stage
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from tests.core.motions import motion
@@ -285,7 +284,7 @@ def turning_about(inwards_m: float, behind_m: float, tilt_rad: float = 0.0) -> A
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
     place = track.front.world_from_front
-    turned = place.rotation @ about(np.array([0.0, 1.0, 0.0]), tilt_rad)
+    turned = place.rotation @ rotation_about(np.array([0.0, 1.0, 0.0]), tilt_rad)
     inside = Rigid3(turned, place.apply(np.array([inwards_m, behind_m, 0.0])))
     track = replace(track, motions=(motion({5: 1.0}, "left", world_from_front=inside),))
     return build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from r2c2r_core.geometry.boxes import box_corners
-from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
+from r2c2r_core.geometry.transforms import Rigid3, rotation_about, rotation_about_z
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.inputs import Overrides
 from r2c2r_core.model.scene import Box, SceneObject
-from r2c2r_core.synthesize.clearance import free_travel, gathered, motion_at, open_freely, rotation_about
+from r2c2r_core.synthesize.clearance import free_travel, gathered, motion_at, open_freely
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from tests.core.synthesize.kitchen_units import Handle, Unit, capture, placed_unit
 
