@@ -118,15 +118,7 @@ def _fixed_overlaps(loose: Any, rest: list[Touch]) -> Iterator[Finding]:
 
 def without_visuals(spec: Any) -> None:
     """Remove the visuals from an MjSpec, as they take seconds to load."""
-    for geom in [g for g in spec.geoms if g.contype == 0 and g.conaffinity == 0]:
-        spec.delete(geom)
-    used = {geom.meshname for geom in spec.geoms}
-    for part in [m for m in spec.meshes if m.name not in used]:
-        spec.delete(part)
-    for geom in spec.geoms:
-        geom.material = ""
-    for part in [*spec.materials, *spec.textures]:
-        spec.delete(part)
+    spec.compiler.discardvisual = True
 
 
 def compiled(mjcf: Path, *, strict: bool = False, keep_free: bool = False, loosen: bool = False) -> Any:

@@ -8,6 +8,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import BundleError
+from r2c2r_core.export.contacts import movers_of
 from r2c2r_core.gym.robot_env import RobotEnv, tool_state
 from r2c2r_core.robot.grasps import BACK_M, Way, best_way
 from r2c2r_core.robot.motion import Travel, travel_of
@@ -95,25 +96,13 @@ def close_in_the_way(rig: Rig, travel: Travel) -> None:
     """Close the joints whose parts, being ajar, would block the part."""
     import mujoco
 
-    scratch, model = mujoco.MjData(rig.model), rig.model
-    own = _joint_moving(model, travel.part.body)
+    scratch, model, own = mujoco.MjData(rig.model), rig.model, travel.part.joint
+    moving = {body: name for name in joints_of(model) for body in movers_of(model, name)}
     for share in np.linspace(0.0, 1.0, _LOOKS):
         scratch.qpos[:] = rig.data.qpos
         scratch.qpos[travel.address] = share * travel.upper
         find_contacts(model, scratch)
         for pair in scratch.contact.geom[: scratch.ncon]:
-            joints = [_joint_moving(model, int(model.geom_bodyid[geom])) for geom in pair]
-            if own in joints:
-                other = joints[0] if joints[1] == own else joints[1]
-                if other is not None and other != own:
-                    rig.data.qpos[model.jnt_qposadr[other]] = 0.0
-
-
-def _joint_moving(model: Any, body: int) -> int | None:
-    """The hinge or slide that moves a body, or None."""
-    while body:
-        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-        if count and model.jnt_type[first] in (2, 3) and not model.joint(first).name.startswith("gripper/"):
-            return first
-        body = int(model.body_parentid[body])
-    return None
+            joints = {moving.get(int(model.geom_bodyid[geom])) for geom in pair}
+            for other in joints - {own, None} if own in joints else ():
+                rig.data.qpos[model.joint(other).qposadr[0]] = 0.0

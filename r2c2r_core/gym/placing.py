@@ -8,6 +8,7 @@ import numpy as np
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import BundleError
 from r2c2r_core.gym.robot_env import RobotEnv, tool_state
+from r2c2r_core.robot.certificate import level
 from r2c2r_core.robot.grasps import BACK_M, body_words
 from r2c2r_core.robot.picking import NEAR_M, Pick, plan_pick, things_of
 
@@ -65,10 +66,7 @@ class PickPlaceEnv(RobotEnv):
 
     def view(self) -> tuple[Vector3, Vector3]:
         """Camera target: the object's initial position, seen from the gripper's approach side."""
-        approach = self.pick.grasp.rotation[:, 0]
-        level = np.array([-approach[0], -approach[1], 0.0])
-        length = float(np.linalg.norm(level))
-        return self._start, level / length if length > 0.1 else np.array([0.0, -1.0, 0.0])
+        return self._start, level(-self.pick.grasp.rotation[:, 0])
 
     @property
     def _at(self) -> Vector3:

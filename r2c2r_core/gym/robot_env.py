@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+import cv2
 import gymnasium
 import numpy as np
 from gymnasium import spaces
@@ -125,7 +126,7 @@ class RobotEnv(gymnasium.Env):  # type: ignore[misc]  # gymnasium is an extra: t
     def action_to(self, pose: Rigid3, width_m: float) -> np.ndarray:
         """The action that moves the target to a pose, or as far as one step allows."""
         shift = (pose.translation - self.target.translation) / SHIFT_M
-        turn = _turn_vector(pose.rotation @ self.target.rotation.T) / TURN_RAD
+        turn = cv2.Rodrigues(pose.rotation @ self.target.rotation.T)[0].ravel() / TURN_RAD
         length, angle = float(np.linalg.norm(shift)), float(np.linalg.norm(turn))
         parts = [shift / max(length, 1.0), turn / max(angle, 1.0), [2 * width_m / STROKE_M - 1]]
         return np.concatenate(parts).clip(-1.0, 1.0).astype(np.float32)
@@ -194,9 +195,3 @@ def _picture_spaces() -> dict[str, Any]:
         "depth": spaces.Box(0.0, _FAR_M, (height, width, 1), np.float32),
         "segmentation": spaces.Box(-1, 2**30, (height, width, 1), np.int32),
     }
-
-
-def _turn_vector(rotation: np.ndarray) -> np.ndarray:
-    import cv2
-
-    return np.asarray(cv2.Rodrigues(rotation)[0]).ravel()

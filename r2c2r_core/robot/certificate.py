@@ -213,17 +213,18 @@ def film_of_joint(rig: Rig, travel: Travel, surfaces: Surfaces, least_m: float =
     """A film of the joint's front, with at least `least_m` on all sides."""
     pose, front = travel.world_from_closed, travel.part.front
     reach_m = max(0.8 * float(front.size[0]), 0.8 * float(front.size[2]), least_m)
-    return film_of(surfaces, rig, pose.apply(front.centre), _level(-pose.rotation[:, 1]), reach_m)
+    return film_of(surfaces, rig, pose.apply(front.centre), level(-pose.rotation[:, 1]), reach_m)
 
 
 def _seen_from(rig: Rig, pick: Pick) -> Vector3:
     """Horizontal direction from an object to the bundle's camera, else to the gripper's approach side."""
     if rig.model.ncam:
-        return _level(rig.data.cam_xpos[0] - pick.grasp.translation)
-    return _level(-pick.grasp.rotation[:, 0])
+        return level(rig.data.cam_xpos[0] - pick.grasp.translation)
+    return level(-pick.grasp.rotation[:, 0])
 
 
-def _level(direction: Vector3) -> Vector3:
+def level(direction: Vector3) -> Vector3:
+    """The horizontal part of a direction, of length 1; towards -y of an upright one."""
     flat = np.array([direction[0], direction[1], 0.0])
     length = float(np.linalg.norm(flat))
     return flat / length if length > 1e-3 else np.array([0.0, -1.0, 0.0])

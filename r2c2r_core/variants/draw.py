@@ -14,14 +14,8 @@ AJAR, AJAR_MOST = 0.2, 0.3  # fraction of joints initially ajar, and maximum ope
 SHIFT_M = 0.25  # maximum shift of a free object on its support
 RETEXTURED = 0.5  # fraction of variants whose fronts get a procedural surface
 
-KIND_OF = {
-    "counter": "stone",
-    "refrigerator": "metal",
-    "dishwasher": "metal",
-    "oven": "metal",
-    "hood": "metal",
-    "microwave": "metal",
-}
+_METAL = ("refrigerator", "dishwasher", "oven", "hood", "microwave")
+KIND_OF = {"counter": "stone", **dict.fromkeys(_METAL, "metal")}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +66,9 @@ Finish = tuple[str | None, np.ndarray]
 def _value(stated: Mapping[str, Any], quantile: float) -> float:
     """The quantile of a manifest's distribution; a normal one lies about the middle of its ends, where it is cut off."""
     low, high = stated["low"], stated["high"]
-    if stated["distribution"] == "normal" and high > low:
+    if low == high:
+        return float(low)
+    if stated["distribution"] == "normal":
         normal = NormalDist((low + high) / 2, stated["sigma"])
         first, last = normal.cdf(low), normal.cdf(high)
         return normal.inv_cdf(first + quantile * (last - first))

@@ -1,5 +1,6 @@
 """Validity tests of a variant: it loads without collisions, joints sweep freely, and free objects are supported."""
 
+import copy
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,22 +24,11 @@ def colliders_of(root: ET.Element, folder: Path) -> Any:
     """
     import mujoco
 
-    bare = ET.fromstring(ET.tostring(root))
-    for parent in list(bare.iter()):
-        for child in list(parent):
-            if child.get("class") == "visual" and child.tag == "geom":
-                parent.remove(child)
-    asset = bare.find("asset")
-    used = {geom.get("mesh") for geom in bare.iter("geom")}
-    if asset is not None:
-        for part in list(asset):
-            if part.tag in ("texture", "material") or (part.tag == "mesh" and part.get("name") not in used):
-                asset.remove(part)
-    for geom in bare.iter("geom"):
-        geom.attrib.pop("material", None)
+    bare = copy.deepcopy(root)
     compiler = bare.find("compiler")
     assert compiler is not None
     compiler.set("meshdir", str(folder))
+    compiler.set("discardvisual", "true")
     return mujoco.MjSpec.from_string(ET.tostring(bare, encoding="unicode")).compile()
 
 

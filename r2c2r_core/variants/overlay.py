@@ -74,7 +74,7 @@ def _vary_body(root: ET.Element, body: ET.Element, change: Change, half: np.ndar
         if geom.get("type") == "box":
             geom.set("size", numbers(_numbers(geom, "size") * scale))
         if geom.get("type") == "mesh":
-            _scale_mesh(root, geom.get("mesh", ""), scale)
+            _named(root, "mesh", geom.get("mesh")).set("scale", numbers(scale))
         if geom.get("class") == "collision" and change.friction is not None:
             geom.set("friction", numbers(change.friction))  # sliding; the others are those of the class
         if geom.get("material") is not None:
@@ -108,8 +108,7 @@ def _dress(root: ET.Element, geom: ET.Element, change: Change) -> None:
     if change.texture is not None:
         geom.set("material", f"{change.name}_surface")
     else:
-        material = next(found for found in root.iter("material") if found.get("name") == geom.get("material"))
-        material.set("rgba", numbers([*change.tint, 1.0]))
+        _named(root, "material", geom.get("material")).set("rgba", numbers([*change.tint, 1.0]))
 
 
 def _add_surfaces(root: ET.Element, changes: Iterable[Change]) -> None:
@@ -132,9 +131,8 @@ def _add_surfaces(root: ET.Element, changes: Iterable[Change]) -> None:
         ET.SubElement(asset, "material", {"name": f"{change.name}_surface", **shape})
 
 
-def _scale_mesh(root: ET.Element, name: str, scale: np.ndarray) -> None:
-    mesh = next(found for found in root.iter("mesh") if found.get("name") == name)
-    mesh.set("scale", numbers(scale))
+def _named(root: ET.Element, tag: str, name: str | None) -> ET.Element:
+    return next(found for found in root.iter(tag) if found.get("name") == name)
 
 
 def _scale_inertial(inertial: ET.Element, scale: np.ndarray, mass: float) -> None:

@@ -185,6 +185,17 @@ def test_tints_lighten_and_darken_photographed_surfaces(bundle: Path, tmp_path: 
     assert brightness == pytest.approx(brightness[1] * np.array([0.9, 1.0, 1.1]), rel=0.03)  # but for white pixels
 
 
+def test_a_range_of_one_number_is_that_number(bundle: Path) -> None:
+    """A joint without friction has a logarithmic range from zero to zero."""
+    entry = next(entry for entry in base_of(bundle).objects if entry["joints"])
+    joint = entry["joints"][0]
+    for distribution in ("uniform", "loguniform", "normal"):
+        still = {"distribution": distribution, "low": 0.0, "high": 0.0, "sigma": 0.0}
+        varied_joint = joint | {"randomize": joint["randomize"] | {"friction": still}}
+        drawn = draw(np.random.default_rng(0), [entry | {"joints": [varied_joint]}])
+        assert drawn.joints[joint["name"]]["friction"] == 0.0
+
+
 def test_a_bundle_without_ranges_is_refused(bundle: Path, tmp_path: Path) -> None:
     old = shutil.copytree(bundle, tmp_path / "old")
     manifest = json.loads((old / "manifest.json").read_text())
