@@ -60,6 +60,7 @@ class RobotTrial(Shape):
     grips: list[RobotGrip]
     places: list[StandingPlace] = Field(default_factory=list)
     map: str | None = None  # address of the floor plan with its places
+    why: str | None = None  # reason why it tried nothing
 
 
 class SimulatorLines(Shape):

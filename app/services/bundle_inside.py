@@ -28,7 +28,7 @@ def inside(context: Context, project_id: str, version: int) -> schemas.BundleIns
     objects = said.get("objects", [])
     assets = [_asset(entry, names, at) for entry in objects]
     first = next((asset.name for asset in assets if asset.formats), "OBJECT")
-    robots = [_trial("A parallel gripper", "gripper", report.get("gripper"), at), _trial("", "arm", report.get("arm"), at)]
+    robots = [trial("A parallel gripper", "gripper", report.get("gripper"), at), trial("An arm", "arm", report.get("arm"), at)]
     lines = recipes(said.get("capture", {}).get("name", ""), first)
     return schemas.BundleInside(
         version=version,
@@ -64,8 +64,10 @@ def _asset(entry: dict[str, Any], names: list[str], at: str) -> schemas.ObjectAs
     return schemas.ObjectAsset(name=name, category=entry["category"], formats=sorted(path.suffix for path in own), url=url)
 
 
-def _trial(name: str, folder: str, said: dict[str, Any] | None, at: str) -> schemas.RobotTrial | None:
-    """A robot's trial; None where it was not tried."""
+def trial(name: str, folder: str, said: dict[str, Any] | None, at: str) -> schemas.RobotTrial | None:
+    """A robot's trial, or the reason why it failed; None where none was requested or nothing moves."""
+    if said and "why" in said:
+        return schemas.RobotTrial(name=name, joints=0, joints_opened=0, grips=[], why=said["why"])
     if not said or not said.get("grips"):
         return None
     keys = ("kind", "name", "method", "passed", "grip_n", "opened", "why")

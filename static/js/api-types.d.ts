@@ -1196,6 +1196,7 @@ export interface RobotTrial {
   grips: RobotGrip[];
   places: StandingPlace[];
   map: string | null;
+  why: string | null;
 }
 
 /** A run's backends, where they differ from the defaults. */

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from app.jobs.plans import Commands
+from app.services.bundle_inside import trial
 from r2c2r_core.export import stage
 from r2c2r_core.export.stage import ExportConfig, write_bundle
 from r2c2r_core.model.report import Certificate
@@ -128,6 +129,12 @@ def test_the_contents_of_a_bundle_list_assets_robots_and_simulators(made: tuple[
     for link in re.findall(r'href="([^":#]+)"', web.client.get(f"/media/{project}/report.html").text):
         assert web.client.get(f"/media/{project}/{link}").status_code == 200, link
     assert "MuJoCo" in {lines["simulator"] for lines in inside["simulators"]}
+
+
+def test_the_reason_of_a_failed_robot_trial_is_shown() -> None:
+    found = trial("An arm", "arm", {"why": "scene.xml: MuJoCo cannot load it"}, "/media/p/bundles/1")
+    assert found is not None
+    assert (found.name, found.why, found.grips) == ("An arm", "scene.xml: MuJoCo cannot load it", [])
 
 
 def test_a_single_downloaded_object_loads_in_mujoco_with_its_texture(made: tuple[Running, str], tmp_path: Path) -> None:

@@ -63,6 +63,9 @@ const MOMENTS = Array.from({ length: 8 }, (_, k) => ({
  * @param {BundleInside["robots"][number]} robot
  */
 export function robotCard(robot) {
+  if (robot.why) {
+    return h("section", { class: "card stack" }, h("h2", {}, robot.name), h("p", {}, `Not tried: ${robot.why}`));
+  }
   const rows = robot.grips.map((grip) =>
     h(
       "tr",
