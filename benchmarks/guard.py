@@ -42,7 +42,7 @@ MEASURES = {  # smallest change of an object's figure that is reported; negative
     **dict.fromkeys(("centre", "front_centre", "pivot", "edge"), 3.0),  # mm
     "inner_depth": 2.0,  # mm
     "yaw": 0.3,  # deg
-    **dict.fromkeys(("joint_type", "hinge_side", "stop", "limit_source"), -1e-6),  # fraction right
+    **dict.fromkeys(("joint_type", "hinge_side", "limit_source"), -1e-6),  # fraction right
     "false_motion": 1e-6,  # joints
     **dict.fromkeys(("mask_iou", "mask_iou_open", "state"), -0.02),  # fraction
 }

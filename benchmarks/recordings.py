@@ -182,6 +182,5 @@ def _filmed(motion: JointMotion) -> MotionRecord:
         states={frame: state.value for frame, state in motion.states.items()},
         shown=frozenset(),
         largest=motion.largest,
-        stop_seen=motion.stop_seen,
         inside={key: value for key, value in lengths.items() if isinstance(value, int | float)},
     )

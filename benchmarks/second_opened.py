@@ -69,13 +69,12 @@ class Leaf:
 
 @dataclass(frozen=True, kw_only=True)
 class Turn:
-    """Opening and closing times of one leaf (fractions of the film), its end position, and whether it rests there."""
+    """Opening and closing times of one leaf (fractions of the film), and its end position."""
 
     leaf: Leaf
     widest: float
     out: tuple[float, float]
     back: tuple[float, float]
-    rests: bool
     thinks: float  # fraction of the way at which the hand pauses; 0: no pause
 
     def state(self, time: float) -> float:
@@ -404,7 +403,7 @@ def _turns(leaves: list[Leaf], frames: int, rng: np.random.Generator) -> list[Tu
     turns = []
     for (leaf,) in starting:
         widest = round(float(rng.uniform(0.5, 0.9)) * leaf.upper, 3)
-        turns.append(Turn(leaf=leaf, widest=widest, out=(-2.0, -1.0), back=(0.03, _START), rests=False, thinks=0.0))
+        turns.append(Turn(leaf=leaf, widest=widest, out=(-2.0, -1.0), back=(0.03, _START), thinks=0.0))
     slot = (1.0 - _WALK) / max(len(later), 1)
     for number, group in enumerate(later):
         begin, last = _WALK + number * slot, number == len(later) - 1
@@ -415,7 +414,7 @@ def _turns(leaves: list[Leaf], frames: int, rng: np.random.Generator) -> list[Tu
             back = (3.0, 4.0) if last else (back_at, back_at + 0.2 * slot)
             widest = leaf.upper if rests else round(float(rng.uniform(0.45, 0.85)) * leaf.upper, 3)
             thinks = float(rng.uniform(0.35, 0.6)) if rng.random() < 0.4 else 0.0
-            turns.append(Turn(leaf=leaf, widest=widest, out=out, back=back, rests=rests, thinks=thinks))
+            turns.append(Turn(leaf=leaf, widest=widest, out=out, back=back, thinks=thinks))
     return turns
 
 
@@ -726,10 +725,6 @@ def _joint_entry(
     states = [0.0 if turn is None else round(turn.state(time), 6) for time in times]
     seen = [each[leaf.name] for each in tally]
     shown = [pixels >= _MIN_SEEN_PX and share >= _MIN_SEEN_SHARE for pixels, share in seen]
-    rest = [
-        turn is not None and turn.rests and turn.out[1] <= time <= turn.back[0] and show
-        for time, show in zip(times, shown, strict=True)
-    ]
     return {
         "name": leaf.name,
         "type": leaf.type,
@@ -741,7 +736,6 @@ def _joint_entry(
         "states": states,
         "seen_px": [pixels for pixels, _ in seen],
         "seen_share": [share for _, share in seen],
-        "stop_seen": sum(rest) >= 3,
         "largest": max((state for state, show in zip(states, shown, strict=True) if show), default=0.0),
         "inside": leaf.inside if any(states) else None,
     }

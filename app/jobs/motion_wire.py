@@ -14,7 +14,6 @@ def motion_lines(motions: Iterable[JointMotion]) -> list[dict[str, Any]]:
             "part": motion.part,
             "kind": motion.kind,
             "largest": round(motion.largest, 4),
-            "limit_source": motion.limit_source,
             "source": motion.source,
             "states": [
                 {"frame": int(frame), "value": _rounded(state.value), "sigma": _rounded(state.sigma)}
@@ -36,7 +35,6 @@ def marked_line(line: dict[str, Any], marks: Marks) -> dict[str, Any]:
         covariance=None,
         states={state["frame"]: State(value=state["value"], sigma=state["sigma"]) for state in line["states"]},
         largest=line["largest"],
-        stop_seen=line["limit_source"] == "measured",
         source=line["source"],
     )
     return motion_lines([moved(found, marks)])[0]

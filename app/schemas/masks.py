@@ -56,8 +56,7 @@ class Opening(Shape):
     object: int
     part: str  # of an object with several; else empty
     kind: Literal["revolute", "prismatic"]
-    largest: float  # widest observed state, rad or m
-    limit_source: Source  # of `largest` as joint limit: measured where the leaf was seen to stop, else at_least
+    largest: float  # widest observed state, rad or m: the joint opens at least as far
     source: Source  # of axis and pivot
     states: list[OpenState]
 

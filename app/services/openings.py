@@ -32,7 +32,8 @@ def openings(context: Context, project_id: str) -> list[schemas.Opening]:
         found = masks.found_of(context, project, item, places)
         lines = found.masks.motions if found is not None and found.state == "done" else []
         said = states_said(corrected.get(item.id or 0, {}))
-        shown += [schemas.Opening(object=item.id or 0, **line) for line in _with_marks(files, item.result_name, lines, said)]
+        told = [{key: line[key] for key in line if key in schemas.Opening.model_fields} for line in lines]  # less of old masks
+        shown += [schemas.Opening(object=item.id or 0, **line) for line in _with_marks(files, item.result_name, told, said)]
     return shown
 
 

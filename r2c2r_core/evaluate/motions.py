@@ -1,4 +1,4 @@
-"""Metrics of filmed joint motion: per-frame states, stops, limits and interior lengths against truth.
+"""Metrics of filmed joint motion: per-frame states, limits and interior lengths against truth.
 
 Only joints that open in the recording are scored; for the others, false motions are counted. A frame that shows the front
 but has no known state counts as wrong, and so does every frame of a joint that is missing or of another type.
@@ -29,8 +29,7 @@ class JointScore:
     shown_right: int  # with the right state
     open_shown: int  # those in which it is open
     open_right: int
-    stop_right: bool | None  # None: no stop in the truth, and none reported
-    limit_right: bool  # reported as measured and right; or, if no stop was seen, not as measured and beyond what was seen
+    limit_right: bool  # right where it is reported as measured; otherwise not below what was seen
     inner_depth_mm: float | None  # signed error; None: not seen, or no truth
 
 
@@ -40,7 +39,6 @@ def motion_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...
     false = false_motions(truth, found)
     shown, shown_open = sum(s.shown for s in scores), sum(s.open_shown for s in scores)
     note = f"{shown} frames show it, {shown_open} of them open" if scores else "no front was opened"
-    stops = [float(s.stop_right) for s in scores if s.stop_right is not None]
     depths = [abs(s.inner_depth_mm) for s in scores if s.inner_depth_mm is not None]
     limits = [float(s.limit_right) for s in scores]
     right, right_open = sum(s.shown_right for s in scores), sum(s.open_right for s in scores)
@@ -49,7 +47,6 @@ def motion_errors(truth: ObjectRecord, found: ObjectRecord) -> tuple[Metric, ...
         Metric(
             name="state_open", value=_share(right_open, shown_open), unit="share", better="higher", tolerance=0.02, note=note
         ),
-        Metric(name="stop", value=mean(stops), unit="share right", better="higher", tolerance=0.0),
         Metric(name="limit_source", value=mean(limits), unit="share right", better="higher", tolerance=0.0),
         Metric(name="inner_depth", value=mean(depths), unit="mm", better="lower", tolerance=2.0),
         Metric(name="false_motion", value=false, unit="joints", better="lower", tolerance=0.0),
@@ -96,7 +93,6 @@ def _score(true: JointRecord, motion: MotionRecord, found: JointRecord | None) -
         shown_right=len(right),
         open_shown=len(ajar),
         open_right=len(right & ajar),
-        stop_right=_stop_right(true, motion, found.motion if same and found is not None else None, tolerance),
         limit_right=same and found is not None and _limit_right(true, motion, found, tolerance),
         inner_depth_mm=_depth_error_mm(motion, found.motion if found is not None else None),
     )
@@ -106,22 +102,10 @@ def _near(value: float | None, true: float | None, tolerance: float) -> bool:
     return value is not None and true is not None and abs(value - true) <= tolerance
 
 
-def _stop_right(true: JointRecord, motion: MotionRecord, found: MotionRecord | None, tolerance: float) -> bool | None:
-    """Whether a stop was found where the joint has its limit.
-
-    None if none was found and none was seen. One may be found that was not seen: a sliding leaf may stop hidden behind another,
-    with only its vacated place in view.
-    """
-    claimed = found is not None and found.stop_seen
-    if not motion.stop_seen and not claimed:
-        return None
-    return claimed and found is not None and abs(found.largest - true.upper) <= tolerance
-
-
 def _limit_right(true: JointRecord, motion: MotionRecord, found: JointRecord, tolerance: float) -> bool:
     if found.limit_source == "measured":
         return abs(found.upper - true.upper) <= tolerance
-    return not motion.stop_seen and found.upper >= motion.largest - tolerance
+    return found.upper >= motion.largest - tolerance
 
 
 def _depth_error_mm(true: MotionRecord, found: MotionRecord | None) -> float | None:

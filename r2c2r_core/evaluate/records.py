@@ -29,7 +29,6 @@ class MotionRecord:
     states: Mapping[int, float | None]  # by frame number; None: not known
     shown: frozenset[int]  # truth only: the frames that show its front
     largest: float
-    stop_seen: bool
     inside: Mapping[str, float]  # lengths in m, by the names of model/motion.py
 
     @property
@@ -188,7 +187,6 @@ def _true_motion(entry: dict[str, Any]) -> MotionRecord:
         states=states,
         shown=shown,
         largest=float(entry["largest"]),
-        stop_seen=bool(entry["stop_seen"]),
         inside=_lengths(entry.get("inside")),
     )
 
@@ -202,7 +200,6 @@ def _found_motion(entry: dict[str, Any] | None) -> MotionRecord | None:
         states=states,
         shown=frozenset(),
         largest=float(entry["largest"]),
-        stop_seen=bool(entry["stop_seen"]),
         inside=_lengths(entry.get("inside")),
     )
 

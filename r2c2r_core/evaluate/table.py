@@ -21,7 +21,6 @@ _COLUMNS = (
     ("range_ratio", "range", "{:.2f}"),
     ("state", "states", "{:.2f}"),
     ("state_open", "open", "{:.2f}"),
-    ("stop", "stop", "{:.2f}"),
     ("inner_depth", "inner mm", "{:.0f}"),
     ("mask_iou_open", "open IoU", "{:.3f}"),
     ("box_iou", "box IoU", "{:.2f}"),

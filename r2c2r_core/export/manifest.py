@@ -182,7 +182,6 @@ def _motion_entry(motion: JointMotion) -> dict[str, Any]:
         "source": motion.source,
         "covariance": _plain(motion.covariance),
         "largest": _plain(motion.largest),
-        "stop_seen": motion.stop_seen,
         "states": [
             {"frame": frame, "value": _plain(state.value), "sigma": _plain(state.sigma)}
             for frame, state in sorted(motion.states.items())

@@ -93,13 +93,8 @@ def _size(size_m: float, source: Source, placement: Placement | None) -> Range:
 
 
 def _limit(joint: Joint, motion: JointMotion | None) -> Range:
-    """Range of the upper limit, not beyond an obstacle; by the measured state's deviation where its stop was filmed."""
+    """Range of the upper limit, neither beyond an obstacle nor below what was filmed."""
     source: Source = joint.sources.get("limits", "default")
-    widest = None if motion is None else max(motion.states.values(), key=lambda state: state.value or 0.0, default=None)
-    if source == "measured" and widest is not None and widest.sigma:
-        ends = (joint.upper - 3 * widest.sigma, joint.upper + 3 * widest.sigma)
-        why = "standard deviation of the widest state that was filmed"
-        return Range(distribution="normal", low=ends[0], high=ends[1], sigma=widest.sigma, source="measured", why=why)
-    half = _WIDER[source] * joint.upper
-    high = joint.upper if joint.uncut is not None else joint.upper + half
-    return Range(distribution="uniform", low=joint.upper - half, high=high, source="default", why=f"the limit is {source}")
+    half, seen = _WIDER[source] * joint.upper, 0.0 if motion is None else motion.largest
+    low, high = max(joint.upper - half, min(seen, joint.upper)), joint.upper if joint.uncut is not None else joint.upper + half
+    return Range(distribution="uniform", low=low, high=high, source="default", why=f"the limit is {source}")

@@ -5,9 +5,9 @@ whether or not that was filmed, positive is opening, about the axis by the right
 Frame numbers are Frame.index, the frame's number in the recording.
 
 `r2c2r evaluate` scores the manifest's values of these: type, axis and pivot of the joint, the state of every frame that shows
-the front (one that is not listed, or has no value, is a miss), stops, limits and insides. A truth file has the same per joint:
-`states` (of every frame, never null), `seen_px` and `seen_share` (how much of the front each frame shows), `stop_seen`,
-`largest` and `inside`.
+the front (one that is not listed, or has no value, is a miss), limits and insides. A truth file has the same per joint:
+`states` (of every frame, never null), `seen_px` and `seen_share` (how much of the front each frame shows), `largest` and
+`inside`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -22,7 +22,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3, joint_transform
 
 Source = Literal["measured", "at_least", "inferred", "default", "person"]
-"""Source of a number. `at_least` is used for limits only: the largest observed opening, without a stop."""
+"""Source of a number. `at_least` is used for limits only: the largest observed opening, beyond the category's."""
 
 DOOR, DRAWER = "door", "drawer"
 """Parts of an object with a drawer below its door."""
@@ -74,7 +74,6 @@ class JointMotion:
     freedoms: rotation about the axis itself, and the pivot's position along a hinge's line. None if a person set the joint."""
     states: Mapping[int, State]  # by Frame.index: every frame that shows the front
     largest: float  # the largest observed state, rad or m
-    stop_seen: bool  # whether it rested at the end of its motion, so that `largest` is its limit
     source: Source  # of axis and pivot: measured, inferred or person
     inside: Inside | None = None
 
@@ -96,11 +95,6 @@ class JointMotion:
         if self.kind == "revolute":
             return "hinge"
         return "out" if abs(float(self.axis_world @ front_normal)) > np.sqrt(0.5) else "along"
-
-    @property
-    def limit_source(self) -> Source:
-        """Source of `largest` as the joint's upper limit."""
-        return "measured" if self.stop_seen else "at_least"
 
 
 def opened_frames(motions: Iterable[JointMotion]) -> frozenset[int]:

@@ -33,7 +33,7 @@ class ManifestJointSource(Document):
     origin: Source = Field(description="measured, inferred, default or person")
     lower: Source = Field(default="default", description="of the lower limit: default (the closed state) or person")
     limits: Source = Field(
-        description="of the upper limit: measured, at_least (as far as it was seen to open), inferred, default or person"
+        description="of the upper limit: at_least (as far as it was seen to open), inferred, default or person"
     )
 
 
@@ -72,7 +72,6 @@ class ManifestMotion(Document):
         description="6x6: of a small rotation of the axis about the world's axes (rad), then of the origin (m)"
     )
     largest: float = Field(description="the widest state seen, rad or m")
-    stop_seen: bool = Field(description="whether it was held still at the end of its motion")
     states: list[ManifestState] = Field(description="one of every frame that shows the front")
     inside: ManifestInside | None = Field(description="what was seen behind it")
 

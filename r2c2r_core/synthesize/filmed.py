@@ -12,7 +12,7 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.motion import DRAWER, Inside, JointMotion, JointType, Source
 from r2c2r_core.model.rectangle import HINGE_AXES, TOWARDS
-from r2c2r_core.model.scene import Box
+from r2c2r_core.model.scene import Box, Joint
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.fixtures.carcass import Params as BoardParams
 from r2c2r_core.synthesize.fixtures.spec import Below, Motion, Part
@@ -183,12 +183,28 @@ def swinging_clear(leaf: Part, edge: Vector3, motion: Motion) -> Part:
 
 
 def opening(motion: Motion, found: JointMotion | None, most: float) -> tuple[float, Source]:
-    """Upper limit of a part and its source: the filmed stop, at least the filmed maximum, or the category's default."""
-    if found is None or found.largest > most:  # beyond the possible range: a measurement error
+    """Upper limit of a part and its source: the category's, or the filmed maximum where that is larger.
+
+    A hand that holds a leaf still looks like a stop, so no filmed motion proves a smaller limit.
+    """
+    if found is None or not motion.upper < found.largest <= most:  # beyond the possible range: a measurement error
         return motion.upper, "default"
-    if found.stop_seen:
-        return found.largest, "measured"
-    return (found.largest, "at_least") if found.largest > motion.upper else (motion.upper, "default")
+    return found.largest, "at_least"
+
+
+def opened_alike(joints: Sequence[Joint]) -> list[Joint]:
+    """The joints of one object, hinged ones with the widest opening of them and its source: a pair has equal hinges.
+
+    Limits of a person, and those that an obstacle cuts, are kept.
+    """
+    free = [joint for joint in joints if joint.type == "revolute" and joint.sources["limits"] in ("default", "at_least")]
+    wide = max(free, key=lambda joint: joint.upper, default=None)
+    return [
+        replace(joint, upper=wide.upper, sources={**joint.sources, "limits": wide.sources["limits"]})
+        if wide is not None and any(joint is one for one in free)
+        else joint
+        for joint in joints
+    ]
 
 
 def widest(axis_object: Vector3, kind: JointType, dimensions_m: Vector3) -> float:

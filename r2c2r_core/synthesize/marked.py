@@ -8,7 +8,7 @@ import numpy as np
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.motion import JointMotion, State
 from r2c2r_core.model.scene import Joint, SceneObject
-from r2c2r_core.synthesize.filmed import filmed, opening, widest
+from r2c2r_core.synthesize.filmed import filmed, opened_alike, opening, widest
 from r2c2r_core.synthesize.fixtures.spec import Motion
 from r2c2r_core.tuning import param, tuned
 
@@ -61,7 +61,7 @@ def remarked(item: SceneObject, said: Mapping[str, Marks], motions: Sequence[Joi
             replace(joint, motion=seen), joint.motion, motion, widest(joint.axis_object, joint.type, item.dimensions_m)
         )
 
-    return replace(item, joints=tuple(again(joint) for joint in item.joints))
+    return replace(item, joints=tuple(opened_alike([again(joint) for joint in item.joints])))
 
 
 def part_of(joint: Joint, object_name: str) -> str:
@@ -100,7 +100,6 @@ def as_marked(found: JointMotion | None, marks: Marks, motion: Motion, world_fro
         covariance=None,
         states=_said(marks),
         largest=max(0.0, *marks.values()),
-        stop_seen=False,
         source="person",
     )
 

@@ -29,6 +29,7 @@ from r2c2r_core.synthesize.filmed import (
     filmed,
     hinge_notice,
     inside_seen,
+    opened_alike,
     opened_as,
     opening,
     swinging_clear,
@@ -191,7 +192,7 @@ def _fixture(item: MeasuredObject, hinge: Hinge | None, override: ObjectOverride
     said, unheard = _limits_said(item.name, list(motions), override)
     joints = [_joint(item, motion, fixture.feel, hinge, said.get(part), seen[part]) for part, motion in motions.items()]
     leaves = {link.name: link for link in links}
-    joints = [_kept_shut(joint, leaves[joint.child]) for joint in joints]
+    joints = opened_alike([_kept_shut(joint, leaves[joint.child]) for joint in joints])
     hinges = [hinge_notice(motion, seen[part], item.placed_pose) for part, motion in motions.items()]
     open_ended = [_open_ended(joint) for joint in joints]
     warnings = [*item.warnings, *build.notes, *unheard, *unmarked, *(line for line in (*hinges, *open_ended) if line)]
@@ -376,7 +377,7 @@ def _limits(
 
 def _open_ended(joint: Joint) -> str | None:
     """Warning that a joint was observed open to a state that need not be its limit."""
-    if joint.motion is None or joint.sources["limits"] in ("measured", "person"):
+    if joint.motion is None or joint.sources["limits"] == "person":
         return None
     seen = joint.motion.largest
     amount = f"{seen:.2f} m" if joint.type == "prismatic" else f"{np.degrees(seen):.0f} deg"

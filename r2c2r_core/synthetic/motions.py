@@ -1,4 +1,4 @@
-"""Ground truth of every joint in a recording: its state and its front's visibility in each frame, its stop, its interior."""
+"""Ground truth of every joint in a recording: its state and its front's visibility in each frame, and its interior."""
 
 from dataclasses import asdict, dataclass
 
@@ -12,7 +12,6 @@ from r2c2r_core.synthetic.opening import Film, Front, share_of
 from r2c2r_core.synthetic.render import View
 
 _BEHIND_M = 0.05
-_FEWEST_STILL = 3  # frames that show a front at rest, for its stop to be seen
 MIN_SEEN_PX, MIN_SEEN_SHARE = 400, 0.25  # as required by evaluate (records.py); stages do not import each other
 
 
@@ -48,17 +47,14 @@ def motion_entries(film: Film, seen: list[dict[str, Sight]]) -> dict[str, dict[s
     frames = len(seen)
     times = [share_of(i, frames) for i in range(frames)]
     states = [film.states(time) for time in times]
-    still = {o.joint: [o.rises[1] <= t <= o.falls[0] and o.rises[0] >= 0 for t in times] for o in film.openings if o.held}
     entries: dict[str, dict[str, object]] = {}
     for name, front in film.fronts.items():
-        rests = [i for i, rests in enumerate(still.get(name, [])) if rests and seen[i][name].shows]
         values = [round(each[name], 6) for each in states]
         opens = any(values)
         entries[name] = {
             "states": values,
             "seen_px": [each[name].seen_px for each in seen],
             "seen_share": [each[name].seen_share for each in seen],
-            "stop_seen": len(rests) >= _FEWEST_STILL,
             "largest": max((value for value, each in zip(values, seen, strict=True) if each[name].shows), default=0.0),
             "inside": asdict(film.hollows[front.hollow_key].inside) if opens else None,
         }

@@ -59,7 +59,6 @@ class Opening:
     widest: float  # rad or m
     rises: tuple[float, float]
     falls: tuple[float, float]
-    held: bool  # rests at the end of its motion, for longer than a person takes to turn around
 
     def state(self, time: float) -> float:
         """State at a time, rad or m."""
@@ -284,9 +283,7 @@ def _schedule(kitchen: Kitchen, groups: list[list[Front]], rng: np.random.Genera
     if start is not None:
         (front,) = start
         widest = round(float(rng.uniform(0.55, 0.85)) * front.joint.upper, 3)
-        openings.append(
-            Opening(joint=front.joint.name, widest=widest, rises=(-2.0, -1.0), falls=(0.035, START_CLOSED), held=False)
-        )
+        openings.append(Opening(joint=front.joint.name, widest=widest, rises=(-2.0, -1.0), falls=(0.035, START_CLOSED)))
     length = (1.0 - WALK_TO) / max(len(turns), 1)
     for number, group in enumerate(turns):
         at, last = WALK_TO + number * length, number == len(turns) - 1
@@ -303,7 +300,7 @@ def _turn(front: Front, at: float, length: float, held: bool, last: bool, rng: n
     rest = float(rng.uniform(0.16, 0.22)) * length if held else 0.0
     back = (3.0, 4.0) if last else (out[1] + rest, out[1] + rest + 0.26 * pace * length)
     widest = front.joint.upper if held else round(float(rng.uniform(0.5, 0.85)) * front.joint.upper, 3)
-    return Opening(joint=front.joint.name, widest=widest, rises=out, falls=back, held=held)
+    return Opening(joint=front.joint.name, widest=widest, rises=out, falls=back)
 
 
 def _in_reach(groups: list[list[Front]], kitchen: Kitchen) -> list[list[Front]]:

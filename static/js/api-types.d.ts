@@ -776,7 +776,6 @@ export interface Opening {
   part: string;
   kind: "revolute" | "prismatic";
   largest: number;
-  limit_source: "measured" | "at_least" | "inferred" | "default" | "person";
   source: "measured" | "at_least" | "inferred" | "default" | "person";
   states: OpenState[];
 }

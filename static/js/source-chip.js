@@ -5,7 +5,7 @@ import { h } from "./dom.js";
 /** @type {Record<string, { word: string, sign: string, title: string }>} */
 const KINDS = {
   measured: { word: "measured", sign: "●", title: "seen in the recording" },
-  at_least: { word: "at least", sign: "≥", title: "the widest opening that was seen; its stop was not seen" },
+  at_least: { word: "at least", sign: "≥", title: "the widest opening that was seen; it may open further" },
   inferred: { word: "inferred", sign: "◐", title: "inferred from something else that was seen" },
   default: { word: "default", sign: "○", title: "not seen: the usual value of its category" },
   person: { word: "set by a person", sign: "✎", title: "set by a person" },

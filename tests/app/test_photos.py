@@ -30,7 +30,6 @@ FILMED = JointMotion(
     covariance=np.zeros((6, 6)),
     states={0: State(value=0.0, sigma=0.001), 3: State(value=0.25, sigma=0.002), 7: State(value=None, sigma=None)},
     largest=0.25,
-    stop_seen=False,
     source="measured",
 )
 BEFORE = Rigid3(np.eye(3), np.array([0.0, 0.0, 3.0]))  # the camera, which looks along z

@@ -15,7 +15,6 @@ def motion(
     states: Mapping[int, float],
     way: str = "out",
     *,
-    stop_seen: bool = False,
     world_from_front: Rigid3 | None = None,
     size_m: tuple[float, float] = (0.5, 0.7),
     part: str = "",
@@ -32,6 +31,5 @@ def motion(
         covariance=np.diag([1e-6] * 3 + [4e-6] * 3),
         states={frame: State(value=value, sigma=0.004) for frame, value in states.items()},
         largest=max(states.values()),
-        stop_seen=stop_seen,
         source="measured",
     )

@@ -9,7 +9,6 @@ const DOOR = {
   part: "",
   kind: "revolute",
   largest: 1.5,
-  limit_source: "at_least",
   source: "measured",
   states: [
     state(0, 0.01),

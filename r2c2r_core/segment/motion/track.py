@@ -18,7 +18,7 @@ from r2c2r_core.segment.motion.hypotheses import Hypothesis, Way, hypotheses
 from r2c2r_core.segment.motion.lateral import slid
 from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.motion.likelihood import States, closed_counts, evidence, in_view, lay_out, static_evidence
-from r2c2r_core.segment.motion.limits import stop_seen, widest
+from r2c2r_core.segment.motion.limits import widest
 from r2c2r_core.segment.motion.path import best_path
 from r2c2r_core.segment.motion.pose import fix_plane
 from r2c2r_core.segment.scene import Scene
@@ -160,8 +160,7 @@ def _measured(leaf: Leaf, course: Course, scene: Scene, silent: np.ndarray, part
     sigma_m = min(leaf.sigma_thickness_m, joint.sigma_thicker_m)
     leaf = replace(leaf, thickness_m=leaf.thickness_m + joint.thicker_m, sigma_thickness_m=sigma_m)
     states = _states(leaf, course, joint, seen, scene)
-    values, sigmas = np.array([(state.value, state.sigma) for state in states.values()], dtype=np.float64).T
-    largest = widest(np.array([value for value, _ in seen.values()]), values, turns=turns)
+    values = np.array([state.value for state in states.values()], dtype=np.float64)
     pivot = joint.pivot - joint.axis * float(joint.axis @ joint.pivot) if turns else np.zeros(3)
     place = leaf.world_from_front
     return leaf, JointMotion(
@@ -171,8 +170,7 @@ def _measured(leaf: Leaf, course: Course, scene: Scene, silent: np.ndarray, part
         pivot_world=place.apply(pivot),
         covariance=joint.covariance_in(place.rotation),
         states={scene.frames[k].index: state for k, state in states.items()},
-        largest=largest,
-        stop_seen=stop_seen(values, sigmas, [scene.frames[k].index for k in states], largest, turns=turns),
+        largest=widest(np.array([value for value, _ in seen.values()]), values, turns=turns),
         source="measured",
     )
 

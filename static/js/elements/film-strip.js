@@ -141,13 +141,13 @@ export class FilmStrip extends LiveElement {
   #openingLane(opening, { name, colour }, opened) {
     const what = opening.part ? `${name}, ${opening.part}` : name;
     const widest = jointValue(opening.kind, opening.largest);
-    const label = `Opening of ${what}: seen up to ${widest}, ${sourceWord(opening.limit_source)}`;
+    const label = `Opening of ${what}: seen up to ${widest}, ${sourceWord("at_least")}`;
     const canvas = h("canvas", { role: "img", "aria-label": label, title: label });
     for (const type of ["pointerdown", "pointermove"])
       canvas.addEventListener(type, (event) => this.#scrub(/** @type {PointerEvent} */ (event), canvas));
     const state = h("output", { class: "state" });
     opened.set(canvas, { opening, colour, state });
-    const limit = sourceChip(opening.limit_source, { of: widest });
+    const limit = sourceChip("at_least", { of: widest });
     return h("div", { class: "lane opening" }, h("span", { class: "muted" }, state, limit), canvas);
   }
 

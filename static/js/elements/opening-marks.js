@@ -210,7 +210,7 @@ export class OpeningMarks extends EventTarget {
   #plot({ opening }, about) {
     if (!opening) return h("canvas", { hidden: true });
     const marks = opening.states.filter(isMarked).length;
-    const widest = `${jointValue(opening.kind, opening.largest)}, ${sourceWord(opening.limit_source)}`;
+    const widest = `${jointValue(opening.kind, opening.largest)}, ${sourceWord("at_least")}`;
     const label = `Opening over the frames${about}: up to ${widest}; marked in ${marks}`;
     const canvas = h("canvas", { role: "img", "aria-label": label, title: label });
     canvas.addEventListener("pointerdown", (event) => {

@@ -24,7 +24,6 @@ OPENED = {
     "part": "",
     "kind": "revolute",
     "largest": 1.5,
-    "limit_source": "at_least",
     "source": "measured",
     "states": [
         {"frame": 0, "value": 0.01, "sigma": 0.01},

@@ -24,7 +24,6 @@ def opened_truth() -> dict[str, Any]:
             joint["states"] = [widest if opens and i in OPEN else 0.0 for i in range(FRAMES)]
             joint["seen_px"] = [100 if i in UNSEEN else 4000 for i in range(FRAMES)]
             joint["seen_share"] = [0.9] * FRAMES
-            joint["stop_seen"] = thing["name"] == "drawer_1"
             joint["largest"] = widest if opens else 0.0
             joint["inside"] = {"depth_m": 0.45, "shelves_m": []} if opens else None
     return truth
@@ -37,12 +36,12 @@ def filmed_bundle(truth: dict[str, Any]) -> dict[str, Any]:
         for joint in thing["joints"]:
             states = [{"frame": i, "value": v, "sigma": 0.001} for i, v in enumerate(joint.pop("states"))]
             opens = thing["name"] in NAMES
-            told = {key: joint.pop(key) for key in ("largest", "stop_seen", "inside")}
+            told = {key: joint.pop(key) for key in ("largest", "inside")}
             del joint["seen_px"], joint["seen_share"]
             joint["motion"] = {"source": "measured", "covariance": None, "states": states, **told} if opens else None
             if opens:
                 joint["upper"] = told["largest"]
-                joint["source"]["limits"] = "measured" if told["stop_seen"] else "at_least"
+                joint["source"]["limits"] = "measured" if thing["name"] == "drawer_1" else "at_least"
     return manifest
 
 
@@ -61,7 +60,6 @@ def test_a_bundle_with_the_true_motions_scores_perfectly(tmp_path: Path) -> None
         assert (metrics["state"], metrics["state_open"], metrics["limit_source"]) == (1.0, 1.0, 1.0)
         assert metrics["inner_depth"] == pytest.approx(0.0)
         assert metrics["false_motion"] == 0.0
-    assert (door["stop"], drawer["stop"]) == (None, 1.0)  # no stop of the door was seen, and none is claimed
 
 
 def test_unknown_and_missing_states_count_as_errors(tmp_path: Path) -> None:
@@ -99,29 +97,20 @@ def test_a_wrong_joint_type_or_missing_motion_scores_zero(tmp_path: Path) -> Non
         joints["drawer_1"]["motion"] = None
 
     door, drawer = found(tmp_path, spoil)
-    assert (door["state"], door["limit_source"], drawer["state"], drawer["stop"]) == (0.0, 0.0, 0.0, 0.0)
+    assert (door["state"], door["limit_source"], drawer["state"]) == (0.0, 0.0, 0.0)
 
 
-def test_an_unobserved_limit_claimed_as_measured_is_an_error(tmp_path: Path) -> None:
-    def claim(joints: dict[str, Any]) -> None:
-        joints["cabinet_1"]["source"]["limits"] = "measured"
-        joints["cabinet_1"]["motion"]["stop_seen"] = True
-
-    door, _ = found(tmp_path, claim)
-    assert (door["limit_source"], door["stop"]) == (0.0, 0.0)
-
-
-def test_a_limit_that_is_right_counts_though_its_stop_was_hidden(tmp_path: Path) -> None:
-    """A sliding leaf stops behind another one, with its vacated place in view."""
+@pytest.mark.parametrize(("share", "source", "right"), [(0.8, "measured", 0.0), (1.0, "measured", 1.0), (0.7, "at_least", 0.0)])
+def test_a_limit_is_right_as_measured_or_at_least_as_wide_as_seen(
+    tmp_path: Path, share: float, source: str, right: float
+) -> None:
+    """The door was opened to 0.8 of its travel."""
 
     def claim(joints: dict[str, Any]) -> None:
-        joint = joints["cabinet_1"]
-        joint["source"]["limits"] = "measured"
-        joint["upper"] = joint["motion"]["largest"] = joint["upper"] / 0.8
-        joint["motion"]["stop_seen"] = True
+        joints["cabinet_1"]["source"]["limits"] = source
+        joints["cabinet_1"]["upper"] *= share / 0.8
 
-    door, _ = found(tmp_path, claim)
-    assert (door["limit_source"], door["stop"]) == (1.0, 1.0)
+    assert found(tmp_path, claim)[0]["limit_source"] == right
 
 
 def test_motion_of_a_static_joint_is_a_false_motion(tmp_path: Path) -> None:
@@ -137,6 +126,4 @@ def test_motion_of_a_static_joint_is_a_false_motion(tmp_path: Path) -> None:
 def test_ground_truth_without_motion_gives_no_motion_scores(tmp_path: Path) -> None:
     truth = truth_of(0)
     metrics = row(evaluate_bundle(*write(tmp_path, truth, bundle_of(truth))), "cabinet_1")
-    assert [metrics[name] for name in ("state", "state_open", "stop", "limit_source", "inner_depth", "false_motion")] == [
-        None
-    ] * 6
+    assert [metrics[name] for name in ("state", "state_open", "limit_source", "inner_depth", "false_motion")] == [None] * 5

@@ -13,6 +13,7 @@ from r2c2r_core.model.materials import SURFACE_FRICTION
 from r2c2r_core.model.placement import Spread
 from r2c2r_core.schema.manifest import Manifest
 from tests.core.export.kitchen import bottle, cabinet, drawer, reconstruction
+from tests.core.motions import motion
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -82,3 +83,5 @@ def test_mass_ranges_are_sourced_and_joint_ranges_stop_at_obstacles() -> None:
     (joint,) = cabinet("a").joints
     assert randomize.of_joint(joint)["upper"].high > joint.upper
     assert randomize.of_joint(replace(joint, uncut=2.0))["upper"].high == joint.upper
+    filmed = replace(joint, motion=motion({3: joint.upper}, "left"), sources={**joint.sources, "limits": "at_least"})
+    assert randomize.of_joint(filmed)["upper"].low == joint.upper  # it was seen to open as far

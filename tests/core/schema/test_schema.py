@@ -126,7 +126,6 @@ def test_the_manifest_contains_the_fitted_motion_of_a_joint() -> None:
         covariance=1e-6 * np.eye(6),
         states={7: State(value=0.5, sigma=0.01), 3: State(value=None, sigma=None)},
         largest=0.5,
-        stop_seen=False,
         source="measured",
         inside=Inside(depth_m=0.43, shelves_m=(0.2, 0.4)),
     )

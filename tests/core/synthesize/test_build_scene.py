@@ -185,13 +185,13 @@ def test_unnamed_limits_are_ignored_with_several_joints() -> None:
     assert any("joint_limits is for an object of one joint and was not used" in w for w in item.warnings)
 
 
-def test_a_lower_limit_set_by_a_person_keeps_the_measured_upper_limit() -> None:
+def test_a_lower_limit_set_by_a_person_keeps_the_filmed_upper_limit() -> None:
     track, placement, asset = placed_unit(Unit("a", "drawer", (0, 0, 0.5), (0.5, 0.58, 0.3)), np.random.default_rng(0))
-    track = replace(track, motions=(motion({5: 0.43}, stop_seen=True),))
+    track = replace(track, motions=(motion({5: 0.56}),))
     asked = Overrides(objects={"a": ObjectOverride(joint_lower=0.05)})
     joint = build_scene(capture(), [track], [placement], [asset], asked, SynthesizeConfig()).objects[0].joints[0]
-    assert (joint.lower, joint.sources["lower"], joint.sources["limits"]) == (0.05, "person", "measured")
-    assert joint.upper == pytest.approx(0.43, abs=1e-6)
+    assert (joint.lower, joint.sources["lower"], joint.sources["limits"]) == (0.05, "person", "at_least")
+    assert joint.upper == pytest.approx(0.56, abs=1e-6)
 
 
 def test_a_wall_beside_the_hinge_limits_the_door() -> None:
@@ -203,28 +203,18 @@ def test_a_wall_beside_the_hinge_limits_the_door() -> None:
     assert any("a wall blocks it" in w for w in scene.objects[0].warnings)
 
 
-@pytest.mark.parametrize(
-    ("seen_m", "stop_seen", "source"),
-    [
-        (0.43, True, "measured"),
-        (0.12, True, "measured"),
-        (0.12, False, "default"),
-        (0.56, False, "at_least"),
-        (0.9, True, "default"),
-        (None, False, "default"),
-    ],
-)
-def test_drawer_travel_comes_from_the_filmed_opening(seen_m: float | None, stop_seen: bool, source: str) -> None:
-    """An observed stop sets the limit; without a stop it is a lower bound; travel beyond the unit's depth is ignored."""
+@pytest.mark.parametrize(("seen_m", "source"), [(0.12, "default"), (0.56, "at_least"), (0.9, "default"), (None, "default")])
+def test_drawer_travel_is_at_least_the_filmed_opening(seen_m: float | None, source: str) -> None:
+    """Where it is larger than the category's; travel beyond the unit's depth is ignored."""
     track, placement, asset = placed_unit(Unit("a", "drawer", (0, 0, 0.5), (0.5, 0.58, 0.3)), np.random.default_rng(0))
     if seen_m is not None:
-        track = replace(track, motions=(motion({4: 0.05, 5: seen_m}, stop_seen=stop_seen),))
+        track = replace(track, motions=(motion({4: 0.05, 5: seen_m}),))
     scene = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig())
     joint = scene.objects[0].joints[0]
     assert joint.sources["limits"] == source
     if source != "default":
         assert joint.upper == pytest.approx(seen_m, abs=1e-6)
-    assert any("seen open" in w for w in scene.objects[0].warnings) == (seen_m is not None and source != "measured")
+    assert any("seen open" in w for w in scene.objects[0].warnings) == (seen_m is not None)
     assert (joint.motion is not None) == (seen_m is not None)
 
 
@@ -244,22 +234,25 @@ def test_the_drawer_of_a_refrigerator_slides_like_a_drawer_and_its_doors_turn_li
         assert (joint.effort, joint.velocity) == (feel.effort, feel.velocity)
 
 
-@pytest.mark.parametrize(("way", "stop_seen"), [("right", True), ("right", False), ("top", True), ("bottom", True)])
-def test_hinge_and_limit_come_from_the_filmed_opening_of_a_door(way: str, stop_seen: bool) -> None:
+@pytest.mark.parametrize(
+    ("way", "angle_deg", "source"),
+    [("right", 55.0, "default"), ("right", 118.0, "at_least"), ("top", 55.0, "default"), ("bottom", 118.0, "at_least")],
+)
+def test_hinge_and_limit_come_from_the_filmed_opening_of_a_door(way: str, angle_deg: float, source: str) -> None:
     """Independently of its handle."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
-    angle = np.deg2rad(102.0)
-    seen = motion({4: 0.5, 5: angle}, way, stop_seen=stop_seen, world_from_front=track.front.world_from_front)
+    angle = np.deg2rad(angle_deg)
+    seen = motion({4: 0.5, 5: angle}, way, world_from_front=track.front.world_from_front)
     track = replace(track, motions=(seen,))
     item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
     joint = item.joints[0]
     axes = {"right": [0, 0, 1], "top": [-1, 0, 0], "bottom": [1, 0, 0]}
     np.testing.assert_allclose(joint.axis_object, axes[way], atol=0.01)
-    assert (joint.sources["axis"], joint.sources["limits"]) == ("measured", "measured" if stop_seen else "default")
-    assert joint.upper == pytest.approx(angle if stop_seen else np.deg2rad(110), abs=0.02)
-    assert any("seen open" in w for w in item.warnings) == (not stop_seen)
+    assert (joint.sources["axis"], joint.sources["limits"]) == ("measured", source)
+    assert joint.upper == pytest.approx(max(angle, np.deg2rad(110)), abs=0.02)
+    assert any("seen open" in w for w in item.warnings)
 
 
 @pytest.mark.parametrize(("way", "opens_by_itself"), [("top", True), ("bottom", False), ("right", False)])
@@ -395,18 +388,18 @@ def test_the_fixture_follows_the_filmed_motion(category: str, way: str, fixture:
     assert any(f"called a {category}" in w for w in item.warnings) == (fixture != category)
 
 
-def test_each_door_of_a_pair_gets_only_its_own_motion() -> None:
+def test_doors_of_a_pair_have_one_limit_and_their_own_motions() -> None:
     unit = Unit("a", "double-door cabinet", (0, 0, 0.5), (0.8, 0.58, 0.7))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
     assert track.front is not None
     place = track.front.world_from_front
     half = Rigid3(place.rotation, place.apply(np.array([0.2, 0.0, 0.0])))
-    seen = motion({5: 1.2}, "right", stop_seen=True, world_from_front=half, size_m=(0.4, 0.7), part="right")
+    seen = motion({5: 2.0}, "right", world_from_front=half, size_m=(0.4, 0.7), part="right")
     track = replace(track, motions=(seen,))
     item = build_scene(capture(), [track], [placement], [asset], Overrides(objects={}), SynthesizeConfig()).objects[0]
     left, right = sorted(item.joints, key=lambda joint: joint.name)
-    assert (left.motion, left.sources["limits"]) == (None, "default")
-    assert (right.motion, right.sources["limits"], right.upper) == (seen, "measured", 1.2)
+    assert (left.motion, right.motion) == (None, seen)
+    assert {(joint.upper, joint.sources["limits"]) for joint in item.joints} == {(2.0, "at_least")}
 
 
 @pytest.mark.parametrize(
@@ -441,7 +434,7 @@ def test_a_filmed_opening_is_ignored_when_a_person_moves_the_hinge() -> None:
     """A person moved the hinge to the left; the angle in the scan was measured about the right edge."""
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.5, 0.58, 0.7), handle=Handle(0.2, 0.2))
     track, placement, asset = placed_unit(unit, np.random.default_rng(0))
-    track = replace(track, motions=(motion({5: 1.8}, "right", stop_seen=True),))
+    track = replace(track, motions=(motion({5: 1.8}, "right"),))
     asked = Overrides(objects={"a": ObjectOverride(hinge="left")})
     joint = build_scene(capture(), [track], [placement], [asset], asked, SynthesizeConfig()).objects[0].joints[0]
     assert joint.axis_object[2] == -1.0

@@ -23,7 +23,6 @@ def measured(values: dict[int, float | None]) -> JointMotion:
         covariance=np.eye(6) * 1e-6,
         states={frame: State(value=value, sigma=None if value is None else 0.01) for frame, value in values.items()},
         largest=max(v for v in values.values() if v is not None),
-        stop_seen=True,
         source="measured",
     )
 
@@ -45,7 +44,6 @@ def test_a_closed_mark_shifts_the_zero_of_every_frame() -> None:
     assert moved is not None
     assert moved.largest == pytest.approx(0.9, abs=0.005)
     assert moved.states[0].sigma is None  # marks of a person have no uncertainty
-    assert moved.stop_seen  # it was held still at that position
 
 
 def test_two_marks_rescale_the_measured_states() -> None:
