@@ -19,7 +19,7 @@ from r2c2r_core.kitchen.walls import distances_behind
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.contradiction import Contradiction
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.tuning import param, tuned
 
 _SIDES = ("left", "right", "upper", "lower")
@@ -182,9 +182,15 @@ def _within(mask: Mask, point: PromptPoint) -> bool:
 
 
 def _unlikely_sizes(track: MaskTrack, category: Category, params: Params) -> Iterator[Contradiction]:
-    """Measured sizes implausible for the category; depths are left out, because they are seldom observed."""
+    """Measured sizes implausible for the category; depths are left out, because they are seldom observed.
+
+    A door that is certain to end where it does may be a tall one, which people call a cabinet too.
+    """
+    highest_m = 0.0
     if track.front is not None:
         sizes = {"wide": (track.front.width_m, category.width), "high": (track.front.height_m, category.height)}
+        if category.opens in ("side", "pair") and _certainty(track.front, category)[0] >= params.unsure_front:
+            highest_m = category_of("tall_cabinet").height.high
     elif track.box is not None:
         width, depth, height = track.box.dimensions_m
         sizes = {"wide": (max(width, depth), category.width), "high": (height, category.height)}
@@ -193,7 +199,7 @@ def _unlikely_sizes(track: MaskTrack, category: Category, params: Params) -> Ite
     if category.name == "object":  # a name missing from the table
         return
     for word, (size_m, usual) in sizes.items():
-        if usual.fit(float(size_m)) >= params.unlikely:
+        if usual.fit(float(size_m)) >= params.unlikely or (word == "high" and usual.high < size_m <= highest_m):
             continue
         yield Contradiction(
             rule="size-unlikely",
@@ -237,8 +243,7 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
     front = track.front
     if front is None or not front.edges:
         return
-    seam = 0.0 if has_seams(category, front.width_m) else front.seam
-    sure = front.right * (1 - seam)
+    sure, seam = _certainty(front, category)
     if sure >= params.unsure_front:
         return
     sides = [side for side, odds in zip(_SIDES, front.edges, strict=True) if odds < params.unsure_edge]
@@ -252,6 +257,12 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
         f"{': ' * bool(doubts)}{', and '.join(doubts)}",
         mend="click beside it, off it, to move an edge there; or draw it in the elevation",
     )
+
+
+def _certainty(front: FrontPanel, category: Category) -> tuple[float, float]:
+    """Probability that all edges are right and no seam is inside, and that of an unexpected seam."""
+    seam = 0.0 if has_seams(category, front.width_m) else front.seam
+    return front.right * (1 - seam), seam
 
 
 def has_seams(category: Category, width_m: float) -> bool:

@@ -22,10 +22,10 @@ class Params:
     """Tuned parameters of collision-free joint travel."""
 
     touch_m: float = param(0.0005, "m", "Penetration above which two objects collide")
-    wall_touch_m: float = param(
+    edge_m: float = param(
         0.01,
         "m",
-        "Maximum additional penetration of an opening front behind a wall's plane",
+        "Maximum overlap of an opening front with a wall's plane, or of a closed one with a neighbour, that is an edge's error",
         source="a wall is a plane through a centimetre of uneven plaster, and a front's edge is known to 8 mm",
     )
     steps: int = param(36, "count", "Number of joint positions that are tested", ge=2)
@@ -57,7 +57,11 @@ def open_freely(objects: Sequence[SceneObject], walls: Sequence[Wall], kept: fro
                 continue
             free, blocker = joint.upper, None
             with spared(f"how far {joint.name} opens was not checked", warnings):
-                free, blocker = free_travel(item, joint, index, objects, obstacles, walls)
+                free, blocker, touched = free_travel(item, joint, index, objects, obstacles, walls)
+                if touched is not None:
+                    warnings.append(
+                        f"{joint.name}: its closed front overlaps {touched}: an edge between them is measured wrong"
+                    )
             if joint.motion is not None:  # filmed to open this far, so the apparent obstacle is a measurement error
                 free = max(free, min(joint.motion.largest, joint.upper))
             if blocker is None or free >= joint.upper:
@@ -78,15 +82,20 @@ def free_travel(
     objects: Sequence[SceneObject],
     obstacles: Obstacles,
     walls: Sequence[Wall],
-) -> tuple[float, str | None]:
-    """Collision-free travel of a joint with all others closed, and the name of the obstacle that limits it."""
+) -> tuple[float, str | None, str | None]:
+    """Collision-free travel of a joint with all others closed, its obstacle, and what its closed leaf overlaps."""
     params = tuned(Params)
     child_index = next(i for i, link in enumerate(item.links) if link.name == joint.child)
     child = item.links[child_index]
     others = ~((obstacles.owner == index) & (obstacles.link == child_index))
     moving = link_boxes(item, child)
     near = others & _within_reach(obstacles.boxes, item, joint, moving)
-    corners = _corners(moving)
+    corners, still = _corners(moving), np.flatnonzero(near)
+    closed = np.zeros((len(moving.centres), len(still)))  # overlaps of the closed leaf: an edge's error blocks nothing
+    touched = None
+    for _, i, j, depth in _overlaps([moving], obstacles, still):
+        closed[i, j] = min(depth, params.edge_m)
+        touched = objects[obstacles.owner[still[j]]].name if depth > params.touch_m else touched
     near_walls = [wall for wall, depth in zip(walls, depths_in(walls, corners), strict=True) if depth < params.behind_m]
     before = np.maximum(depths_in(near_walls, corners), 0.0)
     lowest_m = floor_height([corners, _corners(obstacles.boxes)]) - params.touch_m
@@ -94,9 +103,12 @@ def free_travel(
     def blockers_at(positions: np.ndarray) -> list[str | None]:
         motions = [motion_at(item, joint, float(position)) for position in positions]
         places = [motion.apply(corners) for motion in motions]
-        walled = [(depths_in(near_walls, place) > before + params.wall_touch_m).any() for place in places]
+        walled = [(depths_in(near_walls, place) > before + params.edge_m).any() for place in places]
         grounded = [place[:, 2].min() < lowest_m for place in places]
-        found = _blockers([_moved(moving, motion) for motion in motions], obstacles, np.flatnonzero(near), objects)
+        found: list[str | None] = [None] * len(positions)
+        for place, i, j, depth in _overlaps([_moved(moving, motion) for motion in motions], obstacles, still):
+            if depth > closed[i, j] + params.touch_m:
+                found[place] = objects[obstacles.owner[still[j]]].name
         return [
             "a wall" if wall else "the floor" if floor else name
             for wall, floor, name in zip(walled, grounded, found, strict=True)
@@ -106,9 +118,9 @@ def free_travel(
     blockers = blockers_at(positions)
     first = next((k for k, blocker in enumerate(blockers) if blocker is not None), None)
     if first is None:
-        return joint.upper, None
+        return joint.upper, None, touched
     free = float(positions[max(first - 1, 0)])
-    return _shortened(_last_free(free, float(positions[first]), blockers_at), joint), blockers[first]
+    return _shortened(_last_free(free, float(positions[first]), blockers_at), joint), blockers[first], touched
 
 
 def _last_free(free: float, blocked: float, blockers_at: Callable[[np.ndarray], list[str | None]]) -> float:
@@ -133,20 +145,15 @@ def motion_at(item: SceneObject, joint: Joint, position: float) -> Rigid3:
     return joint_transform(axis, pivot, position, turns=joint.type == "revolute")
 
 
-def _blockers(
-    moved: Sequence[Boxes], obstacles: Obstacles, near: np.ndarray, objects: Sequence[SceneObject]
-) -> list[str | None]:
-    """For each pose of the moving boxes: the object with the deepest penetration, if any."""
+def _overlaps(moved: Sequence[Boxes], obstacles: Obstacles, near: np.ndarray) -> list[tuple[int, int, int, float]]:
+    """Overlaps of moving boxes with obstacles: pose, moving box, obstacle and depth, the deepest last."""
     moving, still = Boxes(*(np.stack(part) for part in zip(*moved, strict=True))), Boxes(*(v[near] for v in obstacles.boxes))
     reach = np.linalg.norm(moving.halves, axis=-1)[..., None] + np.linalg.norm(still.halves, axis=-1)
     apart = np.linalg.norm(moving.centres[:, :, None] - still.centres, axis=-1)
     place, i, j = np.nonzero(apart < reach)  # broad phase: the other bounding spheres do not intersect
     depth = box_penetration(Boxes(*(v[place, i] for v in moving)), Boxes(*(v[j] for v in still)))
-    names: list[str | None] = [None] * len(moved)
-    for k in np.argsort(depth, kind="stable"):
-        if depth[k] > tuned(Params).touch_m:
-            names[place[k]] = objects[obstacles.owner[near[j[k]]]].name
-    return names
+    order = [int(k) for k in np.argsort(depth, kind="stable") if depth[k] > 0]
+    return [(int(place[k]), int(i[k]), int(j[k]), float(depth[k])) for k in order]
 
 
 def _within_reach(boxes: Boxes, item: SceneObject, joint: Joint, moving: Boxes) -> np.ndarray:

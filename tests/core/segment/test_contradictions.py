@@ -109,6 +109,27 @@ def test_sizes_atypical_of_the_category_are_reported() -> None:
     assert found((unknown, prompt("lathe_1", "lathe", 10.5))) == ()
 
 
+@pytest.mark.parametrize(
+    ("height_m", "width_m", "right", "seam", "said"),
+    [
+        (2.1, 0.6, 0.9, 0.05, False),  # a tall door
+        (1.3, 0.6, 0.5, 0.05, True),
+        (1.4, 0.6, 0.95, 0.6, True),  # two doors, one over the other
+        (2.1, 1.2, 0.95, 0.05, True),  # two doors, side by side
+        (0.2, 0.6, 0.95, 0.05, True),  # a part of one
+        (3.2, 0.6, 0.95, 0.05, True),
+    ],
+)
+def test_a_door_taller_than_usual_is_doubtful_only_where_its_edges_are(
+    height_m: float, width_m: float, right: float, seam: float, said: bool
+) -> None:
+    door = track("door_1", "cabinet", slice(0, 80), width_m=width_m, height_m=height_m)
+    assert door.front is not None
+    door = replace(door, front=replace(door.front, edges=(0.9,) * 4, right=right, seam=seam))
+    rules = [doubt.rule for doubt in found((door, prompt("door_1", "cabinet", 40.5)))]
+    assert ("size-unlikely" in rules) == said
+
+
 def test_floor_standing_objects_above_the_floor_are_reported() -> None:
     chair = ("chair_1", "chair", (0.45, 0.5, 0.9))
     assert found((thing(*chair), prompt("chair_1", "chair", 10.5))) == ()

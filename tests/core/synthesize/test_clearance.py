@@ -41,7 +41,7 @@ def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> 
 
 def travel(item: SceneObject, *others: SceneObject, walls: tuple[Wall, ...] = ()) -> tuple[float, str | None]:
     objects = [item, *others]
-    return free_travel(item, item.joints[0], 0, objects, gathered(objects), walls)
+    return free_travel(item, item.joints[0], 0, objects, gathered(objects), walls)[:2]
 
 
 @pytest.mark.parametrize("category", ["drawer", "cabinet"])
@@ -130,6 +130,21 @@ def test_free_travel_does_not_depend_on_the_world_frame(category: str) -> None:
     here, there = travel(unit(category), obstacles(Rigid3())), travel(unit(category, room=ROOM), obstacles(ROOM))
     assert here[1] == there[1] == "block"
     assert here[0] == pytest.approx(there[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("category", ["drawer", "cabinet"])
+@pytest.mark.parametrize(("overlap_m", "opens"), [(0.0008, True), (0.008, True), (0.03, False)])
+def test_an_overlap_while_closed_that_an_edges_error_explains_blocks_no_joint(
+    category: str, overlap_m: float, opens: bool
+) -> None:
+    front = unit(category)
+    free_edge_m = max(abs(corner) for corner in (-0.3, 0.3))
+    side = -1.0 if front.joints[0].origin_object[0] > 0 else 1.0  # on the side without the hinge
+    ends = sorted((side * (free_edge_m - overlap_m), side * (free_edge_m + 0.5)))
+    beside = block((ends[0], -0.35, 0.0), (ends[1], -0.28, 1.0))
+    free, _ = open_freely([front, beside], (), frozenset())
+    assert (free.joints[0].upper > 0.9 * front.joints[0].upper) == opens
+    assert any("its closed front overlaps block" in line for line in free.warnings)
 
 
 def test_a_blocked_limit_is_lowered_unless_a_person_set_it() -> None:

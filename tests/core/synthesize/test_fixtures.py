@@ -99,6 +99,14 @@ def test_storage_fixtures_have_shelves_inside(every_fixture: ArticulatedScene, n
         assert box.size_m[2] >= 0.008
 
 
+@pytest.mark.parametrize("z_m", [-0.19, -0.25])
+def test_a_guessed_parting_line_moves_off_the_handle_that_crosses_it(z_m: float) -> None:
+    """It lies at -0.228 m: a door behind another door's handle would not open."""
+    unit = Unit("a", "fridge_freezer", (0, 0, 0.875), (0.6, 0.65, 1.75), handle=Handle(0.2, z_m), kind="appliance")
+    joints = built(unit).objects[0].joints
+    assert [joint.upper for joint in joints] == pytest.approx([np.deg2rad(115)] * 2)
+
+
 def test_drawer_tray_boards_are_at_least_8_mm_thick(every_fixture: ArticulatedScene) -> None:
     tray = [box for box in the(every_fixture, "drawer").links[1].boxes if box.name.startswith("tray")]
     assert min(box.size_m.min() for box in tray) >= 0.008 - 1e-9
