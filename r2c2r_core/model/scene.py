@@ -81,6 +81,11 @@ class Joint:
     confidence: float | None = None  # in its hinge side, 0..1; None where the category leaves no choice
     motion: JointMotion | None = None  # filmed motion; None if it was not observed to move
 
+    @property
+    def has_stay(self) -> bool:
+        """Whether it opens upwards about a level axis: on such flaps gas or spring stays carry the leaf's weight."""
+        return self.type == "revolute" and float(self.axis_object[0]) < -0.7  # +X is along the front: within 45 degrees of it
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SceneObject:

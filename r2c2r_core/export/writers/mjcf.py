@@ -148,6 +148,8 @@ def _add_assets(asset: ET.Element, plan: Plan) -> None:
 def _add_body(parent: ET.Element, body: Body) -> ET.Element:
     pose = body.world_from_body if body.free else body.parent_from_body
     element = ET.SubElement(parent, "body", {"name": body.name, **_pose(pose)})
+    if body.joint is not None and body.joint.has_stay:
+        element.set("gravcomp", "1")
     inertial = body.link.inertial
     full = [inertial.inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     mass = {"pos": numbers(inertial.com_link), "mass": numbers(inertial.mass_kg), "fullinertia": numbers(full)}

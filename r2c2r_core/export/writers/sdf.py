@@ -61,6 +61,8 @@ def _add_link(model: ET.Element, body: Body, named: Body) -> None:
     """Add a body with its pose in the asset; `named` is the same body with file paths relative to the scene."""
     link = ET.SubElement(model, "link", name=body.name)
     _add_pose(link, body.world_from_body)
+    if body.joint is not None and body.joint.has_stay:
+        ET.SubElement(link, "gravity").text = "false"
     inertial = ET.SubElement(link, "inertial")
     _add_pose(inertial, Rigid3(translation=body.link.inertial.com_link))
     ET.SubElement(inertial, "mass").text = numbers(body.link.inertial.mass_kg)

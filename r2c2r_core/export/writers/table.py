@@ -50,7 +50,8 @@ FORMATS: tuple[Format, ...] = (
         write=write_urdf,
         loses=(
             "free-standing things are fixed where they stand (loaders disagree on floating joints)",
-            "no floor, no contact exclusions, no surface friction and no joint armature (URDF cannot express them)",
+            "no floor, no contact exclusions, no surface friction, no joint armature, no stays: flaps sink when let go "
+            "(URDF cannot express them)",
             "SAPIEN's loader drops the friction, effort and velocity of joints: set them as README.txt says",
             "where each number comes from: see manifest.json",
         ),

@@ -189,7 +189,7 @@ def _write_object(stage: Any, path: str, bodies: Sequence[Body], looks: dict[str
 
 
 def _write_body(stage: Any, path: str, body: Body, looks: dict[str, Any], root: str, *, dynamic: bool) -> None:
-    from pxr import Gf, UsdGeom, UsdPhysics
+    from pxr import Gf, Sdf, UsdGeom, UsdPhysics
 
     xform = UsdGeom.Xform.Define(stage, path)
     _place(xform, body.world_from_body)
@@ -197,6 +197,9 @@ def _write_body(stage: Any, path: str, body: Body, looks: dict[str, Any], root: 
     _label(xform.GetPrim(), part=[labels.part], disposition=labels.disposition)
     if dynamic:
         UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim())
+    if body.joint is not None and body.joint.has_stay:
+        xform.GetPrim().AddAppliedSchema("PhysxRigidBodyAPI")
+        xform.GetPrim().CreateAttribute("physxRigidBody:disableGravity", Sdf.ValueTypeNames.Bool, custom=False).Set(True)
     inertial = body.link.inertial
     moments, axes = _principal(inertial.inertia)
     mass = UsdPhysics.MassAPI.Apply(xform.GetPrim())

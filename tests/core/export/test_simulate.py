@@ -15,6 +15,8 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.scene import ArticulatedScene, Box, SceneObject
 from tests.core.export.conftest import write_folder
 from tests.core.export.kitchen import bottle, cabinet, counter, double_door, drawer, kitchen
+from tests.core.synthesize.kitchen_units import Handle, Unit
+from tests.core.synthesize.test_build_scene import built
 
 DEPTH_TOLERANCE_M = 5e-4
 
@@ -44,6 +46,23 @@ def test_the_good_kitchen_opens_fully_without_penetration(tmp_path: Path) -> Non
     assert result.rest_penetration_m == 0.0
     assert result.most_drift_m < 5e-4  # the bottle settles through a tenth of a millimetre
     assert result.realtime_factor > 1.0
+
+
+def test_a_wide_flap_opens_under_a_hands_force_and_stays_where_it_is_let_go(tmp_path: Path) -> None:
+    """Gas stays carry such leaves: at 10 kg, gravity alone would stop the hand at 64 % of its travel."""
+    unit = Unit("flap", "wall_cabinet", (0, 0, 1.8), (1.0, 0.35, 0.86), handle=Handle(0.0, -0.38, vertical=False))
+    scene = write_folder(built(unit), tmp_path / "b") / "scene.xml"
+    result = simulate(scene)
+    assert [joint.travel_reached for joint in result.joints] == [1.0]
+    assert result.findings == ()
+    model = compiled(scene)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("ajar").id)
+    ajar = data.qpos.copy()
+    mujoco.mj_step(model, data, nstep=round(1.0 / model.opt.timestep))
+    np.testing.assert_allclose(data.qpos, ajar, atol=1e-3)
+    assert "<gravity>false</gravity>" in (scene.parent / "scene.sdf").read_text()
+    assert "bool physxRigidBody:disableGravity = 1" in (scene.parent / "assets/flap/flap.usda").read_text()
 
 
 def test_a_scene_with_undecodable_names_is_one_compile_finding(tmp_path: Path) -> None:
