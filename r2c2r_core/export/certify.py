@@ -138,14 +138,13 @@ def _closed_openings(things: tuple[ThingResult, ...]) -> tuple[Finding, ...]:
 
 def _far_colliders(fits: tuple[ColliderFit, ...]) -> tuple[Finding, ...]:
     return tuple(
-        finding(
-            "collider-far",
-            fit.link,
-            f"5 % of what is drawn lies over {1000 * fit.drawn_to_collider.p95_m:.0f} mm from its colliders, "
-            f"5 % of them over {1000 * fit.collider_to_drawn.p95_m:.0f} mm from what is drawn",
-        )
+        finding("collider-far", fit.link, f"5 % of {what} is more than {1000 * gap.p95_m:.0f} mm from {other}")
         for fit in fits
-        if max(fit.drawn_to_collider.p95_m, fit.collider_to_drawn.p95_m) > FAR_COLLIDER_M
+        for what, gap, other in (
+            ("its visible surface", fit.drawn_to_collider, "every collider: a hand passes through it"),
+            ("its colliders' surface", fit.collider_to_drawn, "all that is visible: a hand stops before it"),
+        )
+        if gap.p95_m > FAR_COLLIDER_M
     )
 
 

@@ -14,6 +14,7 @@ from r2c2r_core.model.capture import Frame, Room
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.rectangle import TOWARDS, Rectangle3
 from r2c2r_core.model.track import FrontHandle, FrontPanel
+from r2c2r_core.segment.fronts.certainty import Params as CertaintyParams
 from r2c2r_core.segment.fronts.certainty import edges_right
 from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
@@ -412,7 +413,8 @@ def edge_strengths(front: Front) -> tuple[float, ...]:
 
 def seam_inside(front: Front) -> float:
     """Probability of the likeliest uncut seam inside a panel."""
-    return probability(LineField(front.run.odds, front.run.grid.cell_m).best_uncut(front.cell, tuned(Params).border_m))
+    field, faintest = LineField(front.run.odds, front.run.grid.cell_m), tuned(CertaintyParams).faintest
+    return probability(field.best_uncut(front.cell, tuned(Params).border_m, faintest))
 
 
 _SIDE_EDGES: dict[HingeSide, tuple[int, int]] = {"left": (0, 3), "right": (1, 2), "bottom": (2, 3), "top": (0, 1)}

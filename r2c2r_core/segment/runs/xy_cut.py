@@ -217,15 +217,19 @@ class LineField:
         found = self.likeliest(cell, axis, position - STEP, position + STEP)
         return found is not None and found[1] > self.params.possible
 
-    def best_uncut(self, cell: Cell, inset_m: float) -> float:
-        """Log-odds, with sizes and handles, of the likeliest line at least `inset_m` within a cell; -inf where none fits."""
+    def best_uncut(self, cell: Cell, inset_m: float, faintest: float) -> float:
+        """Log-odds, with sizes and handles, of the likeliest possible line at least `inset_m` within a cell; -inf without one.
+
+        Its faintest part counts (that quantile): a seam runs from edge to edge, the inner edge of a frame ends at rails.
+        """
         inset, best = inset_m / self.cell_m, -np.inf
         for axis in (0, 1):
             low, high = across(cell, axis)
             start, stop = round(low / STEP + inset), min(round(high / STEP - inset), self.odds[axis].shape[1])
             paths = self._paths(cell, axis, start, stop)
             if paths is not None:
-                best = max(best, float((paths.odds.mean(axis=0) + self._prior(cell, axis, start, stop)).max()))
+                odds = np.quantile(paths.odds, faintest, axis=0) + self._prior(cell, axis, start, stop)
+                best = max(best, float(odds[self._unbroken(cell, axis, paths)].max(initial=-np.inf)))
         return best
 
     def _best(self, cell: Cell, axis: int) -> Line | None:

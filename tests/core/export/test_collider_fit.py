@@ -1,5 +1,6 @@
 """Distance between a link's collider and its visual mesh, for known offsets."""
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,23 @@ def test_the_certificate_warns_of_a_collider_far_from_its_visual(tmp_path: Path)
     found = [f for f in certify(folder).findings if f.rule == "collider-far"]
     assert {f.where for f in found} == {"bottle_1_body"}
     assert {f.severity for f in found} == {"warning"}
+
+
+def test_only_the_direction_in_which_a_collider_is_far_is_reported(tmp_path: Path) -> None:
+    """A second collider in the air before a door: all that is drawn still has its own."""
+    folder = write_folder(kitchen(), tmp_path / "kitchen")
+    path = folder / "scene.urdf"
+    tree = ET.parse(path)
+    link = tree.find("./link[@name='cabinet_1_door']")
+    assert link is not None
+    second = ET.SubElement(link, "collision", name="second")
+    ET.SubElement(second, "origin", xyz="0.25 -0.3 0.3", rpy="0 0 0")
+    ET.SubElement(ET.SubElement(second, "geometry"), "box", size="0.3 0.02 0.3")
+    tree.write(path)
+    (found,) = [f for f in certify(folder).findings if f.rule == "collider-far"]
+    assert found.where == "cabinet_1_door"
+    assert found.message.startswith("5 % of its colliders' surface is more than ")
+    assert found.message.endswith("mm from all that is visible: a hand stops before it")
 
 
 def _shifted(line: str, metres: float) -> str:

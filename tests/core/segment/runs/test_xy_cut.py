@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from r2c2r_core.calibration import probability
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
@@ -87,6 +88,23 @@ def test_a_narrow_stile_with_the_handle_is_not_cut_off() -> None:
     assert len(cut_panels(odds(200, 288, line, [], sure=1.0, handles=[(188, 60)]), whole, CELL_M)) == 1
     pull_out = [(140, 0, 288)]  # 15 cm wide
     assert len(cut_panels(odds(200, 288, pull_out, [], sure=3.5, handles=[(170, 60)]), whole, CELL_M)) == 2
+
+
+def uncut(seen: PanelOdds) -> float:
+    """Probability of a seam left inside a front of 60 x 72 cm."""
+    return probability(LineField(seen, CELL_M).best_uncut(Cell(0, 0, 240, 288), 0.035, 0.1))
+
+
+def test_the_inner_edge_of_a_panels_frame_is_hardly_a_seam() -> None:
+    """It ends at the rails; in the sample kitchens doors with a frame were said to hold a seam with 45 %."""
+    frame = odds(240, 288, [(212, 32, 256)], [], sure=2.9)
+    frame.upright[:16, 106] = frame.upright[128:, 106] = -1.5
+    assert uncut(frame) < 0.05
+
+
+def test_two_handles_alone_are_no_seam() -> None:
+    assert uncut(odds(240, 288, [], [], handles=[(120, 30), (120, 240)])) == 0.0
+    assert uncut(odds(240, 288, [], [(144, 0, 240)], sure=-0.5, handles=[(120, 30), (120, 240)])) > 0.5
 
 
 @pytest.mark.parametrize("grid", [Cell(0, 0, 8, 400), Cell(0, 0, 400, 8), Cell(0, 0, 2, 2), Cell(0, 0, 1, 1)])
