@@ -376,8 +376,8 @@ def _limits(
 
 
 def _open_ended(joint: Joint) -> str | None:
-    """Warning that a joint was observed open to a state that need not be its limit."""
-    if joint.motion is None or joint.sources["limits"] == "person":
+    """Warning that a joint was observed open beyond its category's limit, to a state that need not be its own."""
+    if joint.motion is None or joint.sources["limits"] != "at_least":
         return None
     seen = joint.motion.largest
     amount = f"{seen:.2f} m" if joint.type == "prismatic" else f"{np.degrees(seen):.0f} deg"

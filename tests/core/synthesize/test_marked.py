@@ -86,6 +86,14 @@ def test_marks_on_a_built_object_give_the_same_result_as_a_run() -> None:
     assert values(named.joints[0].motion) == values(run.joints[0].motion)
 
 
+def test_a_mark_on_one_door_of_a_pair_opens_both_as_far_as_a_run_does() -> None:
+    marks = {"left_door": {30: 2.0}}
+    unit = Unit("a", "double_door_cabinet", (0, 0, 0.45), (0.8, 0.58, 0.72))
+    run = built(unit, overrides=Overrides(objects={"a": ObjectOverride(states=marks)})).objects[0]
+    for item in (run, remarked(built(unit).objects[0], marks, ())):
+        assert [(joint.upper, joint.sources["limits"]) for joint in item.joints] == [(2.0, "at_least")] * 2
+
+
 def test_marks_alone_define_the_motion_of_an_unmeasured_joint() -> None:
     item = built(
         Unit("a", "cabinet", (0, 0, 0.45), (0.6, 0.58, 0.72)),
