@@ -94,8 +94,8 @@ def free_travel(
     closed = np.zeros((len(moving.centres), len(still)))  # overlaps of the closed leaf: an edge's error blocks nothing
     touched = None
     for _, i, j, depth in _overlaps([moving], obstacles, still):
-        closed[i, j] = min(depth, params.edge_m)
-        touched = objects[obstacles.owner[still[j]]].name if depth > params.touch_m else touched
+        if depth > params.touch_m:
+            closed[i, j], touched = min(depth, params.edge_m), objects[obstacles.owner[still[j]]].name
     near_walls = [wall for wall, depth in zip(walls, depths_in(walls, corners), strict=True) if depth < params.behind_m]
     before = np.maximum(depths_in(near_walls, corners), 0.0)
     lowest_m = floor_height([corners, _corners(obstacles.boxes)]) - params.touch_m
