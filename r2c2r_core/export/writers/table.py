@@ -75,7 +75,7 @@ FORMATS: tuple[Format, ...] = (
         write=write_usd,
         loses=(
             "fixtures without a joint are static: their mass is written, but engines ignore it",
-            "dry friction and maximum velocity of joints are PhysX attributes; other engines read damping and effort only",
+            "dry friction and maximum velocity of joints, and stays of flaps, are PhysX attributes; other engines lack them",
             "where each number comes from: see manifest.json",
         ),
         others=("scene.usdz",),
