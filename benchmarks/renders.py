@@ -1,4 +1,4 @@
-"""MuJoCo renderings of a bundle for visual inspection: closed, all joints open, and each joint open alone.
+"""MuJoCo renderings of a bundle for visual inspection: closed, ajar, open, and each joint open alone.
 
     MUJOCO_GL=egl python benchmarks/renders.py BUNDLE.zip OUT.png [--size 960x540]
 
@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 
 from r2c2r_core.export.archive import opened_bundle
-from r2c2r_core.export.contacts import joint_names
 from r2c2r_core.export.writers.stand import CAMERA
 
 _COLUMNS = 3
@@ -39,18 +38,14 @@ def sheet(mjcf: Path, width: int, height: int) -> np.ndarray:
 
     model = mujoco.MjModel.from_xml_path(str(mjcf))
     data = mujoco.MjData(model)
-    names = joint_names(model)
-    poses = [("closed", []), ("all open", names), *((name, [name]) for name in names)]
     pictures = []
     with mujoco.Renderer(model, height, width) as renderer:
-        for caption, opened in poses:
-            data.qpos[:] = model.qpos0
-            for name in opened:
-                data.qpos[model.joint(name).qposadr[0]] = model.joint(name).range[1]
+        for number in range(model.nkey):
+            mujoco.mj_resetDataKeyframe(model, data, number)
             mujoco.mj_forward(model, data)
             renderer.update_scene(data, camera=CAMERA, scene_option=_visuals_only())
             picture = renderer.render().copy()
-            cv2.putText(picture, caption, (16, 34), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (60, 64, 72), 2, cv2.LINE_AA)
+            cv2.putText(picture, model.key(number).name, (16, 34), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (60, 64, 72), 2, cv2.LINE_AA)
             pictures.append(picture)
     pictures += [np.full_like(pictures[0], 255)] * (-len(pictures) % _COLUMNS)
     rows = [np.hstack(pictures[k : k + _COLUMNS]) for k in range(0, len(pictures), _COLUMNS)]

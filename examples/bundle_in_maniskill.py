@@ -1,9 +1,10 @@
-"""Open every joint of a bundle in a ManiSkill scene: python examples/bundle_in_maniskill.py FOLDER (an unpacked bundle)
+"""Open the joints of a bundle in a ManiSkill scene: python examples/bundle_in_maniskill.py FOLDER (an unpacked bundle)
 
 Needs `pip install mani_skill`, and a Vulkan device for rendering. SAPIEN's loader drops joint friction, so it is set here.
 """
 
 import importlib.util
+import json
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -48,7 +49,8 @@ def main(folder: str) -> None:
     env = gymnasium.make("Kitchen-v0", obs_mode="state", render_mode=None)
     env.reset(seed=0)
     kitchen = env.unwrapped.kitchen
-    kitchen.set_qpos(kitchen.qlimits[..., 1])
+    opened = json.loads((urdf.parent / "manifest.json").read_text())["states"]["open"]
+    kitchen.set_qpos(np.array([[opened[joint.name] for joint in kitchen.active_joints]]))
     for _ in range(10):
         env.step(env.action_space.sample())
     for joint, position in zip(kitchen.active_joints, kitchen.qpos[0].tolist(), strict=True):

@@ -4,6 +4,7 @@ Needs `pip install robosuite`. Its models are MJCF, like the bundle's scene, so 
 """
 
 import importlib.util
+import json
 import sys
 from pathlib import Path
 
@@ -29,10 +30,8 @@ def main(folder: str) -> None:
     world.merge(MujocoXML(str(scene)))
     model = world.get_model(mode="mujoco")
     data = mujoco.MjData(model)
-    for joint in range(model.njnt):
-        name = model.joint(joint).name
-        if not name.startswith(("robot", "gripper")) and model.jnt_limited[joint]:
-            data.qpos[model.jnt_qposadr[joint]] = model.jnt_range[joint, 1]
+    for name, position in json.loads((scene.parent / "manifest.json").read_text())["states"]["open"].items():
+        data.joint(name).qpos[0] = position
     for _ in range(100):
         mujoco.mj_step(model, data)
     for joint in range(model.njnt):

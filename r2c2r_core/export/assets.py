@@ -50,7 +50,7 @@ def _asset(plan: Plan, object_name: str) -> Plan:
         for h in plan.handles
         if h.link in links
     )
-    return Plan(name=object_name, bodies=bodies, floor_z_m=0.0, handles=handles)
+    return Plan(name=object_name, bodies=bodies, floor_z_m=0.0, handles=handles, conflicts=plan.conflicts)
 
 
 def _in_asset(body: Body, asset_from_world: Rigid3, *, is_base: bool) -> Body:

@@ -36,6 +36,11 @@ def touches(model: Any, positions: Mapping[str, float], scratch: Any | None = No
     mujoco.mj_resetData(model, data)
     for name, position in positions.items():
         data.qpos[model.joint(name).qposadr[0]] = position
+    return overlapping(model, data)
+
+
+def overlapping(model: Any, data: Any) -> list[Touch]:
+    """Overlapping body pairs in the state of `data`, deepest first."""
     find_contacts(model, data)
     deepest: dict[tuple[int, int], float] = {}
     for contact in data.contact[: data.ncon]:

@@ -14,7 +14,7 @@ from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.randomize import Range
 from r2c2r_core.export.scan_fit import ScanFit
 from r2c2r_core.export.seen import Seen
-from r2c2r_core.export.states import STATES, position
+from r2c2r_core.export.states import states_of
 from r2c2r_core.model.handle import Handle
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.model.motion import JointMotion
@@ -52,8 +52,8 @@ def manifest_of(
             for item in reconstruction.scene.objects
         ],
         "states": {
-            name: {body.joint_name: _plain(position(body.joint, name)) for body in plan.bodies if body.joint is not None}
-            for name in STATES
+            name: {body.joint_name: _plain(state.position(body)) for body in plan.bodies if body.joint is not None}
+            for name, state in states_of(plan).items()
         },
         "contradictions": [
             {"rule": found.rule, "objects": list(found.objects), "message": found.message, "mend": found.mend}

@@ -6,7 +6,8 @@ if they lie elsewhere in the scene, because URDF and MJCF turn a body about its 
 
 import hashlib
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -64,6 +65,8 @@ class Plan:
     bodies: tuple[Body, ...]
     floor_z_m: float
     handles: tuple[Handle, ...] = ()  # of its joints, set by `with_handles`
+    conflicts: Mapping[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
+    """By state: joints, or a joint and a free body, that overlap when open in it; set by the export's stage."""
 
     def of(self, object_name: str) -> tuple[Body, ...]:
         """The bodies of one object, its base first."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Image, Points, Vector3
 from r2c2r_core.export.plan import WORLD, Body, Plan, facing
+from r2c2r_core.export.states import states_of
 from r2c2r_core.export.writers.meshes import box_mesh, png_bytes
 from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, pixel_rays
 from r2c2r_core.geometry.raster import rasterize
@@ -43,7 +44,7 @@ def preview_png(plan: Plan, seen_from: Vector3 | None, width_px: int = 1600) -> 
 
     `seen_from` is a world position from which the scan was filmed.
     """
-    closed, opened = scene_soup(plan, 0.0), scene_soup(plan, OPEN_FRACTION)
+    closed, opened = scene_soup(plan, 0.0), scene_soup(plan, OPEN_FRACTION, states_of(plan)["open"].joints)
     points, direction = np.concatenate([closed.corners, opened.corners]), _view_from(plan, seen_from)
     across, high = np.ptp(points @ _view_axes(direction).T, axis=0)[:2]
     stacked = across > _LONG * high
@@ -57,10 +58,10 @@ def preview_png(plan: Plan, seen_from: Vector3 | None, width_px: int = 1600) -> 
     return png_bytes(np.concatenate(pictures, axis=0 if stacked else 1))
 
 
-def scene_soup(plan: Plan, fraction: float) -> Soup:
-    """The triangles of the scene with every joint at `fraction` of its range."""
+def scene_soup(plan: Plan, fraction: float, joints: Collection[str] | None = None) -> Soup:
+    """The triangles of the scene with these joints (None: all) at `fraction` of their range, the others closed."""
     corners, uvs, ids, textures = [], [], [], []
-    poses = poses_at(plan, fraction)
+    poses = poses_at(plan, fraction, joints)
     for number, body in enumerate(plan.bodies, start=1):
         visual = body.link.visual
         vertices, faces = (visual.vertices, visual.faces) if visual is not None else box_mesh(body)
@@ -82,11 +83,12 @@ def scene_soup(plan: Plan, fraction: float) -> Soup:
     )
 
 
-def poses_at(plan: Plan, fraction: float) -> dict[str, Rigid3]:
-    """world_from_body of every body with every joint at `fraction` of its range."""
+def poses_at(plan: Plan, fraction: float, joints: Collection[str] | None = None) -> dict[str, Rigid3]:
+    """world_from_body of every body with these joints (None: all) at `fraction` of their range, the others closed."""
     poses = {WORLD: Rigid3()}
     for body in plan.bodies:
-        poses[body.name] = poses[body.parent] @ body.parent_from_body @ _motion(body, fraction)
+        share = fraction if joints is None or body.joint_name in joints else 0.0
+        poses[body.name] = poses[body.parent] @ body.parent_from_body @ _motion(body, share)
     return poses
 
 

@@ -39,9 +39,10 @@ _RECIPES = (
 import mujoco
 model = mujoco.MjModel.from_xml_path("scene.xml")
 data = mujoco.MjData(model)
-mujoco.mj_resetDataKeyframe(model, data, model.key("open").id)  # or closed, ajar
+mujoco.mj_resetDataKeyframe(model, data, model.key("open").id)  # or closed, ajar, JOINT_open
 mujoco.mj_step(model, data)""",
-        note="To look at it: python -m mujoco.viewer --mjcf=scene.xml",
+        note="In open, joints that would overlap another open one stay closed; JOINT_open opens one joint alone, by its name. "
+        "To look at it: python -m mujoco.viewer --mjcf=scene.xml",
         loader="MuJoCo (MJCF)",
     ),
     Recipe(

@@ -31,7 +31,9 @@ from r2c2r_core.export.rules.table import UNSAFE
 from r2c2r_core.export.scan_fit import ScanFit, scan_fits
 from r2c2r_core.export.seal import check_seal, checksums
 from r2c2r_core.export.seen import Seen, seen_sides
+from r2c2r_core.export.simulate import compiled
 from r2c2r_core.export.support import supported
+from r2c2r_core.export.together import conflicts
 from r2c2r_core.export.writers.meshes import write_body
 from r2c2r_core.export.writers.table import formats, write_formats
 from r2c2r_core.failing import apart
@@ -96,10 +98,9 @@ def write_bundle(
         reconstruction = replace(
             reconstruction, scene=_without(reconstruction.scene, lost), failures=reconstruction.failures | lost
         )
-        tried = [entry for entry in formats() if entry.file == SCENE]
-        write_formats(plan, folder, tried)  # first, so that the gripper trials can start
+        plan = write_scene(plan, folder)  # first, as the gripper trials need it
         gripped = begin_gripping(folder, pool or Pool(1), progress.part(0.7, 0.9)) if config.gripper else None
-        write_formats(plan, folder, [entry for entry in formats() if entry not in tried], progress=progress.part(0.05, 0.1))
+        write_formats(plan, folder, [entry for entry in formats() if entry.file != SCENE], progress=progress.part(0.05, 0.1))
         fits, seen, pictures = dict[str, ScanFit](), dict[str, Seen](), dict[str, str]()
         with apart("export", "measuring the fit to the scan", {}):
             looks = looks_of(reconstruction.capture, plan)
@@ -132,6 +133,17 @@ def write_bundle(
             replace_folder(folder, destination.with_suffix(""))
     progress.at(1.0, "certified bundle" if certificate.passed else "bundle written, its certificate failed")
     return replace(certificate, left_out=lost)
+
+
+def write_scene(plan: Plan, folder: Path) -> Plan:
+    """Write scene.xml; returns the plan with the joints that cannot be open at once, which takes a first one to find."""
+    entries = [entry for entry in formats() if entry.file == SCENE]
+    write_formats(plan, folder, entries)
+    if (folder / SCENE).is_file():
+        with apart("export", "which joints can be open at once", {}):
+            plan = replace(plan, conflicts=conflicts(compiled(folder / SCENE, strict=True, keep_free=True)))
+            write_formats(plan, folder, entries)
+    return plan
 
 
 def _with_meshes(scene: ArticulatedScene, folder: Path, texture_max_px: int) -> tuple[Plan, dict[str, str]]:

@@ -2,13 +2,23 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 
-from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, joint_names, movers_of, touches
+from r2c2r_core.export.contacts import (
+    ALLOWED_PENETRATION_M,
+    body_name,
+    carried_by,
+    free_bodies,
+    joint_names,
+    movers_of,
+    overlapping,
+    touches,
+)
 from r2c2r_core.export.rules.table import finding
+from r2c2r_core.export.states import SHARES
 from r2c2r_core.model.report import Blocker, Finding
 
 _POSITIONS = 6  # per joint: every 15 to 20 degrees
@@ -51,6 +61,27 @@ def meetings(model: Any) -> list[Meeting]:
         if overlaps:
             a, b, depth = zip(*overlaps, strict=True)
             found.append(Meeting(joints=(first, second), depth_m=max(depth), first_at=(min(a), min(b))))
+    return found
+
+
+def conflicts(model: Any) -> dict[str, tuple[tuple[str, str], ...]]:
+    """By state: pairs of joints, or of a joint and a free body, that overlap in its keyframe, with what they carry."""
+    import mujoco
+
+    movers = {name: movers_of(model, name) for name in joint_names(model)}
+    movers = {name: bodies | carried_by(model, bodies) for name, bodies in movers.items()}
+    free = free_bodies(model).difference(*movers.values())
+
+    def names_of(body: int) -> set[str]:
+        return {body_name(model, body)} if body in free else {name for name, bodies in movers.items() if body in bodies}
+
+    found, data = {}, mujoco.MjData(model)
+    for state in SHARES if movers else ():
+        mujoco.mj_resetDataKeyframe(model, data, model.key(state).id)
+        deep = [touch.bodies for touch in overlapping(model, data) if touch.depth_m > ALLOWED_PENETRATION_M]
+        ends = [(names_of(a), names_of(b)) for a, b in deep if not free >= {a, b}]
+        pairs = {(min(pair), max(pair)) for some, others in ends for pair in product(some - others, others - some)}
+        found[state] = tuple(sorted(pairs))
     return found
 
 

@@ -307,7 +307,9 @@ class Manifest(Document):
     world_from_capture: _Pose = Field(description="4x4: the levelled world from the recording's own")
     objects: list[ManifestObject] = Field(description="what the scene holds")
     states: dict[str, dict[str, float]] = Field(
-        default_factory=dict, description="where each joint stands in closed, ajar and open: keyframes of scene.xml"
+        default_factory=dict,
+        description="where each joint stands in closed, ajar, open (those that can be open at once) and JOINT_open: the "
+        "keyframes of scene.xml",
     )
     contradictions: list[ManifestContradiction] = Field(
         default_factory=list, description="what the segmenter's masks, sizes and places contradict"

@@ -1,4 +1,4 @@
-"""scene.glb: the scene for web viewers, closed, with joints as glTF animations: one clip per joint, and `all`.
+"""scene.glb: the scene for web viewers, closed, with joints as glTF animations: one clip per joint, and `open`.
 
 One node per link with the link's name (glTF 2.0). glTF is +Y up: the root node rotates the world. It has no joints: type,
 axis and limits are in the node's `extras`.
@@ -17,6 +17,7 @@ import numpy as np
 from r2c2r_core.export.assets import asset_file, assets_of
 from r2c2r_core.export.labels import labels_of, labels_of_handle
 from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.states import states_of
 from r2c2r_core.export.writers.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.handle import Handle
@@ -156,18 +157,19 @@ def _textured(gltf: _Gltf, file: str) -> int:
 
 
 def _clips(plan: Plan, gltf: _Gltf, nodes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
-    """One clip of all joints, then one for each joint."""
+    """One clip of the joints that can be open at once, then one for each joint."""
     moving = [body for body in plan.bodies if body.joint is not None]
     if not moving:
         return []
     times = gltf.accessor(np.array([0.0, SECONDS / 2, SECONDS]), "SCALAR", bounds=True)
     clips = [_clip(body, gltf, times, nodes) for body in moving]
-    everything = {
-        "name": "all",
-        "samplers": [clip["samplers"][0] for clip in clips],
-        "channels": [clip["channels"][0] | {"sampler": number} for number, clip in enumerate(clips)],
+    at_once = [clip for clip in clips if clip["name"] in states_of(plan)["open"].joints]
+    opened = {
+        "name": "open",
+        "samplers": [clip["samplers"][0] for clip in at_once],
+        "channels": [clip["channels"][0] | {"sampler": number} for number, clip in enumerate(at_once)],
     }
-    return [everything, *clips]
+    return [opened, *clips]
 
 
 def _clip(body: Body, gltf: _Gltf, times: int, nodes: dict[str, dict[str, Any]]) -> dict[str, Any]:

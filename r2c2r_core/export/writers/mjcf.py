@@ -11,7 +11,7 @@ from r2c2r_core.export.contacts import CARRIED_BY
 from r2c2r_core.export.labels import labels_of, labels_of_handle
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.preview import poses_at
-from r2c2r_core.export.states import STATES, position
+from r2c2r_core.export.states import State, states_of
 from r2c2r_core.export.writers.stand import add_surroundings, add_view
 from r2c2r_core.export.writers.text import numbers, quat_wxyz_of, words_of
 from r2c2r_core.geometry.transforms import Rigid3
@@ -87,18 +87,18 @@ def _add_states(root: ET.Element, worldbody: ET.Element, plan: Plan) -> None:
     """Add a keyframe for each state: positions in MuJoCo's body order, which is the document's."""
     bodies = [plan.body(element.attrib["name"]) for element in worldbody.iter("body")]
     keyframe = ET.SubElement(root, "keyframe")
-    for state in STATES:
-        poses = poses_at(plan, STATES[state])
+    for name, state in states_of(plan).items():
+        poses = poses_at(plan, state.share, state.joints)
         qpos = [value for body in bodies for value in _positions(body, state, poses[body.name])]
         if qpos:
-            ET.SubElement(keyframe, "key", name=state, qpos=numbers(qpos))
+            ET.SubElement(keyframe, "key", name=name, qpos=numbers(qpos))
 
 
-def _positions(body: Body, state: str, world_from_body: Rigid3) -> list[float]:
+def _positions(body: Body, state: State, world_from_body: Rigid3) -> list[float]:
     """Generalised positions of a body: its joint's, or its pose if it is free."""
     if body.free:
         return [*world_from_body.translation, *quat_wxyz_of(world_from_body.rotation)]
-    return [] if body.joint is None else [position(body.joint, state)]
+    return [] if body.joint is None else [state.position(body)]
 
 
 def _add_meaning(root: ET.Element, plan: Plan) -> None:

@@ -13,6 +13,7 @@ import r2c2r_core.export.probes as probes
 from r2c2r_core.export.handles import with_handles
 from r2c2r_core.export.manifest import manifest_of
 from r2c2r_core.export.plan import Plan, plan_bundle
+from r2c2r_core.export.stage import write_scene
 from r2c2r_core.export.support import supported
 from r2c2r_core.export.writers.meshes import write_body
 from r2c2r_core.export.writers.table import formats, write_formats
@@ -35,7 +36,8 @@ def write_folder(scene: ArticulatedScene, folder: Path) -> Path:
     folder.mkdir(parents=True)
     plan = with_handles(supported(plan_bundle(scene)))
     write_meshes(plan, folder)
-    write_formats(plan, folder, formats())
+    plan = write_scene(plan, folder)
+    write_formats(plan, folder, [entry for entry in formats() if entry.file != "scene.xml"])
     (folder / "manifest.json").write_text(json.dumps(manifest_of(reconstruction(scene), plan, None)))
     (folder / "README.txt").write_text("read me")
     (folder / "preview.png").write_bytes(b"not looked at")

@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 from r2c2r_core.export import randomize
+from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, overlapping
+from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.materials import SURFACE_FRICTION
 from r2c2r_core.model.placement import Spread
+from r2c2r_core.model.scene import ArticulatedScene
 from r2c2r_core.schema.manifest import Manifest
+from tests.core.export.conftest import write_folder
 from tests.core.export.kitchen import bottle, cabinet, drawer, reconstruction
 from tests.core.motions import motion
 
@@ -27,10 +31,51 @@ def test_mujoco_keyframes_match_the_manifests_joint_states(good_folder: Path, st
     mujoco.mj_forward(model, data)
     mujoco.mj_forward(model, still)
     assert len(said) == 4
+    shut = {"double_1_left_hinge"} if state == "open" else set()  # the drawer beside it crosses its way
     for joint, position in said.items():
+        share = 0.0 if joint in shut else {"closed": 0, "ajar": 0.15, "open": 1}[state]
         assert float(data.joint(joint).qpos[0]) == pytest.approx(position, abs=1e-8)
-        assert position == pytest.approx({"closed": 0, "ajar": 0.15, "open": 1}[state] * model.joint(joint).range[1])
+        assert position == pytest.approx(share * model.joint(joint).range[1])
     np.testing.assert_allclose(data.body("bottle_1_body").xpos, still.body("bottle_1_body").xpos, atol=1e-8)
+
+
+def test_no_parts_overlap_or_move_in_any_keyframe(good_folder: Path) -> None:
+    """The door beside the drawer opens by more than 90 degrees, into its way."""
+    model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+    assert deepest_m(model) < ALLOWED_PENETRATION_M
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("open").id)
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+    assert np.abs(data.qpos - model.key("open").qpos).max() < 1e-3  # rad or m
+
+
+def test_a_door_that_hits_a_free_object_stays_closed_in_the_states(tmp_path: Path) -> None:
+    obstacle = bottle("b", x=-0.36, bottom_z=0.0005)
+    before = Rigid3(translation=obstacle.world_from_object.translation + np.array([0.0, -0.5, 0.0]))
+    obstacle = replace(obstacle, world_from_object=before)
+    scene = ArticulatedScene(name="t", objects=(cabinet("c"), obstacle, drawer("d", x=2.0)), layout_moves_m={}, warnings=())
+    model = mujoco.MjModel.from_xml_path(str(write_folder(scene, tmp_path / "b") / "scene.xml"))
+    assert deepest_m(model) < ALLOWED_PENETRATION_M
+    assert {model.key(number).name for number in range(model.nkey)} == {"closed", "ajar", "open", "d_slide_open"}
+
+
+def deepest_m(model: mujoco.MjModel) -> float:
+    """Deepest overlap of the model's keyframes."""
+    data, depths = mujoco.MjData(model), [0.0]
+    for number in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, number)
+        depths += [touch.depth_m for touch in overlapping(model, data)]
+    return max(depths)
+
+
+def test_each_joint_has_a_keyframe_that_opens_it_alone(good_folder: Path) -> None:
+    said = json.loads((good_folder / "manifest.json").read_text())["states"]
+    model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+    assert {model.key(number).name for number in range(model.nkey)} == set(said)
+    for joint in said["closed"]:
+        assert {name for name, position in said[f"{joint}_open"].items() if position} == {joint}
+        assert said[f"{joint}_open"][joint] == pytest.approx(model.joint(joint).range[1])
 
 
 def test_an_asset_has_an_open_keyframe_for_its_own_joint(good_folder: Path) -> None:

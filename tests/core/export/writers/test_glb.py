@@ -55,7 +55,7 @@ def values_of(document: dict, binary: bytes, accessor: int) -> np.ndarray:
     return np.frombuffer(binary, "<f4", entry["count"] * width, view["byteOffset"]).reshape(-1, width)
 
 
-def test_the_glb_has_an_opening_animation_per_joint_and_one_for_all(tmp_path: Path) -> None:
+def test_the_glb_has_an_opening_animation_per_joint_and_one_for_those_open_at_once(tmp_path: Path) -> None:
     plan = plan_bundle(kitchen())
     write_meshes(plan, tmp_path)
     write_glb(plan, tmp_path / "scene.glb")
@@ -63,9 +63,9 @@ def test_the_glb_has_an_opening_animation_per_joint_and_one_for_all(tmp_path: Pa
     assert document["buffers"][0]["byteLength"] <= len(binary) < document["buffers"][0]["byteLength"] + 4
     clips = {clip["name"]: clip for clip in document["animations"]}
     moving = {body.joint_name: body for body in plan.bodies if body.joint is not None}
-    assert set(clips) == {"all", *moving}
-    assert len(clips["all"]["channels"]) == len(moving)
-    assert [channel["sampler"] for channel in clips["all"]["channels"]] == list(range(len(moving)))
+    assert set(clips) == {"open", *moving}
+    assert len(clips["open"]["channels"]) == len(moving)
+    assert [channel["sampler"] for channel in clips["open"]["channels"]] == list(range(len(moving)))
     opened = poses_at(plan, 1.0)
     for name, body in moving.items():
         sampler, channel = clips[name]["samplers"][0], clips[name]["channels"][0]
