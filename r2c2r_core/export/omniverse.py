@@ -6,6 +6,7 @@ from typing import Any
 from r2c2r_core.model.report import LoaderResult
 
 FALSE_ALARMS = {
+    "HI.004": "floor, light and camera are beside the default prim, so that a stage that references it keeps its own",
     "RB.007": "fixed parts have a mass in case somebody frees them; engines ignore a mass without a rigid body",
     "UsdAsciiPerformanceChecker": "the files are text so that they can be read and compared; a binary one is quicker to open",
     "VG.009": "it would save space: texture coordinates repeat",

@@ -102,10 +102,11 @@ scene.step()""",
         install="Isaac Sim 5, its own Python",
         language="python",
         code="""\
-from isaacsim.core.utils.stage import add_reference_to_stage
-add_reference_to_stage("scene.usda", "/World/Kitchen")""",
-        note="Or File > Open. Each fixture with joints is one articulation; the drives damp (stiffness 0): raise it to hold a "
-        "position. Joint friction is in PhysxJointAxisAPI (PhysX 5.6).",
+from isaacsim.core.utils.stage import open_stage
+open_stage("scene.usda")""",
+        note='Or File > Open. add_reference_to_stage("scene.usda", "/World/Kitchen") adds the objects to a stage with its own '
+        "floor, light and physics scene. Each fixture with joints is one articulation; the drives damp (stiffness 0): raise it "
+        "to hold a position. Joint friction is in PhysxJointAxisAPI (PhysX 5.6).",
         loader="NVIDIA asset validator",
     ),
     Recipe(
@@ -114,12 +115,27 @@ add_reference_to_stage("scene.usda", "/World/Kitchen")""",
         language="python",
         code="""\
 import isaaclab.sim as sim_utils
-from isaaclab.assets import AssetBaseCfg
+from isaaclab.actuators import ImplicitActuatorCfg
+from isaaclab.assets import ArticulationCfg, AssetBaseCfg
+from pxr import Usd, UsdPhysics
 kitchen = AssetBaseCfg(
     prim_path="{ENV_REGEX_NS}/Kitchen",
     spawn=sim_utils.UsdFileCfg(usd_path="scene.usda"),
-)""",
-        note="Each object alone, with its joints: assets/OBJECT/OBJECT.usda as ArticulationCfg.",
+)
+def unit(prim):
+    turn = prim.GetAttribute("xformOp:orient").Get()
+    position = tuple(prim.GetAttribute("xformOp:translate").Get())
+    return ArticulationCfg(
+        prim_path="{ENV_REGEX_NS}/Kitchen/" + prim.GetName(),
+        spawn=None,  # it comes with the kitchen
+        init_state=ArticulationCfg.InitialStateCfg(pos=position, rot=(turn.GetReal(), *turn.GetImaginary())),
+        actuators={"joints": ImplicitActuatorCfg(joint_names_expr=[".*"], stiffness=None, damping=None)},
+    )
+stage = Usd.Stage.Open("scene.usda")
+found = [prim for prim in stage.GetDefaultPrim().GetChildren() if prim.HasAPI(UsdPhysics.ArticulationRootAPI)]
+units = {prim.GetName(): unit(prim) for prim in found}""",
+        note="In the scene's configuration, list the kitchen before its units, and a floor and light of your own. One object "
+        "alone: assets/OBJECT/OBJECT.usda as ArticulationCfg. rot is w, x, y, z (Isaac Lab 2).",
         loader="NVIDIA asset validator",
     ),
     Recipe(

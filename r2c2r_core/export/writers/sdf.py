@@ -6,13 +6,17 @@ A base is fixed to the world by a joint; only free-standing objects have none an
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import numpy as np
+
 from r2c2r_core.export.assets import assets_of, world_from_asset
 from r2c2r_core.export.plan import WORLD, Body, Plan
+from r2c2r_core.export.writers.stand import AMBIENT, CAMERA, FOVY_DEG, PICTURE, SUN, SUNLIGHT, view_of
 from r2c2r_core.export.writers.text import numbers, rpy_of
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.materials import SURFACE_FRICTION
 
 _FLOOR_M = (20.0, 20.0, 0.1)
+_CAMERA_FROM_SENSOR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])  # a sensor looks along +X, +Z up
 
 
 def write_sdf(plan: Plan, path: Path) -> None:
@@ -24,7 +28,7 @@ def sdf_text(plan: Plan) -> str:
     """The SDF document."""
     root = ET.Element("sdf", version="1.9")
     world = ET.SubElement(root, "world", name=plan.name)
-    _add_floor(world, plan)
+    _add_surroundings(world, plan)
     plates = [body for body in plan.bodies if body.is_support]
     files = {body.name: body for body in plan.bodies}  # paths relative to the scene's folder, not the asset's
     for asset in assets_of(plan):
@@ -46,8 +50,15 @@ def _add_model(world: ET.Element, name: str, pose: Rigid3) -> ET.Element:
     return model
 
 
-def _add_floor(world: ET.Element, plan: Plan) -> None:
-    """Add the floor as a plate: Drake 1.51 crashes on a plane that precedes meshes."""
+def _add_surroundings(world: ET.Element, plan: Plan) -> None:
+    """Add light, and the floor with a camera. The floor is a plate: Drake 1.51 crashes on a plane that precedes meshes."""
+    view = view_of(plan)
+    ET.SubElement(ET.SubElement(world, "scene"), "ambient").text = numbers([*[AMBIENT] * 3, 1.0])
+    sun = ET.SubElement(world, "light", name=SUN, type="directional")
+    ET.SubElement(sun, "cast_shadows").text = "true"
+    ET.SubElement(sun, "diffuse").text = numbers([*[SUNLIGHT] * 3, 1.0])
+    ET.SubElement(sun, "specular").text = "0 0 0 1"
+    ET.SubElement(sun, "direction").text = numbers(-view.sun)
     model = ET.SubElement(world, "model", name="floor")
     ET.SubElement(model, "static").text = "true"
     ET.SubElement(model, "pose").text = f"0 0 {numbers(plan.floor_z_m - _FLOOR_M[2] / 2)} 0 0 0"
@@ -55,6 +66,15 @@ def _add_floor(world: ET.Element, plan: Plan) -> None:
     for kind in ("collision", "visual"):
         shape = ET.SubElement(link, kind, name=f"floor_{kind}")
         _add_box(shape, Rigid3(), _FLOOR_M)
+    sensor = ET.SubElement(link, "sensor", name=CAMERA, type="camera")
+    floor_from_world = Rigid3(translation=np.array([0.0, 0.0, _FLOOR_M[2] / 2 - plan.floor_z_m]))
+    _add_pose(sensor, floor_from_world @ view.world_from_camera @ Rigid3(_CAMERA_FROM_SENSOR))
+    camera = ET.SubElement(sensor, "camera")
+    slope = np.tan(np.radians(FOVY_DEG) / 2) * PICTURE[0] / PICTURE[1]
+    ET.SubElement(camera, "horizontal_fov").text = numbers(2 * np.arctan(slope))
+    image = ET.SubElement(camera, "image")
+    for key, pixels in zip(("width", "height"), PICTURE, strict=True):
+        ET.SubElement(image, key).text = str(pixels)
 
 
 def _add_link(model: ET.Element, body: Body, named: Body) -> None:

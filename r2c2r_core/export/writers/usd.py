@@ -1,11 +1,12 @@
 """scene.usda: USD with UsdPhysics, for Isaac Sim, Omniverse and other readers of USD; +Z up, metres, kilograms.
 
-The scene has gravity and the floor, and references a separate layer for each object, `assets/<object>/<object>.usda`;
-scene.usdz is all of it in one file. One articulation per object with joints, its root on the object's own prim
-(never on a body, never nested); bodies are siblings, joints beside them. A base is fixed to the object's prim and not to
-the world, so that it moves with the asset. UsdPhysics uses degrees: limits, damping and velocities of hinges are converted.
-Quantities that UsdPhysics lacks (dry friction, armature, maximum velocity) are in PhysX's schema PhysxJointAxisAPI, as plain
-attributes, so that no NVIDIA library is needed to write or to read them.
+The default prim holds the objects, each a reference to its own layer, `assets/<object>/<object>.usda`; gravity, floor, light
+and camera are beside it, so that a stage that references the scene keeps its own. scene.usdz is all of it in one file.
+One articulation per object with joints, its root on the object's own prim (never on a body, never nested); bodies are
+siblings, joints beside them. A base is fixed to the object's prim and not to the world, so that it moves with the asset.
+UsdPhysics uses degrees: limits, damping and velocities of hinges are converted. Quantities that UsdPhysics lacks (dry
+friction, armature, maximum velocity) are in PhysX's schema PhysxJointAxisAPI, as plain attributes, so that no NVIDIA library
+is needed to write or to read them.
 """
 
 import struct
@@ -20,6 +21,7 @@ from r2c2r_core.export.assets import asset_file, assets_of, object_names, world_
 from r2c2r_core.export.labels import labels_of, labels_of_handle
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.writers.meshes import convex_hull
+from r2c2r_core.export.writers.stand import AMBIENT, CAMERA, FOVY_DEG, PICTURE, SUN, SUNLIGHT, view_of
 from r2c2r_core.export.writers.text import quat_wxyz_of
 from r2c2r_core.geometry.transforms import Rigid3, rotation_between
 from r2c2r_core.model.handle import Handle
@@ -28,6 +30,8 @@ from r2c2r_core.model.scene import Joint
 
 ROOT = "/Scene"
 _FLOOR_M = 20.0
+_NITS = 1000.0  # of the ambient light
+_FILM_MM = 24.0  # a full-frame sensor's height: any value gives the same picture
 _FIRST_DAY = 1 << 5 | 1  # 1 January 1980 as a DOS date
 _X = np.array([1.0, 0.0, 0.0])
 _SOLREF_LIMIT = (0.02, 1.0)  # MuJoCo's default time constant (s) and damping ratio of joint limits, which scene.xml uses
@@ -95,11 +99,11 @@ def _asset_stage(plan: Plan) -> Any:
 
 
 def _scene_stage(plan: Plan) -> Any:
-    """Stage with gravity, floor, support plates, and a placed prim for each object."""
+    """Stage with a placed prim for each object, support plates, and the surroundings beside them."""
     from pxr import UsdGeom
 
     stage = _new_stage(ROOT, "assembly")
-    _write_world(stage, plan)
+    _write_surroundings(stage, plan, _write_touch(stage, ROOT))
     for body in plan.bodies:
         if body.is_support:
             _write_body(stage, f"{ROOT}/{body.name}", body, {}, ROOT, dynamic=False)
@@ -108,15 +112,18 @@ def _scene_stage(plan: Plan) -> Any:
     return stage
 
 
-def _write_world(stage: Any, plan: Plan) -> None:
-    """Write gravity and the floor."""
-    from pxr import Gf, UsdGeom, UsdPhysics
+def _write_surroundings(stage: Any, plan: Plan, touch: Any) -> None:
+    """Write gravity, floor, light and camera outside the default prim.
 
-    scene = UsdPhysics.Scene.Define(stage, f"{ROOT}/physics")
+    Light in the proportions of scene.xml, at the 1000 nits of Isaac Sim's default stage: a white face looks as bright under
+    the dome of luminance L as under a sun of illuminance pi L.
+    """
+    from pxr import Gf, UsdGeom, UsdLux, UsdPhysics
+
+    scene = UsdPhysics.Scene.Define(stage, "/physics")
     scene.CreateGravityDirectionAttr(Gf.Vec3f(0, 0, -1))
     scene.CreateGravityMagnitudeAttr(9.81)
-    touch = _write_touch(stage, ROOT)
-    floor = UsdGeom.Plane.Define(stage, f"{ROOT}/floor")
+    floor = UsdGeom.Plane.Define(stage, "/floor")
     floor.CreateAxisAttr(UsdGeom.Tokens.z)
     floor.CreateWidthAttr(_FLOOR_M)
     floor.CreateLengthAttr(_FLOOR_M)
@@ -124,6 +131,18 @@ def _write_world(stage: Any, plan: Plan) -> None:
     floor.AddTranslateOp().Set(Gf.Vec3d(0, 0, plan.floor_z_m))
     UsdPhysics.CollisionAPI.Apply(floor.GetPrim())
     _bind(floor.GetPrim(), touch, purpose="physics")
+    view = view_of(plan)
+    UsdLux.DomeLight.Define(stage, "/ambient").CreateIntensityAttr(_NITS)
+    sun = UsdLux.DistantLight.Define(stage, f"/{SUN}")
+    sun.CreateIntensityAttr(np.pi * _NITS * SUNLIGHT / AMBIENT)
+    sun.CreateNormalizeAttr(True)  # intensity is an illuminance
+    _place(sun, Rigid3(rotation_between(np.array([0.0, 0.0, 1.0]), view.sun), view.centre + view.radius_m * view.sun))
+    camera = UsdGeom.Camera.Define(stage, f"/{CAMERA}")
+    camera.CreateHorizontalApertureAttr(_FILM_MM * PICTURE[0] / PICTURE[1])
+    camera.CreateVerticalApertureAttr(_FILM_MM)
+    camera.CreateFocalLengthAttr(_FILM_MM / 2 / np.tan(np.radians(FOVY_DEG) / 2))
+    camera.CreateClippingRangeAttr(Gf.Vec2f(0.01, 100.0))
+    _place(camera, view.world_from_camera)
 
 
 def _write_touch(stage: Any, root: str) -> Any:

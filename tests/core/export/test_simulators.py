@@ -5,11 +5,18 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import MagicMock
 
+import numpy as np
 import pytest
 
+from r2c2r_core.export.assets import world_from_asset
 from r2c2r_core.export.loaders import APART, EVERY_LOADER
+from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.simulators import Recipe, recipes
+from r2c2r_core.export.writers.text import quat_wxyz_of
 from tests.core.export.conftest import probe, write_folder
 from tests.core.export.kitchen import kitchen
 from tests.waiting import PATIENCE_S
@@ -57,6 +64,29 @@ def test_recipe_code_runs(simulator: str, folder: Path) -> None:
         timeout=PATIENCE_S * 4,
     )
     assert ran.returncode == 0, ran.stderr
+
+
+def test_the_isaac_lab_recipe_configures_every_articulation_where_it_stands(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("isaaclab", "isaaclab.sim", "isaaclab.actuators", "isaaclab.assets"):
+        monkeypatch.setitem(sys.modules, name, MagicMock(ArticulationCfg=Configured))
+    monkeypatch.chdir(folder)
+    said: dict[str, Any] = {}
+    exec(RECIPES["Isaac Lab"].code, said)
+    plan = plan_bundle(kitchen())
+    assert set(said["units"]) == {"cabinet_1", "drawer_1", "double_1"}
+    for name, unit in said["units"].items():
+        pose = world_from_asset(plan, name)
+        assert unit.prim_path == "{ENV_REGEX_NS}/Kitchen/" + name
+        np.testing.assert_allclose(unit.init_state.pos, pose.translation, atol=1e-9)
+        np.testing.assert_allclose(unit.init_state.rot, quat_wxyz_of(pose.rotation), atol=1e-9)
+
+
+class Configured(SimpleNamespace):
+    """Stand-in for Isaac Lab's ArticulationCfg: keeps what it is given."""
+
+    InitialStateCfg = SimpleNamespace
 
 
 @pytest.mark.parametrize("simulator", ELSEWHERE)

@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
+from pxr import Gf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from r2c2r_core.export.plan import Plan, plan_bundle
 from r2c2r_core.export.preview import poses_at
@@ -138,3 +138,31 @@ def test_equal_plans_give_identical_usd_bytes(good_folder: Path, tmp_path: Path)
 
     other = write_folder(kitchen(), tmp_path / "other")
     assert (other / "scene.usda").read_bytes() == (good_folder / "scene.usda").read_bytes()
+
+
+def test_the_default_prim_holds_only_the_objects_and_the_rest_is_beside_it(stage: Usd.Stage) -> None:
+    kinds = {prim.GetName(): prim.GetTypeName() for prim in stage.GetPseudoRoot().GetChildren()}
+    assert kinds == {
+        "Scene": "Xform",
+        "physics": "PhysicsScene",
+        "floor": "Plane",
+        "ambient": "DomeLight",
+        "sun": "DistantLight",
+        "front": "Camera",
+    }
+    assert stage.GetDefaultPrim().GetName() == "Scene"
+    below = {prim.GetTypeName() for prim in Usd.PrimRange(stage.GetDefaultPrim())}
+    assert not below & {"PhysicsScene", "Plane", "DomeLight", "DistantLight", "Camera"}
+
+
+def test_light_and_camera_are_those_of_the_mjcf(stage: Usd.Stage, good_folder: Path) -> None:
+    model = mujoco.MjModel.from_xml_path(str(good_folder / "scene.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    cache = UsdGeom.XformCache()
+    sun, camera = (np.array(cache.GetLocalToWorldTransform(stage.GetPrimAtPath(path))).T for path in ("/sun", "/front"))
+    np.testing.assert_allclose(sun[:3, :3] @ [0, 0, -1], model.light("sun").dir, atol=1e-6)
+    np.testing.assert_allclose(camera[:3, 3], data.cam("front").xpos, atol=1e-6)
+    np.testing.assert_allclose(camera[:3, :3], data.cam("front").xmat.reshape(3, 3), atol=1e-6)
+    seen = UsdGeom.Camera(stage.GetPrimAtPath("/front")).GetCamera(Usd.TimeCode.Default())
+    assert seen.GetFieldOfView(Gf.Camera.FOVVertical) == pytest.approx(model.cam("front").fovy[0])
