@@ -82,7 +82,8 @@ def _handles(body: Body, solids: Sequence[Solid]) -> Iterator[Handle]:
 
 def _grip(body: Body, joint: Joint, name: str, pieces: Sequence[Box], face: float, solids: Sequence[Solid]) -> Handle:
     """Grasp at the piece farthest out, with its longest side across the approach as x; a square knob is grasped sideways."""
-    corners = _corners(min(pieces, key=lambda box: float(_corners(box)[:, 1].min())))
+    grip = min(pieces, key=lambda box: float(_corners(box)[:, 1].min()))
+    corners = _corners(grip)
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = high - low
     upright = size[2] > size[0] - 1e-4
@@ -102,6 +103,8 @@ def _grip(body: Body, joint: Joint, name: str, pieces: Sequence[Box], face: floa
         protrusion_m=float(face - low[1]),
         gap_m=gap,
         room=_room_of(pose, extent, solids),
+        sources=grip.sources,
+        confidence=grip.confidence,
     )
 
 

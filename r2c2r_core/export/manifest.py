@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from r2c2r_core.model.motion import JointMotion
 from r2c2r_core.model.placement import Placement, Spread
 from r2c2r_core.model.reconstruction import Reconstruction
 from r2c2r_core.model.report import JointResult
-from r2c2r_core.model.scene import SceneObject
+from r2c2r_core.model.scene import GripPart, SceneObject
 from r2c2r_core.model.track import MaskTrack
 
 SCHEMA = 1
@@ -174,6 +174,8 @@ def _handle_entry(handle: Handle, labels: Labels) -> dict[str, Any]:
         "protrusion_m": _plain(handle.protrusion_m),
         "gap_m": _plain(handle.gap_m),
         "room": _plain(asdict(handle.room)),
+        "source": {key: handle.sources.get(key, "default") for key in get_args(GripPart)},
+        "confidence": _plain(handle.confidence),
     }
 
 

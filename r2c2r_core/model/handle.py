@@ -1,10 +1,13 @@
 """Grasp points of a joint: a grip to hold, or a point to push."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.motion import Source
+from r2c2r_core.model.scene import GripPart
 
 HandleKind = Literal["bar", "knob", "push"]
 """A grip with a gap behind it, a grip solid down to the front, or a front without either."""
@@ -37,6 +40,8 @@ class Handle:
     protrusion_m: float  # from the front's outer face to the grip's
     gap_m: float  # between the grip and the front, where fingers hook in; 0: a knob or a push
     room: Room
+    sources: Mapping[GripPart, Source] = field(default_factory=dict)
+    confidence: float | None = None  # that there is a handle here, 0..1; None: a push
 
     @property
     def grasp_width_m(self) -> float:

@@ -11,6 +11,8 @@ from r2c2r_core.model.motion import JointMotion, JointType, Source
 
 InsidePart = Literal["depth", "shelves"]
 """Observable properties of the space behind a front: its depth (for a drawer, its tray's) and its shelves."""
+GripPart = Literal["place", "protrusion", "thickness"]
+"""Numbers of a handle's grip: its rectangle on the front, its distance from the front, its depth."""
 Role = Literal["front", "handle", "carcass", "inner"]
 """Role of a board in its unit: a door or drawer front (or a fixed one beside it), a piece of a handle, an outer board of the
 body, or something inside that no camera sees (a shelf, a divider, a drawer's tray)."""
@@ -24,6 +26,8 @@ class Box:
     role: Role
     size_m: Vector3
     link_from_box: Rigid3
+    sources: Mapping[GripPart, Source] = field(default_factory=dict)  # of a handle's grip; default where not listed
+    confidence: float | None = None  # in a handle's grip, 0..1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -8,7 +8,7 @@ from r2c2r_core.geometry.masks import PackedMask
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.carrier import Carrier
-from r2c2r_core.model.motion import JointMotion, opened_frames
+from r2c2r_core.model.motion import JointMotion, Source, opened_frames
 from r2c2r_core.model.rectangle import Rectangle3
 
 
@@ -22,6 +22,8 @@ class FrontHandle:
     top_m: float
     protrusion_m: float  # protrusion from the front
     confidence: float  # 0..1
+    source: Source = "measured"  # of its rectangle: measured in the frames, inferred from a mesh, or a person's
+    protrusion_source: Source = "measured"
 
     @property
     def centre(self) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from pydantic import Field, Strict
 from r2c2r_core.model.contradiction import ContradictionRule
 from r2c2r_core.model.handle import HandleKind
 from r2c2r_core.model.motion import Source
+from r2c2r_core.model.scene import GripPart
 from r2c2r_core.schema.document import Document
 from r2c2r_core.schema.prompts import PromptsFilePoint, Version
 
@@ -141,6 +142,12 @@ class ManifestHandle(Document):
     protrusion_m: float = Field(description="from the front's outer face to the grip's")
     gap_m: float = Field(description="between the grip and the front, where fingers hook in")
     room: ManifestRoom = Field(description="what is free round it")
+    source: dict[GripPart, Source] = Field(
+        default_factory=dict,
+        description="of place (measured in the frames, inferred from the mesh, person; default of a push), protrusion and "
+        "thickness (default where nothing measured them)",
+    )
+    confidence: float | None = Field(default=None, description="that there is a handle here, 0 to 1; null of a push")
 
 
 class ManifestJoint(Document):

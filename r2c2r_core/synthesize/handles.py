@@ -55,6 +55,8 @@ def _box_of(group: np.ndarray) -> FrontHandle:
         top_m=float(group[:, 2].max()),
         protrusion_m=float(np.quantile(-group[:, 1], 0.95)),
         confidence=0.5,
+        source="inferred",
+        protrusion_source="inferred",
     )
 
 

@@ -99,4 +99,5 @@ def _handle_on(handle: DrawnHandle | str, cell: Cell, cell_m: float) -> GridHand
         right=column + handle.right_m / cell_m,
         bottom=row - handle.bottom_m / cell_m,
         confidence=1.0,
+        source="person",
     )

@@ -395,6 +395,8 @@ def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
         top_m=(middle_z - handle.top) * cell_m,
         protrusion_m=handle.protrusion_m or tuned(Params).usual_protrusion_m,
         confidence=handle.confidence,
+        source=handle.source,
+        protrusion_source="measured" if handle.protrusion_m else "default",
     )
 
 

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.calibration import probability
+from r2c2r_core.model.motion import Source
 from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Params as ReliefParams
@@ -41,6 +42,7 @@ class GridHandle:
     bottom: float
     confidence: float
     protrusion_m: float = 0.0  # 0: not measured
+    source: Source = "measured"
 
     @property
     def width(self) -> float:

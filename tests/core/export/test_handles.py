@@ -49,6 +49,18 @@ def test_a_drawer_handle_frame_matches_a_grasping_gripper() -> None:
     assert handle.kind == "knob"  # solid back to the front
 
 
+def test_the_manifest_says_where_a_handle_comes_from(tmp_path: Path) -> None:
+    item, said = drawer("drawer_1"), {"place": "measured", "protrusion": "default"}
+    known = [replace(b, sources=said, confidence=0.8) if b.role == "handle" else b for b in item.links[1].boxes]
+    item = replace(item, links=(item.links[0], replace(item.links[1], boxes=tuple(known))))
+    scene = ArticulatedScene(name="t", objects=(item, without_handles(cabinet("a", x=2.0))), layout_moves_m={}, warnings=())
+    manifest = json.loads((write_folder(scene, tmp_path / "b") / "manifest.json").read_text())
+    bar, push = (entry["joint"]["handles"][0] for entry in manifest["objects"])
+    assert bar["source"] == {"place": "measured", "protrusion": "default", "thickness": "default"}
+    assert bar["confidence"] == 0.8
+    assert (set(push["source"].values()), push["confidence"]) == ({"default"}, None)
+
+
 def test_a_handle_rotates_with_its_cabinet_and_opens_about_the_hinge() -> None:
     straight, turned = only(planned(cabinet("a"))), only(planned(cabinet("a", yaw=0.7)))
     about_z = straight.world_from_handle.rotation.T @ turned.world_from_handle.rotation

@@ -1,5 +1,6 @@
 """Every line of the fixture table end to end: built, written as URDF, MJCF and USD, linted, loaded and opened."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -12,8 +13,9 @@ from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.kitchen.categories import CATEGORIES
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import HingeSide
-from r2c2r_core.model.scene import ArticulatedScene, SceneObject
+from r2c2r_core.model.scene import ArticulatedScene, Box, SceneObject
 from r2c2r_core.model.track import FrontHandle
+from r2c2r_core.synthesize.fixtures.doors import split_handle
 from r2c2r_core.synthesize.fixtures.seams import seams_between
 from r2c2r_core.synthesize.fixtures.spec import Build, Order
 from r2c2r_core.synthesize.fixtures.table import fixture_of
@@ -143,6 +145,27 @@ def test_a_wide_fridge_with_an_edge_handle_has_one_door() -> None:
 
 def handle_at(z: float, *, x: float = 0.0) -> FrontHandle:
     return FrontHandle(left_m=x - 0.08, right_m=x + 0.08, bottom_m=z - 0.01, top_m=z + 0.01, protrusion_m=0.03, confidence=0.9)
+
+
+def grip_of(handle: FrontHandle) -> Box:
+    (grip,) = [box for part in build_with("drawer", handle).parts for box in part.boxes if box.name == "handle"]
+    return grip
+
+
+def test_a_grip_says_what_was_measured_of_its_handle() -> None:
+    grip = grip_of(handle_at(0.0))
+    assert (dict(grip.sources), grip.confidence) == ({"place": "measured", "protrusion": "measured"}, 0.9)
+    from_mesh = grip_of(replace(handle_at(0.0), source="inferred", protrusion_m=0.001))
+    assert dict(from_mesh.sources) == {"place": "inferred", "protrusion": "default"}  # too near to be measured: clipped
+    knob = grip_of(replace(handle_at(0.0), left_m=-0.01, right_m=0.01))
+    assert knob.sources["thickness"] == "measured"  # down to the front
+
+
+def test_the_mirrored_handle_of_a_pair_is_inferred() -> None:
+    left, right = split_handle(handle_at(0.0, x=0.2), np.array([1.0, 0.6, 0.8]))
+    assert left is not None
+    assert right is not None
+    assert (left.source, right.source) == ("inferred", "measured")
 
 
 def build_with(name: str, *handles: FrontHandle, hinge: HingeSide = "left") -> Build:

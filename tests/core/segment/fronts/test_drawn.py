@@ -58,6 +58,8 @@ def test_the_handle_of_a_drawn_front_is_found_drawn_or_omitted(session: Geometri
     assert placed is not None
     assert placed.handle is not None
     np.testing.assert_allclose(placed.handle.centre, (0.02, 0.06), atol=1e-6)
+    assert (found.handle.source, placed.handle.source) == ("measured", "person")
+    assert placed.handle.protrusion_source == "default"
     bare = session.find(prompted("drawer", replace(front, handle="none"))).panel()
     assert bare is not None
     assert bare.handle is None
