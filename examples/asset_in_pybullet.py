@@ -21,7 +21,7 @@ def main(folder: str, name: str) -> None:
     pybullet.setGravity(0, 0, -9.81)
     turned = pybullet.getQuaternionFromEuler([0, 0, 1.57])
     flags = pybullet.URDF_USE_INERTIA_FROM_FILE
-    unit = pybullet.loadURDF(str(asset), [1, 2, 0], turned, useFixedBase=True, flags=flags)
+    unit = pybullet.loadURDF(str(asset), [1, 2, 0], turned, flags=flags)
     joints = [pybullet.getJointInfo(unit, number) for number in range(pybullet.getNumJoints(unit))]
     moving = [joint for joint in joints if joint[2] in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC)]
     for joint in moving:
@@ -35,4 +35,6 @@ def main(folder: str, name: str) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
     main(*sys.argv[1:])

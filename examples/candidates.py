@@ -27,4 +27,6 @@ def main(scan: str, prompts: str, name: str, out: str) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 5:
+        sys.exit(__doc__)
     main(*sys.argv[1:])

@@ -25,4 +25,6 @@ def main(scan: str, category: str, frame: str, x: str, y: str, out: str) -> None
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 7:
+        sys.exit(__doc__)
     main(*sys.argv[1:])

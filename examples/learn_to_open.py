@@ -65,4 +65,6 @@ def main(folder: str, joint: str, demonstrations: str = "12", trials: str = "10"
 
 
 if __name__ == "__main__":
+    if not 3 <= len(sys.argv) <= 5:
+        sys.exit(__doc__)
     main(*sys.argv[1:])

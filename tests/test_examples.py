@@ -51,6 +51,12 @@ def test_every_example_is_run_by_this_file() -> None:
     assert [name for name in sorted(path.stem for path in EXAMPLES.glob("*.py")) if f'"{name}"' not in source] == []
 
 
+@pytest.mark.parametrize("example", sorted(path.stem for path in EXAMPLES.glob("*.py")))
+def test_an_example_without_arguments_prints_its_usage(run: Run, example: str) -> None:
+    with pytest.raises(SystemExit, match=f"python examples/{example}.py [A-Z]"):
+        run(example)
+
+
 def test_the_capture_example_reads_ten_frames(run: Run, sample: SamplePaths) -> None:
     assert "10 frames" in run("read_a_capture", sample.scan)
 
