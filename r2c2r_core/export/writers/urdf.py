@@ -1,7 +1,7 @@
 """scene.urdf: readable without changes by yourdfpy, MuJoCo, PyBullet, SAPIEN and ROS.
 
 - One root link `world`, without mass and geometry: PyBullet then fixes the scene without `useFixedBase` (with a mass
-  it falls: measured), and every other link has an inertial.
+  it falls; without one but another name it warns: measured), and every other link has an inertial.
 - Free-standing objects have `fixed` joints here. `floating` would be correct, but PyBullet turns it into a fixed joint with
   a warning, yourdfpy's `update_cfg(zero_cfg)` raises on it and viser shows a dead slider for it (measured with 3.2.7,
   0.0.60 and 1.1.1); in scene.xml the same objects have a free joint, so they move in MuJoCo.
@@ -25,7 +25,7 @@ def write_urdf(plan: Plan, path: Path) -> None:
     for asset in assets_of(plan):
         file = path.parent / asset_file(asset.name, ".urdf")
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(urdf_text(asset, root=None if asset.bodies[0].free else asset.name))
+        file.write_text(urdf_text(asset, root=None if asset.bodies[0].free else WORLD))
 
 
 def srdf_text(plan: Plan) -> str:

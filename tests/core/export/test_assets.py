@@ -122,9 +122,23 @@ def test_a_urdf_asset_loads_standalone_with_the_scenes_joint_limits(moved_away: 
     path = moved_away / f"assets/{name}/{name}.urdf"
     robot = yourdfpy.URDF.load(str(path), load_meshes=True)
     assert len(robot.scene.geometry) == sum(len(link.visuals) for link in robot.robot.links)
-    assert robot.base_link == ("bottle_1_body" if name == "bottle_1" else name)  # a free-standing object can fall
+    assert robot.base_link == ("bottle_1_body" if name == "bottle_1" else "world")  # a free-standing object can fall
     scene = {joint.name: joint.limit for joint in read_urdf(moved_away / "scene.urdf").joints}
     assert all(joint.limit == scene[joint.name] for joint in read_urdf(path).joints if joint.type != "fixed")
+
+
+def test_pybullet_holds_an_asset_still_without_a_warning(moved_away: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    pybullet = pytest.importorskip("pybullet")
+    client = pybullet.connect(pybullet.DIRECT)
+    pybullet.setGravity(0, 0, -9.81)
+    unit = pybullet.loadURDF(str(moved_away / "assets/drawer_1/drawer_1.urdf"), [1, 2, 3])
+    for _ in range(10):
+        pybullet.stepSimulation()
+    place = pybullet.getBasePositionAndOrientation(unit)[0]
+    pybullet.disconnect(client)
+    said = capfd.readouterr()
+    assert place == (1, 2, 3)
+    assert "Warning" not in said.out + said.err
 
 
 def test_a_glb_asset_references_existing_textures(good_folder: Path) -> None:
