@@ -40,8 +40,9 @@ def of_object(item: SceneObject, mass_kg: float, placement: Placement | None) ->
             distribution="uniform",
             low=_FRICTION[0],
             high=_FRICTION[1],
-            source="sourced",
-            why="dry wood on wood 0.25-0.5, laminate 0.2-0.4, oak on oak up to 0.62 in friction tables",
+            source="default" if item.movable else "sourced",
+            why="as of furniture: " * item.movable
+            + "dry wood on wood 0.25-0.5, laminate 0.2-0.4, oak on oak up to 0.62 in friction tables",
         ),
         "dimensions_m": [
             _size(float(size), source, placement)
@@ -63,7 +64,7 @@ def _resistances(joint: Joint) -> dict[str, float]:
 
 def _around(value: float) -> Range:
     low, high = _RESISTANCE
-    why = "half to twice the force that a hand was measured to need; no furniture was measured"
+    why = "half to twice the written value, an own choice (materials.py); no furniture was measured"
     return Range(distribution="loguniform", low=low * value, high=high * value, source="default", why=why)
 
 

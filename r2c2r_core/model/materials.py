@@ -86,7 +86,7 @@ TOASTER = Material(density_kg_m3=300.0, source="own estimate: two-slice toasters
 KETTLE = Material(density_kg_m3=400.0, source="own estimate: kettles of 1-1.7 l 0.8-1.5 kg, empty", weight_kg=(0.7, 3.0))
 UNKNOWN_THING = Material(density_kg_m3=400.0, source="own choice: household things lie between 100 and 1000 kg/m3")
 
-_OPENED = "own choice within 2010 ADA Standards 309.4 (one hand, at most 22.2 N)"
+_OPENED = "own choice, opened by one hand with less than the 22.2 N of 2010 ADA Standards 309.4"
 _RELEASED = "enough to come to rest: lids without were measured to slam at 6.9 rad/s (Articraft, pull request 81)"
 
 HINGE_FEEL = JointFeel(damping=0.3, friction=0.15, effort=30.0, velocity=3.0, source=f"{_OPENED}; {_RELEASED}")

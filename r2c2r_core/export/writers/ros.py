@@ -53,8 +53,8 @@ _PACKAGE = """\
   <name>{package}</name>
   <version>0.0.0</version>
   <description>A scanned scene that opens</description>
-  <maintainer email="nobody@example.com">nobody</maintainer>
-  <license>Proprietary</license>
+  <maintainer email="not-stated@recording.invalid">the owner of the recording</maintainer>
+  <license file="README.txt">LicenseRef-README</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
   <exec_depend>robot_state_publisher</exec_depend>
   <exec_depend>joint_state_publisher_gui</exec_depend>
