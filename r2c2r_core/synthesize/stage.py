@@ -41,7 +41,7 @@ from r2c2r_core.synthesize.fixtures.spec import Build, Motion, Order, Part
 from r2c2r_core.synthesize.fixtures.table import fixture_of
 from r2c2r_core.synthesize.joints import Hinge, choose_hinges
 from r2c2r_core.synthesize.laps import lapped, with_hidden_edges
-from r2c2r_core.synthesize.layout import arrange, with_outliers
+from r2c2r_core.synthesize.layout import arrange, settled, with_outliers
 from r2c2r_core.synthesize.marked import as_marked, part_of
 from r2c2r_core.synthesize.opening import open_all
 from r2c2r_core.synthesize.physics import friction_shut, inertial_of_boxes, inertial_of_pieces, moved_boxes, weighing
@@ -107,6 +107,11 @@ def build_scene(
         layout = with_outliers(layout, measured)
     failures |= {name: f"synthesize: {name}: left out: {why}" for name, why in layout.outliers.items()}
     placed = lapped(layout.objects)
+    said: list[str] = []
+    made = surroundings_of(capture, placed, said) if config.surroundings else []
+    found, sized = as_said(made, overrides)
+    below = [*placed, *(item.measured(item.slab) for item in (*found, *sized))]  # worktops are known only now
+    placed = [settled(item, below, floor_found=capture.room.floor_found) for item in placed]
     hinges = choose_hinges(placed, overrides)
     built: list[SceneObject] = []
     for item in progress.part(0.5, 0.9).each(placed, "building"):
@@ -125,9 +130,6 @@ def build_scene(
 
     kept = frozenset(name for item in built for name in _uppers_said(item, overrides.of(item.name)))
     opened = open_all(built, hinges, rebuild, capture.room.walls, kept)
-    said: list[str] = []
-    made = surroundings_of(capture, list(arranged.values()), said) if config.surroundings else []
-    found, sized = as_said(made, overrides)
     opened += standing_clear(opened, found, _painted, capture.room.walls, kept, said)
     opened += [_painted(item.measured(item.slab), item.slab) for item in sized]  # as a person specified, even where it collides
     opened += in_drawers(_built(contents, meshes, config, failures), carriers, opened, fixed, failures)
