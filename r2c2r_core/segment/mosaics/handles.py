@@ -65,14 +65,15 @@ def find_handle(odds: PanelOdds, relief: Relief, cell: Cell) -> GridHandle | Non
     params = tuned(Params)
     size = 2 * round(params.parted_m / relief.cell_m / 2) + 1
     likely = (panel > 0).astype(np.uint8)
-    closed = cv2.morphologyEx(likely, cv2.MORPH_CLOSE, np.ones((size, size), np.uint8))
+    raised = (relief.count * relief.raised)[area]
+    stands_out = likely | (relief.raised[area] > 0.5)  # depth shows a bar where glare hides it from the network
+    closed = cv2.morphologyEx(stands_out, cv2.MORPH_CLOSE, np.ones((size, size), np.uint8))
     labels = np.where(likely > 0, cv2.connectedComponents(closed)[1], 0)
     inside = labels == np.bincount(labels.ravel(), np.maximum(panel, 0).ravel()).argmax()
     rows, columns = _extent(inside)
     if min(np.ptp(rows), np.ptp(columns)) + 1 > round(tuned(ReliefParams).handle_thick_m / relief.cell_m):  # print as well
         inside = (likely > 0) & _likeliest_rectangle(panel)
         rows, columns = _extent(inside)
-    raised = (relief.count * relief.raised)[area]
     lift_m = float(np.average(relief.lift_m[area][inside], weights=raised[inside])) if raised[inside].any() else 0.0
     down, across = _shift(raised, rows, columns, round(params.parallax_m / relief.cell_m))
     return GridHandle(

@@ -50,6 +50,16 @@ def test_parts_of_a_bar_are_merged_and_a_distant_speck_is_ignored() -> None:
     assert handle.protrusion_m == 0.0  # depth showed no protrusion
 
 
+def test_the_ends_of_a_bar_are_one_handle_where_depth_shows_the_bar_between_them() -> None:
+    ends, bar = [(slice(20, 24), slice(20, 28)), (slice(20, 24), slice(48, 54))], (slice(20, 24), slice(20, 54))
+    parts = [(*end, odds) for end, odds in zip(ends, (2.0, 1.5), strict=True)]
+    shown, hidden = find_handle(*found(*parts, raised=bar), PANEL), find_handle(*found(*parts), PANEL)
+    assert shown is not None
+    assert hidden is not None
+    assert (shown.left, shown.right) == (20 * STEP, 54 * STEP)
+    assert (hidden.left, hidden.right) == (20 * STEP, 28 * STEP)  # 10 cm apart with nothing between: print
+
+
 def test_a_handle_at_the_panel_edge_is_not_cropped() -> None:
     handle = find_handle(*found((slice(20, 50), slice(12, 16), 2.0)), PANEL)
     assert handle is not None
