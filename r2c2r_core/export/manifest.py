@@ -18,7 +18,7 @@ from r2c2r_core.export.states import states_of
 from r2c2r_core.model.handle import Handle
 from r2c2r_core.model.mesh import CandidateSet
 from r2c2r_core.model.motion import JointMotion
-from r2c2r_core.model.placement import Placement, Spread
+from r2c2r_core.model.placement import Placement
 from r2c2r_core.model.reconstruction import Reconstruction
 from r2c2r_core.model.report import JointResult
 from r2c2r_core.model.scene import GripPart, SceneObject
@@ -220,7 +220,7 @@ def _candidate_entries(candidates: CandidateSet) -> list[dict[str, Any]]:
 
 
 def _placement_entry(placement: Placement) -> dict[str, Any]:
-    pose = placement.world_from_mesh
+    pose, spread = placement.world_from_mesh, placement.spread
     return {
         "scale": _plain(pose.scale),
         "rotation": _plain(pose.rotation),
@@ -230,14 +230,8 @@ def _placement_entry(placement: Placement) -> dict[str, Any]:
         "mask_iou": _plain(placement.mask_iou),
         "unsure": placement.unsure,
         "runner_up_turn_deg": _plain(placement.runner_up_turn_deg),
-        "spread": _spread_entry(placement.spread),
+        "spread": spread and {key: _plain(getattr(spread, key)) for key in ("turn_deg", "shift_m", "scale")},
     }
-
-
-def _spread_entry(spread: Spread | None) -> dict[str, Any] | None:
-    if spread is None:
-        return None
-    return {"turn_deg": _plain(spread.turn_deg), "shift_m": _plain(spread.shift_m), "scale": _plain(spread.scale)}
 
 
 def _warnings(

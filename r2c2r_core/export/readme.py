@@ -54,7 +54,8 @@ FILES
 LOADING  (unpack first; run in the bundle's folder)
 {simulators}
   An object  MuJoCo  <model name="a" file="assets/{object}/{object}.xml"/> among the assets, then
-                     <frame pos="1 0 0"><attach model="a" body="{body}" prefix="{object}_"/></frame> in the world
+                     <frame pos="1 0 0"><attach model="a" body="{body}" prefix="{object}_"/></frame> in the world;
+                     names in the file lack {object}_, which the prefix adds: all formats then agree
              USD     prim.GetReferences().AddReference("assets/{object}/{object}.usda")
   Handles    each is a site (scene.xml), a prim (scene.usda), a node (scene.glb) and an <r2c2r><handle> (scene.urdf), in the
              frame of a gripper that holds it: x along the grip, y the way fingers close, z into the front. manifest.json has

@@ -118,22 +118,15 @@ import isaaclab.sim as sim_utils
 from isaaclab.actuators import ImplicitActuatorCfg
 from isaaclab.assets import ArticulationCfg, AssetBaseCfg
 from pxr import Usd, UsdPhysics
-kitchen = AssetBaseCfg(
-    prim_path="{ENV_REGEX_NS}/Kitchen",
-    spawn=sim_utils.UsdFileCfg(usd_path="scene.usda"),
-)
-def unit(prim):
-    turn = prim.GetAttribute("xformOp:orient").Get()
-    position = tuple(prim.GetAttribute("xformOp:translate").Get())
-    return ArticulationCfg(
-        prim_path="{ENV_REGEX_NS}/Kitchen/" + prim.GetName(),
-        spawn=None,  # it comes with the kitchen
-        init_state=ArticulationCfg.InitialStateCfg(pos=position, rot=(turn.GetReal(), *turn.GetImaginary())),
-        actuators={"joints": ImplicitActuatorCfg(joint_names_expr=[".*"], stiffness=None, damping=None)},
-    )
-stage = Usd.Stage.Open("scene.usda")
-found = [prim for prim in stage.GetDefaultPrim().GetChildren() if prim.HasAPI(UsdPhysics.ArticulationRootAPI)]
-units = {prim.GetName(): unit(prim) for prim in found}""",
+kitchen = AssetBaseCfg(prim_path="{ENV_REGEX_NS}/Kitchen", spawn=sim_utils.UsdFileCfg(usd_path="scene.usda"))
+held = ImplicitActuatorCfg(joint_names_expr=[".*"], stiffness=None, damping=None)
+units, stage = {}, Usd.Stage.Open("scene.usda")
+for prim in stage.GetDefaultPrim().GetChildren():
+    if prim.HasAPI(UsdPhysics.ArticulationRootAPI):  # spawned with the kitchen
+        position, turn = (prim.GetAttribute(f"xformOp:{name}").Get() for name in ("translate", "orient"))
+        start = ArticulationCfg.InitialStateCfg(pos=tuple(position), rot=(turn.GetReal(), *turn.GetImaginary()))
+        path = "{ENV_REGEX_NS}/Kitchen/" + prim.GetName()
+        units[prim.GetName()] = ArticulationCfg(prim_path=path, init_state=start, actuators={"joints": held})""",
         note="In the scene's configuration, list the kitchen before its units, and a floor and light of your own. One object "
         "alone: assets/OBJECT/OBJECT.usda as ArticulationCfg. rot is w, x, y, z (Isaac Lab 2).",
         loader="NVIDIA asset validator",

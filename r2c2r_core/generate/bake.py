@@ -11,10 +11,11 @@ from r2c2r_core.arrays import Colours, DepthMetres, Faces, Image, Mask, Points
 from r2c2r_core.generate.charts import Atlas
 from r2c2r_core.generate.consistency import VIEWS_KEPT, render_depth, sensor_depth
 from r2c2r_core.generate.evidence import View, moved_edge
-from r2c2r_core.generate.unseen import fill_unseen, own_texels, spread_colours
+from r2c2r_core.generate.unseen import beside_handle, fill_unseen, own_texels, spread_colours
 from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.texels import bilinear_colours
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.track import FrontHandle
 from r2c2r_core.tuning import param, tuned
 
 
@@ -72,10 +73,13 @@ def bake(
     world_from_local: Rigid3,
     views: Sequence[View],
     front_y_m: float | None = None,
+    handle: FrontHandle | None = None,
 ) -> Baked:
     """Texture of an atlas whose points are in the local frame; unobserved texels get plausible colours.
 
     `front_y_m` is the front face of furniture: its other sides are then filled from their own material, or from the plain tint.
+    Beside its `handle`, photos show that handle where the model has none, by errors of millimetres, and its shadow: those
+    texels count as not observed.
     """
     eyes = world_from_local.inverse.apply(np.array([view.eye_world for view in views]))
     wanted = np.ones((len(views), 6), dtype=bool) if front_y_m is None else _best_views(atlas, eyes, views)
@@ -85,6 +89,8 @@ def bake(
             _prefer_best(side.weights)
     colours, seen = _blend(sides, len(views), len(atlas.points))
     seen &= own_texels(atlas, seen, front_y_m)
+    if front_y_m is not None and handle is not None:
+        seen &= ~beside_handle(atlas, front_y_m, handle)
     texture = np.zeros((*atlas.size, 3), np.uint8)
     texture.reshape(-1, 3)[atlas.texel] = fill_unseen(colours, seen, atlas, front_y_m, eyes.mean(axis=0))
     return Baked(spread_colours(texture, atlas), float(seen.mean()) if len(seen) else 0.0)

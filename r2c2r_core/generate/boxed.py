@@ -95,6 +95,7 @@ def _box_with_relief(box: BoxPart, world_from_front: Rigid3, relief: Relief, han
         maskable=np.ones(len(faces), dtype=bool),
         parameters={"raised_steps": float(len(relief.raised)), "sunk_steps": float(len(relief.sunk))},
         warnings=(),
+        handle=relief.handle if bars else None,
     )
 
 

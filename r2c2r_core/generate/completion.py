@@ -60,7 +60,7 @@ class Completion(MeshGenerator):
         shape, variation = guess.shape, guess.variation
         # a bare side may show in a few frames only, so furniture is textured from the whole pool
         views = variation.views if shape.front_y_m is None else evidence.pool
-        picture = bake(atlas, shape.vertices_world, shape.faces, shape.world_from_local, views, shape.front_y_m)
+        picture = bake(atlas, shape.vertices_world, shape.faces, shape.world_from_local, views, shape.front_y_m, shape.handle)
         mesh, local_from_mesh = centred(shape.vertices_local, atlas.source, atlas.faces, atlas.uv, picture.texture)
         return MeshAsset(
             object_name=evidence.track.name,

@@ -16,6 +16,8 @@ from r2c2r_core.generate.variation import Variation
 from r2c2r_core.model.track import FrontHandle, FrontPanel
 from r2c2r_core.tuning import param, tuned
 
+BESIDE_HANDLE_M = 0.02  # where its own edge, shadow and errors of its place may show
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -216,7 +218,7 @@ def _border_cells(heights: HeightMap, border_m: float) -> np.ndarray:
     return np.asarray((np.abs(x) > -heights.left_m - border_m) | (np.abs(z) > -heights.bottom_m - border_m))
 
 
-def _handle_cells(heights: HeightMap, handle: FrontHandle | None, grow_m: float = 0.02) -> np.ndarray:
+def _handle_cells(heights: HeightMap, handle: FrontHandle | None, grow_m: float = BESIDE_HANDLE_M) -> np.ndarray:
     x, z = _cell_centres(heights)
     if handle is None:
         return np.zeros(heights.height_m.shape, dtype=bool)

@@ -7,6 +7,7 @@ import numpy as np
 from r2c2r_core.arrays import Faces, Points
 from r2c2r_core.geometry.meshes import Surface
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.track import FrontHandle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -20,6 +21,7 @@ class Shape:
     maskable: np.ndarray  # per face: whether the track's mask covers it when visible (a front's mask excludes its carcass)
     parameters: dict[str, float]
     warnings: tuple[str, ...]
+    handle: FrontHandle | None = None  # modelled on its front, in a `front`-like local frame
     unseen_error_m: float | None = None  # of an unobserved side from its position by scan or category; None: all observed
 
     @property

@@ -7,6 +7,8 @@ import numpy as np
 
 from r2c2r_core.arrays import Colours, Image, Points, Vector3
 from r2c2r_core.generate.charts import FRONT, Atlas
+from r2c2r_core.generate.relief import BESIDE_HANDLE_M
+from r2c2r_core.model.track import FrontHandle
 from r2c2r_core.tuning import param, tuned
 
 
@@ -38,6 +40,15 @@ def own_texels(atlas: Atlas, seen: np.ndarray, front_y_m: float | None) -> np.nd
     return np.asarray((share > tuned(Params).least_share)[atlas.chart] | (atlas.chart == FRONT) | _stands_out(atlas, front_y_m))
 
 
+def beside_handle(atlas: Atlas, front_y_m: float, handle: FrontHandle) -> np.ndarray:
+    """Texels of the front face behind a handle and beside it."""
+    margin = BESIDE_HANDLE_M
+    x, _, z = atlas.points.T
+    near = (x > handle.left_m - margin) & (x < handle.right_m + margin)
+    near &= (z > handle.bottom_m - margin) & (z < handle.top_m + margin)
+    return np.asarray(near & (atlas.chart == FRONT) & ~_stands_out(atlas, front_y_m))
+
+
 def fill_unseen(colours: Colours, seen: np.ndarray, atlas: Atlas, front_y_m: float | None, eye_local: Vector3) -> Colours:
     """Colours for unobserved texels: gaps from the nearest observed surface, the rest from the median colour.
 
@@ -50,15 +61,18 @@ def fill_unseen(colours: Colours, seen: np.ndarray, atlas: Atlas, front_y_m: flo
     on_front = seen & (atlas.chart == FRONT)
     filled = colours.copy()
     filled[~seen] = np.round(np.median(colours[on_front if on_front.any() else seen], axis=0)).astype(np.uint8)
-    missing = ~seen
-    if front_y_m is not None:
-        outside = _stands_out(atlas, front_y_m)
-        shown = np.bincount(atlas.chart[seen & ~outside], minlength=6) > 0
-        missing &= shown[atlas.chart] | outside
-    known, gaps = np.flatnonzero(seen), np.flatnonzero(missing)
     if front_y_m is None:
+        known, gaps = np.flatnonzero(seen), np.flatnonzero(~seen)
         _blend_neighbours(filled, known, gaps, atlas.points, _mirrored(atlas.points[gaps], atlas.points, eye_local))
-    _blend_neighbours(filled, known, gaps, atlas.points, atlas.points[gaps])
+        _blend_neighbours(filled, known, gaps, atlas.points, atlas.points[gaps])
+        return filled
+    outside = _stands_out(atlas, front_y_m)
+    face, missing = ~outside & (atlas.chart == FRONT), ~seen
+    shown = (np.bincount(atlas.chart[seen & ~outside], minlength=6) > 0)[atlas.chart]
+    # neither a handle nor a side, dark in its gap, colours the face
+    for part, like in ((outside, outside), (face, face), (~outside & ~face & shown, ~outside)):
+        gaps = np.flatnonzero(part & missing)
+        _blend_neighbours(filled, np.flatnonzero(like & seen), gaps, atlas.points, atlas.points[gaps])
     return filled
 
 
@@ -92,7 +106,7 @@ def _blend_neighbours(filled: Colours, known: np.ndarray, missing: np.ndarray, p
     params = tuned(Params)
     from scipy.spatial import cKDTree
 
-    if len(missing) == 0:
+    if len(missing) == 0 or len(known) == 0:
         return
     known = known[:: max(len(known) // params.most_known, 1)]
     reach = params.reach * float(np.linalg.norm(np.ptp(points, axis=0)))
