@@ -30,7 +30,7 @@ from r2c2r_core.model.scene import Joint
 
 ROOT = "/Scene"
 _FLOOR_M = 20.0
-_NITS = 1000.0  # of the ambient light
+_NITS = 1000.0  # luminance of the ambient light: own choice, not tried in Isaac Sim
 _FILM_MM = 24.0  # a full-frame sensor's height: any value gives the same picture
 _FIRST_DAY = 1 << 5 | 1  # 1 January 1980 as a DOS date
 _X = np.array([1.0, 0.0, 0.0])
@@ -115,8 +115,8 @@ def _scene_stage(plan: Plan) -> Any:
 def _write_surroundings(stage: Any, plan: Plan, touch: Any) -> None:
     """Write gravity, floor, light and camera outside the default prim.
 
-    Light in the proportions of scene.xml, at the 1000 nits of Isaac Sim's default stage: a white face looks as bright under
-    the dome of luminance L as under a sun of illuminance pi L.
+    Light in the proportions of scene.xml: a white face is as bright under a dome of luminance L as facing a sun of
+    illuminance pi L.
     """
     from pxr import Gf, UsdGeom, UsdLux, UsdPhysics
 
