@@ -10,6 +10,8 @@ import pytest
 
 from r2c2r_core.export import randomize
 from r2c2r_core.export.contacts import ALLOWED_PENETRATION_M, overlapping
+from r2c2r_core.export.plan import plan_bundle
+from r2c2r_core.export.states import states_of
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.materials import SURFACE_FRICTION
 from r2c2r_core.model.placement import Spread
@@ -58,6 +60,17 @@ def test_a_door_that_hits_a_free_object_stays_closed_in_the_states(tmp_path: Pat
     model = mujoco.MjModel.from_xml_path(str(write_folder(scene, tmp_path / "b") / "scene.xml"))
     assert deepest_m(model) < ALLOWED_PENETRATION_M
     assert {model.key(number).name for number in range(model.nkey)} == {"closed", "ajar", "open", "d_slide_open"}
+
+
+def test_a_door_in_the_way_of_several_drawers_stays_closed_instead_of_them() -> None:
+    scene = ArticulatedScene(
+        name="t", objects=(cabinet("a"), drawer("b", x=1.0), drawer("c", x=2.0)), layout_moves_m={}, warnings=()
+    )
+    met = (("a_hinge", "b_slide"), ("a_hinge", "c_slide"))
+    states = states_of(replace(plan_bundle(scene), conflicts={"open": met}))
+    assert states["open"].joints == {"b_slide", "c_slide"}
+    assert states["ajar"].joints == {"a_hinge", "b_slide", "c_slide"}
+    assert states["a_hinge_open"].joints == {"a_hinge"}
 
 
 def deepest_m(model: mujoco.MjModel) -> float:

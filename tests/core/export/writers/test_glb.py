@@ -1,5 +1,6 @@
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,3 +83,11 @@ def test_the_glb_has_an_opening_animation_per_joint_and_one_for_those_open_at_on
         wanted = opened[body.parent].inverse @ opened[body.name]
         np.testing.assert_allclose(now, wanted.rotation, atol=1e-6)
         np.testing.assert_allclose(place, wanted.translation, atol=1e-6)
+
+
+def test_the_glb_clip_that_opens_joints_together_leaves_those_in_the_way_closed(tmp_path: Path) -> None:
+    plan = replace(plan_bundle(kitchen()), conflicts={"open": (("double_1_left_hinge", "drawer_1_slide"),)})
+    write_meshes(plan, tmp_path)
+    write_glb(plan, tmp_path / "scene.glb")
+    clip = next(clip for clip in document_of(tmp_path / "scene.glb")[0]["animations"] if clip["name"] == "open")
+    assert len(clip["channels"]) == 3
