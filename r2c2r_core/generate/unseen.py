@@ -41,12 +41,15 @@ def own_texels(atlas: Atlas, seen: np.ndarray, front_y_m: float | None) -> np.nd
 
 
 def beside_handle(atlas: Atlas, front_y_m: float, handle: FrontHandle) -> np.ndarray:
-    """Texels of the front face behind a handle and beside it."""
-    margin = BESIDE_HANDLE_M
-    x, _, z = atlas.points.T
-    near = (x > handle.left_m - margin) & (x < handle.right_m + margin)
-    near &= (z > handle.bottom_m - margin) & (z < handle.top_m + margin)
-    return np.asarray(near & (atlas.chart == FRONT) & ~_stands_out(atlas, front_y_m))
+    """Texels of the front face behind a handle and beside it, up to an edge that is near: a strip left there shows the gap."""
+    near = (atlas.chart == FRONT) & ~_stands_out(atlas, front_y_m)
+    for axis, low, high in ((0, handle.left_m, handle.right_m), (2, handle.bottom_m, handle.top_m)):
+        along = atlas.points[:, axis]
+        ends = along.min(), along.max()
+        low, high = low - BESIDE_HANDLE_M, high + BESIDE_HANDLE_M
+        near &= (along > low) | (low - ends[0] < BESIDE_HANDLE_M)
+        near &= (along < high) | (ends[1] - high < BESIDE_HANDLE_M)
+    return np.asarray(near)
 
 
 def fill_unseen(colours: Colours, seen: np.ndarray, atlas: Atlas, front_y_m: float | None, eye_local: Vector3) -> Colours:

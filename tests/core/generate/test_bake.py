@@ -7,6 +7,7 @@ from r2c2r_core.generate.bake import bake
 from r2c2r_core.generate.charts import planar_atlas, unwrapped_atlas
 from r2c2r_core.generate.completion import cut_open
 from r2c2r_core.generate.evidence import gather_evidence
+from r2c2r_core.generate.unseen import beside_handle
 from r2c2r_core.generate.variation import draw_variation
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import render_textured
@@ -64,6 +65,16 @@ def test_the_part_of_a_handle_that_the_model_lacks_is_not_painted_on_the_front(f
     metres = 2.0 / 800.0
     rows, columns = (slice(200 - round(0.213 / metres), 200 - round(0.202 / metres)), slice(200 + 28, 200 + 31))
     assert image[rows, columns].mean(axis=(0, 1)) == pytest.approx([210, 190, 150], abs=12)
+
+
+def test_no_strip_is_left_between_an_erased_handle_and_a_near_edge(front_scene):
+    _, track = front_scene
+    shape, atlas, _ = pictured(front_scene, box_shape, lambda v, f: planar_atlas(v, f, 768, 0.0012))
+    near_edge = replace(track.front.handle, left_m=-0.22, right_m=-0.2, bottom_m=-0.1, top_m=0.1)  # 3 cm from the edge
+    erased = atlas.points[beside_handle(atlas, shape.front_y_m, near_edge)]
+    assert erased[:, 0].min() == pytest.approx(-0.25, abs=0.004)  # and the chart's padding
+    assert erased[:, 0].max() == pytest.approx(-0.18, abs=0.002)
+    assert (erased[:, 2].min(), erased[:, 2].max()) == (pytest.approx(-0.12, abs=0.002), pytest.approx(0.12, abs=0.002))
 
 
 def test_an_unseen_side_of_the_handle_has_the_handle_colour(front_scene):
