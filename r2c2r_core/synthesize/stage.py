@@ -111,7 +111,7 @@ def build_scene(
     made = surroundings_of(capture, placed, said) if config.surroundings else []
     found, sized = as_said(made, overrides)
     below = [*placed, *(item.measured(item.slab) for item in (*found, *sized))]  # worktops are known only now
-    placed = [settled(item, below, floor_found=capture.room.floor_found) for item in placed]
+    placed = tuple(settled(item, below, floor_found=capture.room.floor_found) for item in placed)
     hinges = choose_hinges(placed, overrides)
     built: list[SceneObject] = []
     for item in progress.part(0.5, 0.9).each(placed, "building"):
