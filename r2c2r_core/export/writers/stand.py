@@ -25,7 +25,7 @@ _SHADOW_PX = 8192  # 1 mm in a kitchen: the default gives stepped shadow edges
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class View:
-    """What a scene is lit and seen by, in the world."""
+    """Light and camera of a scene, in the world."""
 
     centre: Vector3
     radius_m: float  # of a sphere about the scene
