@@ -298,7 +298,7 @@ def test_transfers_at_the_same_time_lose_no_files(tmp_path: Path) -> None:
     slow.get = get  # type: ignore[method-assign]
     there._objects = slow
     write(tmp_path / "a", "work/new", "new")
-    (tmp_path / "a/projects/p/work/old").unlink()
+    (tmp_path / "a/projects/p" / "work/old").unlink()
     here.keep("p")
     thread = threading.Thread(target=there.fetch, args=("p",), daemon=True)
     with held() as released:
