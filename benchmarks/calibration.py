@@ -40,7 +40,7 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import Prompts
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.pipeline import Request, reconstruct
-from r2c2r_core.segment.contradictions import has_seams
+from r2c2r_core.segment.certainty import expects_seams
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.joints import handle_hinge
 from r2c2r_core.tuning import changed, tuning
@@ -48,6 +48,7 @@ from r2c2r_core.workspace import Workspace
 
 HERE = Path(__file__).resolve().parent
 RESULTS, PAGE, PICTURE = HERE / "calibration.json", *(HERE.parent / "docs" / f"calibration.{end}" for end in ("md", "svg"))
+FRONTS = HERE / "front_certainty.json"
 MAPS = ("mask", "hinge")
 AS_CLAIMED = ("edge", "seam")  # network log-odds: evaluated, without a map
 SLOPE_SPREAD = 0.5  # standard deviation of the slope's prior about 1: with few claims the ranking of confidences is preserved
@@ -104,7 +105,7 @@ def _edges(truth: Mapping[str, ObjectRecord], work: Workspace) -> Iterator[Claim
         beyond = np.array([across.min() + width, width - across.max(), height - up.max(), up.min() + height])
         for side, sure, off in zip(("left", "right", "top", "bottom"), track.front.edges, beyond, strict=True):
             yield {"of": "edge", "kind": side, "object": name, "claim": sure, "right": float(abs(off) <= EDGE_M), "off_m": off}
-        if not has_seams(category_of(track.category), track.front.width_m):
+        if not expects_seams(category_of(track.category), track.front.width_m):
             over = float(beyond.max() > SEAM_M)
             yield {"of": "seam", "kind": track.category, "object": name, "claim": track.front.seam, "right": over}
 
@@ -319,7 +320,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             json.dumps(figures(claims, {_name(folder) for folder in options.check}), indent=1) + "\n", encoding="utf-8"
         )
     document = json.loads(RESULTS.read_text(encoding="utf-8"))
-    PAGE.write_text(page(document), encoding="utf-8")
+    PAGE.write_text(page(document, json.loads(FRONTS.read_text(encoding="utf-8"))), encoding="utf-8")
     PICTURE.write_text(picture(document), encoding="utf-8")
     return 0
 

@@ -16,8 +16,8 @@ def generator_of(name: str) -> str:
     return name.split()[0]
 
 
-def page(document: Mapping[str, Any]) -> str:
-    """The page of the documentation."""
+def page(document: Mapping[str, Any], fronts: Mapping[str, Any]) -> str:
+    """The page of the documentation; `fronts` are the figures of front_certainty.py."""
     own = [name for name in document["recordings"] if generator_of(name) == "own"]
     lines = [
         "# Calibration of confidences",
@@ -55,6 +55,7 @@ def page(document: Mapping[str, Any]) -> str:
             for generator, g in m["by_generator"].items()
         ),
         "",
+        *_fronts(fronts),
         "## Claims that need no map",
         "",
         "The probability that network and lines give for an edge, or for a seam that was not cut, needs no calibration: a map",
@@ -81,6 +82,29 @@ def page(document: Mapping[str, Any]) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def _fronts(figures: Mapping[str, Any]) -> list[str]:
+    """Section on the certainty of fronts and of the faces of appliances."""
+    count, wrong, makers = sum(figures["faces"].values()), figures["wrong"], len(figures["faces"])
+    return [
+        "## Fronts and faces of appliances",
+        "",
+        'The number that proposals and doubts state ("44 % sure at 44 x 77 cm") is the probability that each edge is within',
+        "10 mm, or 2.5 % of that side, of its true place: a logistic model of the faintest edge, its colour change, a seam",
+        "that was not cut, and the category's usual sizes. Edges are not multiplied: their errors have common causes.",
+        f"`benchmarks/front_certainty.py` fits it on {count} faces of {figures['kitchens']} kitchens by {makers} makers.",
+        f"With each kitchen held out it is off by {figures['off']:.3f}; {figures['wrong_unsure']} of {wrong} wrong faces and",
+        f"{figures['right_unsure']} of {count - wrong} right ones are below 50 %, where a doubt is raised.",
+        "",
+        "| claimed | faces | claimed, mean | right |",
+        "|---|---:|---:|---:|",
+        *(
+            f"| {row['from']:.0%} to {row['to']:.0%} | {row['faces']} | {row['claimed']:.3f} | {row['right']:.3f} |"
+            for row in figures["held_out"]
+        ),
+        "",
+    ]
 
 
 def _row(found: Mapping[str, Any]) -> str:

@@ -115,10 +115,10 @@ def opened_recording(recording: Path, folder: Path) -> tuple[Any, Capture]:
     return open_session(capture, work.cache), capture
 
 
-def true_fronts(truth: Path, world_from_capture: Rigid3) -> Iterator[TrueFront]:
-    """The fronts that a truth.json lists."""
+def true_fronts(truth: Path, world_from_capture: Rigid3, kinds: Sequence[str] = ("front",)) -> Iterator[TrueFront]:
+    """The fronts that a truth.json lists, or the faces of its objects of other kinds of category."""
     for entry in json.loads(truth.read_text(encoding="utf-8"))["objects"]:
-        if category_of(entry["category"]).kind == "front":
+        if category_of(entry["category"]).kind in kinds:
             width, depth, height = entry["dimensions_m"]
             world_from_object = world_from_capture @ Rigid3.from_matrix(np.array(entry["capture_from_object"]))
             face = world_from_object @ Rigid3(np.eye(3), np.array([0.0, -depth / 2, 0.0]))

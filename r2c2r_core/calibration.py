@@ -15,6 +15,12 @@ def probability(log_odds: float) -> float:
     return 1.0 / (1.0 + exp(-log_odds))
 
 
+def log_odds(chance: float) -> float:
+    """Natural log-odds of a probability, which is taken as 0.1 % to 99.9 %."""
+    bounded = min(max(chance, 0.001), 0.999)
+    return log(bounded / (1.0 - bounded))
+
+
 def calibrated(claim: float, slope: float, offset: float) -> float:
     """Calibrated probability of a claimed score in 0..1: its log-odds times `slope` plus `offset`.
 

@@ -262,14 +262,14 @@ class Desk:
         box = self.session.thing_box(prompt) if panel is None else None
         measured = panel is not None or box is not None
         doubts = doubts_about(prompt, panel, box, self.capture) if measured else []
-        said = {"end": "done", "front": self._line(panel), "others": others_line(prompt.others), "doubts": doubts}
+        said = {"end": "done", "front": self._line(prompt, panel), "others": others_line(prompt.others), "doubts": doubts}
         return said | {"motions": motion_lines(self.session.motions(prompt))}
 
     def _front(self, prompt: ObjectPrompt) -> dict[str, Any] | None:
-        return self._line(self.session.panel(prompt))
+        return self._line(prompt, self.session.panel(prompt))
 
-    def _line(self, panel: FrontPanel | None) -> dict[str, Any] | None:
-        return front_line(panel, self.capture.world_from_capture) if panel is not None else None
+    def _line(self, prompt: ObjectPrompt, panel: FrontPanel | None) -> dict[str, Any] | None:
+        return front_line(panel, prompt.category, self.capture.world_from_capture) if panel is not None else None
 
     def _shown(self, found: Glimpse) -> dict[str, Any]:
         frame, packed, confidence = found

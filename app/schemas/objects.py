@@ -103,6 +103,7 @@ class SceneObject(Shape):
     mask_backend: str  # segmenter of the masks; empty without any
     notices: list[str]
     doubts: list[str]  # about its front: implausible size or position for its category, weak edges
+    certainty: float | None  # probability that its front is right, 0..1; None without a front
     saved: float  # time of the last stored change
 
 

@@ -167,12 +167,13 @@ def resume(context: Context) -> None:
 
 
 class MasksState(NamedTuple):
-    """State of the object's masks: progress, number of frames, errors and doubts."""
+    """State of the object's masks: progress, number of frames, errors, doubts, and the certainty of its front."""
 
     state: schemas.SegmentState
     frames: int = 0
     notices: Sequence[str] = ()
     doubts: Sequence[str] = ()
+    certainty: float | None = None
 
 
 def state_of(context: Context, project: Project, item: SceneObject, places: Places | None = None) -> MasksState:
@@ -182,7 +183,8 @@ def state_of(context: Context, project: Project, item: SceneObject, places: Plac
         return MasksState("none")
     error = found.masks.error
     notices = [f"{error['message']}; {error['hint']}".rstrip("; ")] if error else []
-    return MasksState(found.state, len(found.masks), notices, found.masks.doubts)
+    certainty = (found.masks.front or {}).get("certainty")  # files of older versions have none
+    return MasksState(found.state, len(found.masks), notices, found.masks.doubts, certainty)
 
 
 def state_after_follow(context: Context, project: Project, item: SceneObject) -> MasksState:
@@ -338,7 +340,7 @@ def _run_masks(files: ProjectFiles, item: SceneObject | Drawn, segmenter: str, w
             return None
         for older in kept.parent.glob(f"{item.result_name}-*.jsonl"):
             older.unlink(missing_ok=True)
-        front = front_line(track.front, _world_from_capture(files)) if track.front is not None else None
+        front = front_line(track.front, track.category, _world_from_capture(files)) if track.front is not None else None
         others, motions = _run_others(files, item.result_name), motion_lines(track.motions)
         mask_store.write(kept, _entries(track, width), track.backend, front, others, motions)
         found = _stored(kept)

@@ -324,6 +324,7 @@ def _shape(
         mask_backend="",
         notices=[],
         doubts=[],
+        certainty=None,
         saved=saved,
     )
     return _with_masks(shape, project, masks.state_of(context, project, item, places))
@@ -332,7 +333,7 @@ def _shape(
 def _with_masks(shape: schemas.SceneObject, project: Project, now: masks.MasksState) -> schemas.SceneObject:
     """The schema with the given mask state."""
     told: dict[str, object] = {"segment": now.state, "mask_frames": now.frames, "doubts": [*now.doubts]}
-    told |= {"mask_backend": project.segmenter if now.frames else ""}
+    told |= {"certainty": now.certainty, "mask_backend": project.segmenter if now.frames else ""}
     return shape.model_copy(update=told | {"notices": [*now.notices, *_category_notice(shape.category)]})
 
 

@@ -44,7 +44,7 @@ class FrontPanel(Rectangle3):
     confidence: float  # 0..1
     roll_rad: float = 0.0  # in-plane tilt that was found and removed (gravity error)
     edges: tuple[float, ...] = ()  # probability of each edge: left, right, top, bottom; empty where a person drew it
-    right: float = 1.0  # probability that all of them are within 10 mm
+    changes: tuple[float, ...] = ()  # CIELAB colour change at each edge, median along it; in the same order
     seam: float = 0.0  # probability of the most likely seam inside it that was not cut
     slides: float = 0.0  # probability that it slides sideways, over the panel behind it
 

@@ -19,7 +19,8 @@ from r2c2r_core.kitchen.walls import distances_behind
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.contradiction import Contradiction
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.model.track import FrontPanel, MaskTrack
+from r2c2r_core.model.track import MaskTrack
+from r2c2r_core.segment.certainty import front_certainty, unexpected_seam
 from r2c2r_core.tuning import param, tuned
 
 _SIDES = ("left", "right", "upper", "lower")
@@ -70,10 +71,12 @@ class Params:
         source="six sample kitchens: 53 single fronts are at 0.15 or less, 29 pairs taken for one front at 0.9 or more",
     )
     unsure_front: float = param(
-        0.7,
+        0.5,
         "share",
-        "Probability that a front's edges are right and no seam is inside, below which it is questioned",
-        source="development kitchens: below it are 3 of 4 wrong fronts and 1 of 20 correct ones",
+        "Probability that a front is right, below which it is questioned",
+        ge=0,
+        le=1,
+        source="more probably wrong than right",
     )
     in_wall_m: float = param(
         0.04,
@@ -189,7 +192,7 @@ def _unlikely_sizes(track: MaskTrack, category: Category, params: Params) -> Ite
     highest_m = 0.0
     if track.front is not None:
         sizes = {"wide": (track.front.width_m, category.width), "high": (track.front.height_m, category.height)}
-        if category.opens in ("side", "pair") and _certainty(track.front, category)[0] >= params.unsure_front:
+        if category.opens in ("side", "pair") and front_certainty(track.front, category) >= params.unsure_front:
             highest_m = category_of("tall_cabinet").height.high
     elif track.box is not None:
         width, depth, height = track.box.dimensions_m
@@ -243,7 +246,7 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
     front = track.front
     if front is None or not front.edges:
         return
-    sure, seam = _certainty(front, category)
+    sure, seam = front_certainty(front, category), unexpected_seam(front, category)
     if sure >= params.unsure_front:
         return
     sides = [side for side, odds in zip(_SIDES, front.edges, strict=True) if odds < params.unsure_edge]
@@ -257,18 +260,6 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
         f"{': ' * bool(doubts)}{', and '.join(doubts)}",
         mend="click beside it, off it, to move an edge there; or draw it in the elevation",
     )
-
-
-def _certainty(front: FrontPanel, category: Category) -> tuple[float, float]:
-    """Probability that all edges are right and no seam is inside, and that of an unexpected seam."""
-    seam = 0.0 if has_seams(category, front.width_m) else front.seam
-    return front.right * (1 - seam), seam
-
-
-def has_seams(category: Category, width_m: float) -> bool:
-    """Whether seams across a front are expected: two doors, a stack, or an appliance's window, keypad or drawer."""
-    pair = category.opens == "pair" or (category.wider is not None and width_m >= category.wider[0])
-    return pair or category.one_front or category.several_fronts or category.kind == "appliance"
 
 
 def _range(size: Size) -> str:

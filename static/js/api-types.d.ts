@@ -422,6 +422,7 @@ export interface FoundFront {
   object: number;
   corners_m: number[][];
   handle: PromptsFileHandle | null;
+  certainty: number | null;
   edges: number[];
 }
 
@@ -1268,6 +1269,7 @@ export interface SceneObject {
   mask_backend: string;
   notices: string[];
   doubts: string[];
+  certainty: number | null;
   saved: number;
 }
 

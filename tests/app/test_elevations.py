@@ -170,7 +170,8 @@ def test_a_detected_front_is_sent_in_the_format_of_a_drawn_one() -> None:
     into_capture = Rigid3(np.eye(3), np.array([1.0, 0.0, 0.0]))
     at = Rigid3(front_rotation(np.array([0.0, -1.0, 0.0])), np.array([0.3, 2.0, 0.45]))
     panel = FrontPanel(world_from_front=at, width_m=0.6, height_m=0.7, handle=None, confidence=1.0)
-    line = front_line(panel, into_capture.inverse)
+    line = front_line(panel, "cabinet", into_capture.inverse)
     there = np.array(CORNERS) + np.array([1.0, 0.0, 0.0])
     np.testing.assert_allclose(line["corners_m"], there, atol=1e-6)
+    assert line["certainty"] == 1.0  # nothing was detected that could be wrong
     assert line["handle"] is None

@@ -39,7 +39,7 @@ class FoundDrawn(FoundFront):
 
     def panel(self) -> FrontPanel | None:
         """Drawn rectangle, with full confidence, and its handle."""
-        return replace(front_panel(self.front), confidence=1.0)
+        return replace(front_panel(self.front), confidence=1.0, edges=(), changes=(), seam=0.0)
 
 
 def _grid_around(face: Rectangle3, cell_m: float) -> tuple[PlaneGrid, Cell]:

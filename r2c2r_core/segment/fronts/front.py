@@ -1,5 +1,6 @@
 """The clicked panel as a metric rectangle on its run's plane, and its mask in every frame by reprojection."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +15,6 @@ from r2c2r_core.model.capture import Frame, Room
 from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.rectangle import TOWARDS, Rectangle3
 from r2c2r_core.model.track import FrontHandle, FrontPanel
-from r2c2r_core.segment.fronts.certainty import Params as CertaintyParams
-from r2c2r_core.segment.fronts.certainty import edges_right
 from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
@@ -42,6 +41,7 @@ class Params:
     usual_protrusion_m: float = param(
         0.035, "m", "Protrusion of a handle without relief", source="bar handles protrude by 25-40 mm"
     )
+    faintest: float = param(0.1, "share", "Quantile of the log-odds along a seam that stands for its faintest part")
     handle_share: float = param(0.35, "share", "Maximum fraction of a panel that its handle may cover: more is its frame")
     pair_width_share: float = param(
         0.08, "share", "Maximum relative difference in width of the two doors of a pair: they are equally wide"
@@ -152,7 +152,8 @@ def own_handle(handle: GridHandle | None, panel: Cell) -> GridHandle | None:
 
 def front_panel(front: Front) -> FrontPanel:
     """Measured rectangle in the `front` frame."""
-    face, strengths = front.rectangle, edge_strengths(front)
+    face, changes = front.rectangle, edge_changes(front.run.mosaic, front.cell)
+    strengths = _edge_strengths(front, changes)
     return FrontPanel(
         world_from_front=face.world_from_front,
         width_m=face.width_m,
@@ -161,7 +162,7 @@ def front_panel(front: Front) -> FrontPanel:
         confidence=float(np.mean(strengths)),
         roll_rad=front.run.roll_rad,
         edges=strengths,
-        right=edges_right(front.run, front.cell),
+        changes=changes,
         seam=seam_inside(front),
     )
 
@@ -400,13 +401,12 @@ def _handle_in_front(front: Front, cell: Cell) -> FrontHandle:
     )
 
 
-def edge_strengths(front: Front) -> tuple[float, ...]:
-    """Probability that each edge is where it was found: left, right, top, bottom.
+def _edge_strengths(front: Front, changes: Iterable[float]) -> tuple[float, ...]:
+    """Probability that each edge is where it was found, from its CIELAB colour change: left, right, top, bottom.
 
     Where no colour changes, an edge comes from depth alone, and depth ends 1-3 cm short of edges.
     """
     params, odds = tuned(Params), front.run.odds.of_edges(front.cell)
-    changes = edge_changes(front.run.mosaic, front.cell)
     return tuple(
         min(probability(each), 1.0 if change >= params.edge_lab else params.unseen_edge)
         for each, change in zip(odds, changes, strict=True)
@@ -415,8 +415,8 @@ def edge_strengths(front: Front) -> tuple[float, ...]:
 
 def seam_inside(front: Front) -> float:
     """Probability of the likeliest uncut seam inside a panel."""
-    field, faintest = LineField(front.run.odds, front.run.grid.cell_m), tuned(CertaintyParams).faintest
-    return probability(field.best_uncut(front.cell, tuned(Params).border_m, faintest))
+    params, field = tuned(Params), LineField(front.run.odds, front.run.grid.cell_m)
+    return probability(field.best_uncut(front.cell, params.border_m, params.faintest))
 
 
 _SIDE_EDGES: dict[HingeSide, tuple[int, int]] = {"left": (0, 3), "right": (1, 2), "bottom": (2, 3), "top": (0, 1)}

@@ -10,7 +10,8 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.kitchen.walls import distances_behind
 from r2c2r_core.model.capture import Room
 from r2c2r_core.model.rectangle import Rectangle3
-from r2c2r_core.segment.fronts.front import Front, edge_strengths, find_front
+from r2c2r_core.segment.certainty import front_certainty
+from r2c2r_core.segment.fronts.front import Front, find_front, front_panel
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.proposals.naming import FrontLook, name_front
 from r2c2r_core.segment.runs.run import Run
@@ -134,7 +135,7 @@ def _judge(front: Front | None, room: Room, *, pair: bool = False) -> Panel | No
     category, usual = name_front(look)
     by_handle = category_of(category).one_front and not category_of(category).dark
     plain = name_front(look, machines=False)[0] if by_handle else None
-    return Panel(front, category, usual * _evidence(front, area, room), usual, plain)
+    return Panel(front, category, usual * _evidence(front, category_of(category), area, room), usual, plain)
 
 
 def _beside(panel: Panel, others: list[Panel]) -> Panel:
@@ -168,23 +169,14 @@ def _odd_one_out(mates: list[Panel]) -> bool:
     return bool(handles) and all(handle is not None and handle.height > upright * handle.width for handle in handles)
 
 
-def outlined(front: Front, *, stands: bool = False) -> float:
-    """Probability that all sides are edges of a front: that of the faintest, since light and colour errors are common to all.
-
-    The bottom edge of a standing object (`stands`) lies in shadow, and depth shows its support.
-    """
-    left, right, top, bottom = edge_strengths(front)
-    return min(left, right, top) if stands else min(left, right, top, bottom)
-
-
-def _evidence(front: Front, area: tuple[slice, slice], room: Room) -> float:
-    """Confidence (0..1) from edges, handle, flatness by depth, and distance from walls."""
+def _evidence(front: Front, category: Category, area: tuple[slice, slice], room: Room) -> float:
+    """Confidence (0..1) from the certainty of its edges, handle, flatness by depth, and distance from walls."""
     params = tuned(Params)
     handle = front.handle.confidence if front.handle is not None else 0.0
     handled = params.without_handle + (1 - params.without_handle) * handle
     flat = np.clip((front.run.seen[area].mean() - params.unseen) / (params.seen - params.unseen), 0, 1)
     free = params.on_wall if is_on_wall(front.run, room, params.shallowest_m) else 1.0
-    return float(outlined(front) * handled * flat * free)
+    return float(front_certainty(front_panel(front), category) * handled * flat * free)
 
 
 def is_on_wall(run: Run, room: Room, shallowest_m: float) -> bool:

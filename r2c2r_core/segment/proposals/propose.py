@@ -16,15 +16,16 @@ from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.segment.appliances.found import FoundAppliance
+from r2c2r_core.segment.certainty import front_certainty
 from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.found import FoundFront
-from r2c2r_core.segment.fronts.front import front_mask
+from r2c2r_core.segment.fronts.front import front_mask, front_panel
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.prepared import PreparedCapture
 from r2c2r_core.segment.proposals.clicks import best_views, click_on, clump_clicks, panel_clicks
 from r2c2r_core.segment.proposals.clutter import Clump, find_clumps
 from r2c2r_core.segment.proposals.naming import name_thing
-from r2c2r_core.segment.proposals.panels import Panel, find_panels, is_on_wall, outlined, without_sides
+from r2c2r_core.segment.proposals.panels import Panel, find_panels, is_on_wall, without_sides
 from r2c2r_core.tuning import param, tuned
 
 Steps = Iterator[tuple[float, tuple[Proposal, ...]]]
@@ -48,9 +49,6 @@ class Params:
     same_front: float = param(0.7, "score", "Minimum IoU of a click's result with the proposed panel")
     larger: float = param(1.8, "ratio", "Maximum size of a click's result relative to the cluster")
     larger_m: float = param(0.05, "m", "Additional tolerance of that size")
-    odd_size: float = param(
-        8.0, "ratio", "Sum of squared deviations from the usual size at which the confidence falls to 1/e", gt=0
-    )
     taken_share: float = param(0.4, "share", "Maximum fraction of an outline that other proposals may cover")
     clash_m: float = param(
         0.01,
@@ -195,10 +193,8 @@ def _boxes(prepared: PreparedCapture, plane: PlaneRegion) -> list[Panel]:
     found = _confirmed(prepared, kind.name, click_on(prepared.scene, middle, plane.outward))
     if not isinstance(found, FoundAppliance) or is_on_wall(found.front.run, room, params.shallowest_box_m):
         return []
-    cell, cell_m = found.front.cell, found.front.run.grid.cell_m
-    off = np.array([kind.width.deviation(cell.width * cell_m), kind.height.deviation(cell.height * cell_m)])
     front = replace(found.front, depth_m=min(found.front.depth_m, kind.depth.high))
-    return [Panel(front, kind.name, outlined(front, stands=True) * float(np.exp(-(off @ off) / params.odd_size)))]
+    return [Panel(front, kind.name, front_certainty(front_panel(front), kind))]
 
 
 # Presentation: the frame that shows a proposal best, and a click there that selects it

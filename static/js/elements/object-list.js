@@ -357,5 +357,7 @@ function state({ object, current, sure }) {
   if (object.segment === "partial") return line(`${clicks} · `, `stopped after ${frames}`);
   const drawn = h("span", { class: "chip", title: "the segmenter that drew its masks" }, object.mask_backend);
   if (sure === null) return line(`${clicks} · `, frames, " ", current ? drawn : null);
-  return line(`${clicks} · ${frames} · `, `masks ${Math.round(100 * sure)} %`, " ", current ? drawn : null);
+  const share = Math.round(100 * (object.certainty ?? sure));
+  const told = object.certainty === null ? `masks ${share} %` : `${share} % sure`;
+  return line(`${clicks} · ${frames} · `, told, " ", current ? drawn : null);
 }

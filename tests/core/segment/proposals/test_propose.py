@@ -1,5 +1,4 @@
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.segment.fronts.found import FoundFront
-from r2c2r_core.segment.fronts.front import Front
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.mosaics.handles import GridHandle
 from r2c2r_core.segment.proposals import panels
@@ -143,11 +141,3 @@ def test_plinths_walls_and_fillers_get_a_low_front_score(width: float, height: f
 )
 def test_size_determines_the_category_of_a_thing(extent: tuple[float, float, float], base: float, category: str) -> None:
     assert name_thing(np.array(extent), base) == category
-
-
-def test_the_lower_edge_is_ignored_only_for_floor_standing_objects(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The lower edge of a refrigerator lies in shadow: the network sees no edge there."""
-    monkeypatch.setattr(panels, "edge_strengths", lambda _: (0.96, 0.97, 0.98, 0.12))
-    front = cast(Front, None)  # only the edges of the front are evaluated
-    assert panels.outlined(front, stands=True) == 0.96
-    assert panels.outlined(front) == 0.12
