@@ -52,7 +52,7 @@ def _only(bundle: Path, name: str) -> bytes:
     with zipfile.ZipFile(bundle) as archive, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as out:
         top = root_of(archive)
         for entry in archive.infolist():
-            if PurePosixPath(entry.filename.removeprefix(top)).parts[:2] in (("assets", name), ("meshes", name)):
+            if PurePosixPath(entry.filename.removeprefix(top)).parts[:2] == ("assets", name):
                 out.writestr(entry.filename.removeprefix(top), archive.read(entry))
     return made.getvalue()
 

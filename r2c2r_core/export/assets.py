@@ -1,6 +1,6 @@
 """Each object as a separate asset: origin at the centre of its base, front at -y, closed, without the rest of the scene.
 
-An asset's files lie in `assets/<object>/` and refer to the meshes of the bundle, so that no texture is stored twice.
+An asset's folder `assets/<object>/` is complete: it holds the meshes, to which the scene refers as well.
 """
 
 from collections.abc import Iterator
@@ -8,15 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from r2c2r_core.export.plan import WORLD, Body, Plan, collider_corners_world
+from r2c2r_core.export.plan import ASSETS, MESHES, WORLD, Body, Plan, collider_corners_world
 from r2c2r_core.geometry.transforms import Rigid3
-
-_UP = "../../"  # from an asset's folder to the bundle's
 
 
 def asset_file(object_name: str, suffix: str) -> str:
     """An asset's file in the bundle; `suffix` begins with a dot."""
-    return f"assets/{object_name}/{object_name}{suffix}"
+    return f"{ASSETS}/{object_name}/{object_name}{suffix}"
 
 
 def object_names(plan: Plan) -> tuple[str, ...]:
@@ -60,6 +58,5 @@ def _in_asset(body: Body, asset_from_world: Rigid3, *, is_base: bool) -> Body:
         world_from_body=pose,
         parent=WORLD if is_base else body.parent,
         parent_from_body=pose if is_base else body.parent_from_body,
-        bundle=_UP,
-        texture_file=None if body.texture_file is None else f"{_UP}{body.texture_file}",
+        folder=MESHES,
     )

@@ -20,6 +20,8 @@ from r2c2r_core.model.handle import Handle
 from r2c2r_core.model.scene import ArticulatedScene, Box, ConvexPiece, Inertial, Joint, Link, SceneObject
 
 WORLD = "world"
+ASSETS, MESHES = "assets", "meshes"
+"""Folder of all objects, and folder of the meshes within one object's own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,14 +39,14 @@ class Body:
     axis_body: Vector3 | None
     free: bool  # a free rigid body, where the format supports it: then its parent only carries it
     link: Link
-    texture_file: str | None  # relative to the bundle; bodies of one object share equal textures
+    folder: str  # of its meshes, relative to the written file
+    texture: str | None  # file in the folder; bodies of one object share equal textures
     is_support: bool = False  # a plate of support.py, not part of the object
-    bundle: str = ""  # the bundle's folder, relative to the written file
 
     @property
-    def folder(self) -> str:
-        """Folder of its meshes, relative to the written file."""
-        return f"{self.bundle}meshes/{self.object_name}"
+    def texture_file(self) -> str | None:
+        """PNG of the fitted mesh, relative to the written file."""
+        return None if self.texture is None else f"{self.folder}/{self.texture}"
 
     @property
     def visual_file(self) -> str | None:
@@ -138,7 +140,8 @@ def _bodies_of(item: SceneObject, taken: set[str], carrier: Body | None) -> list
                 axis_body=None if found is None else link.object_from_link.rotation.T @ _unit(found.axis_object),
                 free=item.movable and base,
                 link=link,
-                texture_file=_texture_file(item.name, name, link, textures),
+                folder=f"{ASSETS}/{item.name}/{MESHES}",
+                texture=_texture(name, link, textures),
             )
         )
     return bodies
@@ -202,12 +205,12 @@ def facing(plan: Plan) -> Vector3 | None:
     return total / length if length > 1e-3 else None
 
 
-def _texture_file(object_name: str, body_name: str, link: Link, textures: dict[str, str]) -> str | None:
+def _texture(body_name: str, link: Link, textures: dict[str, str]) -> str | None:
     if link.visual is None:
         return None
     texture = np.ascontiguousarray(link.visual.texture)
     digest = hashlib.sha256(repr(texture.shape).encode() + texture.tobytes()).hexdigest()
-    return textures.setdefault(digest, f"meshes/{object_name}/{body_name}_vis.png")
+    return textures.setdefault(digest, f"{body_name}_vis.png")
 
 
 def _starting_with(object_name: str, name: str, bare: str) -> str:

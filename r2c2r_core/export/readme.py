@@ -47,9 +47,9 @@ FILES
   manifest.json  where every number comes from                  report.html the certificate, for reading
   gripper/ arm/  a sheet of pictures of a gripper, and of an arm with the places where it stands, at every joint they tried
   assets/        each object alone (.urdf .xml .usda .glb): origin under the middle of its foot, front at -Y, closed, no floor,
-                 no gravity; textures and meshes are those of meshes/, so keep the two folders side by side
+                 no gravity, each folder complete in itself; the scene's files use the same meshes:
+    OBJECT/meshes/  textured OBJ to see (_vis), convex OBJ to touch (_col_); boxes stand in scene.urdf and scene.xml
   preview.png    the scene
-  meshes/        textured OBJ to see (_vis), convex OBJ to touch (_col_); boxes stand in scene.urdf and scene.xml
 
 LOADING  (unpack first; run in the bundle's folder)
 {simulators}

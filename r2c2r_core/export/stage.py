@@ -22,7 +22,7 @@ from r2c2r_core.export.lint import lint
 from r2c2r_core.export.looks import looks_of
 from r2c2r_core.export.manifest import manifest_of, with_blockers
 from r2c2r_core.export.pictures import write_pictures
-from r2c2r_core.export.plan import Plan, plan_bundle
+from r2c2r_core.export.plan import ASSETS, Plan, plan_bundle
 from r2c2r_core.export.preview import preview_png
 from r2c2r_core.export.readme import readme_text
 from r2c2r_core.export.report import report_html, report_of
@@ -158,7 +158,7 @@ def _with_meshes(scene: ArticulatedScene, folder: Path, texture_max_px: int) -> 
             for body in plan.of(item.name):
                 write_body(body, folder, texture_max_px)
     for name in lost:
-        shutil.rmtree(folder / "meshes" / name, ignore_errors=True)
+        shutil.rmtree(folder / ASSETS / name, ignore_errors=True)
     written = replace(plan, bodies=tuple(body for body in plan.bodies if body.object_name not in lost))
     return with_handles(supported(written)), lost
 

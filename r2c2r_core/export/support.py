@@ -124,7 +124,8 @@ def _plate(thing: Body, points: Points) -> Body:
         axis_body=None,
         free=False,
         link=link,
-        texture_file=None,
+        folder="",
+        texture=None,
         is_support=True,
     )
 

@@ -40,7 +40,7 @@ def test_a_bundle_limited_to_formats_has_their_scenes_manifest_and_report(tmp_pa
     whole = tmp_path / "whole.zip"
     scenes = {"scene.urdf", "scene.srdf", "scene.xml", "scene.usda", "scene.usdz", "scene.glb", "package.xml", "ros/scene.urdf"}
     assets = {f"assets/a/a{suffix}" for suffix in (".urdf", ".xml", ".usda", ".glb")}
-    names = {*scenes, *assets, "manifest.json", "report.html", "meshes/a/a.obj"}
+    names = {*scenes, *assets, "manifest.json", "report.html", "assets/a/meshes/a.obj"}
     with zipfile.ZipFile(whole, "w") as archive:
         for name in sorted(names):
             archive.writestr(name, "{}" if name == "manifest.json" else name)
@@ -49,9 +49,9 @@ def test_a_bundle_limited_to_formats_has_their_scenes_manifest_and_report(tmp_pa
         return set(zipfile.ZipFile(io.BytesIO(_with_formats(whole, frozenset(formats)))).namelist())
 
     proof = {"manifest.json", "report.html"}
-    assert members("urdf") == {"scene.urdf", "scene.srdf", "assets/a/a.urdf", "meshes/a/a.obj", *proof}
-    assert members("mjcf") == {"scene.xml", "assets/a/a.xml", "meshes/a/a.obj", *proof}
-    assert members("usd") == {"scene.usda", "scene.usdz", "assets/a/a.usda", "meshes/a/a.obj", *proof}
-    assert members("ros") == {"package.xml", "ros/scene.urdf", "meshes/a/a.obj", *proof}
-    assert members("glb") == {"scene.glb", *proof}  # the GLB of an asset refers to textures in meshes/
+    assert members("urdf") == {"scene.urdf", "scene.srdf", "assets/a/a.urdf", "assets/a/meshes/a.obj", *proof}
+    assert members("mjcf") == {"scene.xml", "assets/a/a.xml", "assets/a/meshes/a.obj", *proof}
+    assert members("usd") == {"scene.usda", "scene.usdz", "assets/a/a.usda", "assets/a/meshes/a.obj", *proof}
+    assert members("ros") == {"package.xml", "ros/scene.urdf", "assets/a/meshes/a.obj", *proof}
+    assert members("glb") == {"scene.glb", *proof}  # the GLB of an asset refers to textures beside it
     assert members("urdf", "mjcf", "usd", "glb", "ros") == names

@@ -67,7 +67,7 @@ _CMAKE = """\
 cmake_minimum_required(VERSION 3.8)
 project(@package@ NONE)
 find_package(ament_cmake REQUIRED)
-install(DIRECTORY meshes ros DESTINATION share/${PROJECT_NAME})
+install(DIRECTORY assets ros DESTINATION share/${PROJECT_NAME})
 ament_package()
 """
 

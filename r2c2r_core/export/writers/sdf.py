@@ -4,6 +4,7 @@ A base is fixed to the world by a joint; only free-standing objects have none an
 """
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,15 +31,14 @@ def sdf_text(plan: Plan) -> str:
     world = ET.SubElement(root, "world", name=plan.name)
     _add_surroundings(world, plan)
     plates = [body for body in plan.bodies if body.is_support]
-    files = {body.name: body for body in plan.bodies}  # paths relative to the scene's folder, not the asset's
     for asset in assets_of(plan):
         model = _add_model(world, asset.name, world_from_asset(plan, asset.name))
         for body in asset.bodies:
-            _add_link(model, body, files[body.name])
+            _add_link(model, replace(body, folder=plan.body(body.name).folder))  # paths relative to the scene
             _add_joint(model, body)
     for plate in plates:
         model = _add_model(world, plate.name, Rigid3())
-        _add_link(model, plate, plate)
+        _add_link(model, plate)
         _add_joint(model, plate)
     ET.indent(root)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
@@ -77,8 +77,7 @@ def _add_surroundings(world: ET.Element, plan: Plan) -> None:
         ET.SubElement(image, key).text = str(pixels)
 
 
-def _add_link(model: ET.Element, body: Body, named: Body) -> None:
-    """Add a body with its pose in the asset; `named` is the same body with file paths relative to the scene."""
+def _add_link(model: ET.Element, body: Body) -> None:
     link = ET.SubElement(model, "link", name=body.name)
     _add_pose(link, body.world_from_body)
     if body.joint is not None and body.joint.has_stay:
@@ -89,18 +88,18 @@ def _add_link(model: ET.Element, body: Body, named: Body) -> None:
     inertia = ET.SubElement(inertial, "inertia")
     for key, entry in {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}.items():
         ET.SubElement(inertia, key).text = numbers(body.link.inertial.inertia[entry])
-    if named.visual_file is not None:
-        _add_mesh(ET.SubElement(link, "visual", name=f"{body.name}_vis"), named.visual_file)
+    if body.visual_file is not None:
+        _add_mesh(ET.SubElement(link, "visual", name=f"{body.name}_vis"), body.visual_file)
     for number, box in enumerate(body.link.boxes):
-        if named.visual_file is None:
+        if body.visual_file is None:
             visual = ET.SubElement(link, "visual", name=f"{body.name}_vis_{number}")
             _add_box(visual, box.link_from_box, box.size_m)
             ET.SubElement(ET.SubElement(visual, "material"), "diffuse").text = numbers([*body.link.colour, 1.0])
-    for number, file in enumerate(named.collision_files):
+    for number, file in enumerate(body.collision_files):
         shape = ET.SubElement(link, "collision", name=f"{body.name}_col_{number}")
         _add_mesh(shape, file)
         _add_surface(shape)
-    for number, box in enumerate(body.link.boxes, start=len(named.collision_files)):
+    for number, box in enumerate(body.link.boxes, start=len(body.collision_files)):
         shape = ET.SubElement(link, "collision", name=f"{body.name}_col_{number}")
         _add_box(shape, box.link_from_box, box.size_m)
         _add_surface(shape)

@@ -26,7 +26,7 @@ class Format:
     name: str
     file: str
     opened_by: str
-    reads_meshes: bool  # also uses the files below meshes/
+    reads_meshes: bool  # also uses the meshes below assets/
     write: Callable[[Plan, Path], None]
     loses: tuple[str, ...]  # information that this file does not contain
     others: tuple[str, ...] = ()  # further files and folders of this format, in the bundle

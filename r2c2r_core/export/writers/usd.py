@@ -173,7 +173,7 @@ def _write_looks(stage: Any, plan: Plan, root: str) -> dict[str, Any]:
         uv.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
         picture = UsdShade.Shader.Define(stage, f"{base}/picture")
         picture.CreateIdAttr("UsdUVTexture")
-        picture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(body.texture_file)
+        picture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./{body.texture_file}")
         picture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
         picture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(
             uv.CreateOutput("result", Sdf.ValueTypeNames.Float2)

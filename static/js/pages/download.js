@@ -13,7 +13,7 @@ import { live } from "../live.js";
 /** @typedef {import("../api-types").Bundle} Bundle */
 
 const CONTENT = [
-  ["meshes/", "textured OBJ visuals and convex colliders, relative paths"],
+  ["assets/", "a complete folder for each object: its files in each format, textured OBJ visuals and convex colliders"],
   ["manifest.json", "every dimension and joint with where it came from"],
   ["review.html", "the scene to open and turn, in any browser, without a server"],
   ["report.html", "certificate and accuracy, for a person"],

@@ -26,9 +26,25 @@ def moved_away(good_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     return good_folder
 
 
-def test_every_object_has_assets_in_four_formats_without_textures(good_folder: Path) -> None:
-    found = {p.relative_to(good_folder).as_posix() for p in (good_folder / "assets").rglob("*") if p.is_file()}
+def test_every_object_has_assets_in_four_formats(good_folder: Path) -> None:
+    found = {p.relative_to(good_folder).as_posix() for p in (good_folder / "assets").glob("*/*") if p.is_file()}
     assert found == {f"assets/{name}/{name}{suffix}" for name in OBJECTS for suffix in (".urdf", ".xml", ".usda", ".glb")}
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_an_assets_folder_is_complete_without_the_bundle(good_folder: Path, tmp_path: Path, name: str) -> None:
+    from pxr import UsdUtils
+
+    alone = tmp_path / name
+    shutil.copytree(good_folder / "assets" / name, alone)
+    mujoco.MjModel.from_xml_path(str(alone / f"{name}.xml"))
+    yourdfpy.URDF.load(str(alone / f"{name}.urdf"), load_meshes=True)
+    layers, textures, unresolved = UsdUtils.ComputeAllDependencies(str(alone / f"{name}.usda"))
+    assert not unresolved
+    assert all(Path(path).is_relative_to(alone) for path in [layers[0].realPath, *textures])
+    images = document_of(alone / f"{name}.glb")[0].get("images", [])
+    assert all((alone / image["uri"]).is_file() for image in images)
+    assert images or name not in ("cabinet_1", "bottle_1")  # those with a texture
 
 
 @pytest.mark.parametrize("name", OBJECTS)
@@ -162,7 +178,7 @@ def test_the_ros_package_resolves_its_meshes_and_has_a_handle_link(good_folder: 
         assert start == ""
         assert (good_folder / path).is_file()
     assert "cabinet_1_door_handle" in {link.get("name") for link in robot.findall("link")}
-    assert "meshes ros" in (good_folder / "CMakeLists.txt").read_text()
+    assert "assets ros" in (good_folder / "CMakeLists.txt").read_text()
 
 
 @pytest.mark.parametrize(
@@ -194,7 +210,7 @@ def test_every_sdf_joint_has_zero_spring_reference_and_stiffness(good_folder: Pa
 )
 def test_an_asset_with_a_path_outside_the_bundle_fails_the_linter(good_folder: Path, name: str) -> None:
     path = good_folder / name
-    path.write_text(path.read_text().replace("../../meshes", "../../../../meshes"))
+    path.write_text(path.read_text().replace("meshes/", "../../../meshes/"))
     assert {f.rule for f in lint(good_folder)} == {"asset-path"}
 
 

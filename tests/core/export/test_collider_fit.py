@@ -56,7 +56,7 @@ def test_the_certificate_warns_of_a_collider_far_from_its_visual(tmp_path: Path)
     assert {fit.link for fit in collider_fits(read_urdf(folder / "scene.urdf"), BundleFiles(folder=folder))} >= {
         "cabinet_1_door"
     }
-    path = folder / "meshes" / "bottle_1" / "bottle_1_body_vis.obj"
+    path = folder / "assets" / "bottle_1" / "meshes" / "bottle_1_body_vis.obj"
     lines = path.read_text().splitlines()
     moved = [_shifted(line, 3 * FAR_COLLIDER_M) if line.startswith("v ") else line for line in lines]
     path.write_text("\n".join(moved) + "\n")

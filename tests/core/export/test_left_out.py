@@ -62,7 +62,7 @@ def test_an_object_that_fails_to_export_is_omitted_and_reported(
     assert set(certificate.left_out) == {"bottle_1"}
     assert certificate.left_out["bottle_1"].startswith("export: bottle_1: error: ")
     found = names(tmp_path / "b.zip")
-    assert not [path for path in found if path.startswith("meshes/bottle_1/")]
+    assert not [path for path in found if path.startswith("assets/bottle_1/")]
     with zipfile.ZipFile(tmp_path / "b.zip") as archive:
         urdf = archive.read("scene.urdf").decode()
         assert "bottle_1" not in urdf

@@ -14,8 +14,8 @@ from r2c2r_core.export.lint import lint
 from r2c2r_core.export.rules.table import RULES
 
 Plant = Callable[[Path], None]
-DOOR_MESH = "meshes/cabinet_1/cabinet_1_door_vis.obj"
-BOTTLE_HULL = "meshes/bottle_1/bottle_1_body_col_0.obj"
+DOOR_MESH = "assets/cabinet_1/meshes/cabinet_1_door_vis.obj"
+BOTTLE_HULL = "assets/bottle_1/meshes/bottle_1_body_col_0.obj"
 
 
 def urdf(edit: Callable[[ET.Element], object]) -> Plant:
@@ -233,9 +233,9 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
         lambda f: edit_text(f / DOOR_MESH, "mtllib cabinet_1_door_vis.mtl", "mtllib ../../../x.mtl"),
         set(),
     ),
-    ("mesh-spaces", "a space", renamed_mesh("meshes/cabinet_1/my door.obj"), {"asset-missing"}),
+    ("mesh-spaces", "a space", renamed_mesh("assets/cabinet_1/meshes/my door.obj"), {"asset-missing"}),
     ("mesh-missing", "no file", lambda f: (f / DOOR_MESH).unlink(), set()),
-    ("mesh-format", "glb", renamed_mesh("meshes/cabinet_1/door.glb"), {"asset-missing"}),
+    ("mesh-format", "glb", renamed_mesh("assets/cabinet_1/meshes/door.glb"), {"asset-missing"}),
     ("mesh-scale", "millimetres", urdf(lambda r: first_mesh(r).set("scale", "0.001 0.001 0.001")), {"mesh-size"}),
     ("mesh-scale", "mirrored", urdf(lambda r: first_mesh(r).set("scale", "-1 1 1")), {"com-outside"}),
     (
@@ -244,7 +244,7 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
         both(
             urdf(lambda r: same_basename(r)),
             lambda f: copy_mesh(f),
-            manifest(lambda d: d["objects"][0]["meshes"]["visual"].append("meshes/other/cabinet_1_door_vis.obj")),
+            manifest(lambda d: d["objects"][0]["meshes"]["visual"].append("assets/other/meshes/cabinet_1_door_vis.obj")),
         ),
         set(),
     ),
@@ -323,7 +323,7 @@ CASES: list[tuple[str, str, Plant, set[str]]] = [
     (
         "asset-path",
         "a texture elsewhere",
-        text("assets/cabinet_1/cabinet_1.usda", "@../../meshes/", "@../../../meshes/"),
+        text("assets/cabinet_1/cabinet_1.usda", "@./meshes/", "@../../../meshes/"),
         set(),
     ),
     ("asset-missing", "another mesh", text("assets/bottle_1/bottle_1.xml", "_col_0.obj", "_col_7.obj"), set()),
@@ -346,14 +346,14 @@ def second_parent() -> ET.Element:
 def same_basename(root: ET.Element) -> None:
     visual = ET.SubElement(named(root, "link", "cabinet_1_base"), "visual", name="again")
     geometry = ET.SubElement(visual, "geometry")
-    ET.SubElement(geometry, "mesh", filename="meshes/other/cabinet_1_door_vis.obj")
+    ET.SubElement(geometry, "mesh", filename="assets/other/meshes/cabinet_1_door_vis.obj")
 
 
 def copy_mesh(folder: Path) -> None:
-    (folder / "meshes/other").mkdir()
+    (folder / "assets/other/meshes").mkdir(parents=True)
     for suffix in (".obj", ".mtl", ".png"):
         source = (folder / DOOR_MESH).with_suffix(suffix)
-        (folder / "meshes/other" / source.name).write_bytes(source.read_bytes())
+        (folder / "assets/other/meshes" / source.name).write_bytes(source.read_bytes())
 
 
 def edit_text(path: Path, old: str, new: str) -> None:

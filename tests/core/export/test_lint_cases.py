@@ -62,7 +62,7 @@ CASES = (
     Case(1, "relative meshes, but MuJoCo 3 strips their folders", "mujoco-block", urdf(lambda r: without(r, "mujoco"))),
     Case(2, "../meshes, as ROS lays packages out", "mesh-path", referring_to("../meshes/x.obj")),
     Case(3, "package://", "mesh-path", referring_to("package://cab/meshes/x.obj")),
-    Case(4, "a .glb visual", "mesh-format", renamed_mesh("meshes/cabinet_1/door.glb")),
+    Case(4, "a .glb visual", "mesh-format", renamed_mesh("assets/cabinet_1/meshes/door.glb")),
     Case(5, "no <inertial>", "inertial-missing", urdf(lambda r: without(door(r), "inertial"))),
     Case(6, "A + B < C", "inertia-triangle", urdf(lambda r: set_inertia(r, ixx="0.01", iyy="0.01", izz="0.5"))),
     Case(7, "a mover without mass", "mass-positive", edit_door("inertial/mass", value="0")),
@@ -91,7 +91,7 @@ CASES = (
         both(
             urdf(same_basename),
             copy_mesh,
-            manifest(lambda d: d["objects"][0]["meshes"]["visual"].append("meshes/other/cabinet_1_door_vis.obj")),
+            manifest(lambda d: d["objects"][0]["meshes"]["visual"].append("assets/other/meshes/cabinet_1_door_vis.obj")),
         ),
     ),
     Case(22, "two roots: a loose link", "root", urdf(lambda r: r.append(loose("bottle_1_loose")))),
@@ -101,7 +101,7 @@ CASES = (
         25, "scale= instead of metres in the file", "mesh-scale", urdf(lambda r: first_mesh(r).set("scale", "0.01 0.01 0.01"))
     ),
     Case(26, "a negative scale", "mesh-scale", urdf(lambda r: first_mesh(r).set("scale", "-1 1 1"))),
-    Case(27, "a space in a path", "mesh-spaces", renamed_mesh("meshes/cabinet_1/my door.obj")),
+    Case(27, "a space in a path", "mesh-spaces", renamed_mesh("assets/cabinet_1/meshes/my door.obj")),
 )
 
 

@@ -158,7 +158,7 @@ def test_the_good_bundle_loads_in_sapien(good_folder: Path) -> None:
 
 def test_a_missing_collider_mesh_fails_the_loaders(good_folder: Path) -> None:
     """PyBullet silently ignores a missing mesh; the comparison of collision shapes detects it."""
-    (good_folder / "meshes/bottle_1/bottle_1_body_col_0.obj").unlink()
+    (good_folder / "assets/bottle_1/meshes/bottle_1_body_col_0.obj").unlink()
     found = verdicts(good_folder)
     assert found["PyBullet"].state == "failed"
     assert found["MuJoCo (URDF)"].state == "failed"

@@ -18,7 +18,7 @@ from r2c2r_core.export.stage import ExportConfig, check_bundle, write_bundle
 from r2c2r_core.model.report import Certificate
 from tests.core.export.kitchen import CREATED, kitchen, reconstruction
 
-TEXTURE = "meshes/cabinet_1/cabinet_1_door_vis.png"
+TEXTURE = "assets/cabinet_1/meshes/cabinet_1_door_vis.png"
 
 
 @pytest.fixture

@@ -54,10 +54,10 @@ def test_the_bundle_contains_the_documented_files(kitchen_bundle: tuple[Path, Ce
         "report.html",
         "preview.png",
         "README.txt",
-        "meshes/cabinet_1/cabinet_1_door_vis.obj",
-        "meshes/cabinet_1/cabinet_1_door_vis.mtl",
-        "meshes/cabinet_1/cabinet_1_door_vis.png",
-        "meshes/bottle_1/bottle_1_body_col_0.obj",
+        "assets/cabinet_1/meshes/cabinet_1_door_vis.obj",
+        "assets/cabinet_1/meshes/cabinet_1_door_vis.mtl",
+        "assets/cabinet_1/meshes/cabinet_1_door_vis.png",
+        "assets/bottle_1/meshes/bottle_1_body_col_0.obj",
     } <= names
     folder = kitchen_bundle[0].with_suffix("")
     assert {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()} == names
@@ -197,7 +197,7 @@ def test_an_unsafe_bundle_is_not_passed_to_any_loader(kitchen_bundle: tuple[Path
     folder = tmp_path / "unsafe"
     shutil.copytree(kitchen_bundle[0].with_suffix(""), folder)
     scene = folder / "scene.xml"
-    scene.write_text(scene.read_text().replace('file="meshes', 'file="/meshes', 1))
+    scene.write_text(scene.read_text().replace('file="assets', 'file="/assets', 1))
     certificate = check_bundle(folder)
     assert not certificate.passed
     assert {r.state for r in certificate.loaders} == {"not tried"}

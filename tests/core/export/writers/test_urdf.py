@@ -44,7 +44,7 @@ def test_links_have_inertials_and_mesh_paths_are_relative() -> None:
     for link in root.findall("link"):
         assert (link.find("inertial") is not None) == (link.get("name") != "world")
     for mesh in root.iter("mesh"):
-        assert mesh.attrib["filename"].startswith("meshes/")
+        assert mesh.attrib["filename"].startswith("assets/")
         assert "scale" not in mesh.attrib
 
 
