@@ -50,11 +50,15 @@ def is_watertight(vertices: Points, faces: Faces) -> bool:
 
 def is_manifold(vertices: Points, faces: Faces) -> bool:
     """Whether manifold3d accepts the joined surface as the boundary of a solid."""
+    return joined_solid(vertices, faces) is not None
+
+
+def joined_solid(vertices: Points, faces: Faces) -> Any | None:
+    """manifold3d's solid of a surface whose vertices are joined by position; None when it bounds none."""
     import manifold3d
 
-    if len(faces) == 0:
-        return False
-    return bool(_solid(*join_vertices(vertices, faces)).status() == manifold3d.Error.NoError)
+    solid = _solid(*join_vertices(vertices, faces)) if len(faces) else None
+    return solid if solid is not None and solid.status() == manifold3d.Error.NoError else None
 
 
 def volume(vertices: Points, faces: Faces) -> float:

@@ -47,7 +47,7 @@ from r2c2r_core.synthesize.opening import open_all
 from r2c2r_core.synthesize.physics import friction_shut, inertial_of_boxes, inertial_of_pieces, moved_boxes, weighing
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.surroundings import as_said, standing_clear, surroundings_of
-from r2c2r_core.synthesize.things import Solid, convex_pieces
+from r2c2r_core.synthesize.things import convex_pieces
 from r2c2r_core.tuning import Changes
 
 Outliers = Literal["leave-out", "keep"]
@@ -249,7 +249,7 @@ def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: i
     vertices = item.placed_pose.inverse.apply(placement.world_from_mesh.apply(asset.mesh.vertices))
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     fitted = (vertices - (low + high) / 2) * (item.dimensions_m / np.maximum(high - low, 1e-6))
-    pieces = convex_pieces(Solid(vertices=fitted, faces=asset.mesh.faces), item.dimensions_m, seed=seed)
+    pieces = convex_pieces(fitted, asset.mesh.faces, item.dimensions_m, seed=seed)
     material = item.spec.material
     link = Link(
         name=f"{item.name}_base",

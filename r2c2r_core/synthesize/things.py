@@ -1,12 +1,15 @@
 """Convex colliders of free-standing rigid objects from the placed mesh."""
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points, Vector3
+from r2c2r_core.geometry.meshes import joined_solid
 from r2c2r_core.model.scene import ConvexPiece
-from r2c2r_core.synthesize.vessels import staves
+from r2c2r_core.synthesize.vessels import between, corners_of, staves
 from r2c2r_core.tuning import param, tuned
 
 
@@ -15,7 +18,10 @@ class Params:
     """Tuned parameters of convex decomposition."""
 
     openness: float = param(
-        1.35, "ratio", "Ratio of hull to solid volume above which an object has a cavity or legs that a gripper needs", ge=1
+        1.35,
+        "ratio",
+        "Ratio of hull to solid volume above which an object has a cavity, legs or, at some height, a neck",
+        ge=1,
     )
     flat_m: float = param(
         0.006, "m", "Distance from the underside within which a point belongs to it", source="reconstructed feet are uneven"
@@ -23,24 +29,18 @@ class Params:
     most_pieces: int = param(16, "count", "Maximum number of convex pieces of an object", ge=1)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solid:
-    """A closed shape in the object frame."""
+def convex_pieces(vertices: Points, faces: Faces, dimensions_m: Vector3, *, seed: int = 0) -> tuple[ConvexPiece, ...]:
+    """The hull, parted where it would fill a neck; staves or a convex decomposition where it would fill a cavity.
 
-    vertices: Points
-    faces: Faces
-
-
-def convex_pieces(solid: Solid, dimensions_m: Vector3, *, seed: int = 0) -> tuple[ConvexPiece, ...]:
-    """The hull, or staves or a convex decomposition where the hull would fill a cavity; all with one flat underside."""
-    from trimesh import Trimesh
-
-    shape = Trimesh(solid.vertices, solid.faces, process=True)
-    hull = shape.convex_hull
-    if shape.is_volume and float(hull.volume) > tuned(Params).openness * float(shape.volume):
-        parts = staves(solid.vertices, solid.faces) or _decomposed(shape, seed)
+    All have one flat underside. The mesh is in the object's frame.
+    """
+    shape = joined_solid(vertices, faces)
+    if shape is None or shape.volume() <= 0:
+        parts = [vertices]
+    elif shape.hull().volume() > tuned(Params).openness * shape.volume():
+        parts = staves(vertices, faces) or _decomposed(shape, seed)
     else:
-        parts = [np.asarray(hull.vertices)]
+        parts = corners_of(_parted(shape))
     pieces = []
     for number, points in enumerate(parts):
         simple = _simplified(_flat_below(points, -dimensions_m[2] / 2))
@@ -49,12 +49,32 @@ def convex_pieces(solid: Solid, dimensions_m: Vector3, *, seed: int = 0) -> tupl
     return tuple(pieces)
 
 
-def _decomposed(shape: object, seed: int) -> list[Points]:
+def _parted(shape: Any) -> list[Any]:
+    """Hulls between as few heights as keep the parts of a hull below `openness` times the shape's own hull there."""
+    import manifold3d
+
+    params = tuned(Params)
+    _, _, foot, _, _, head = shape.bounding_box()
+    slabs = list(pairwise(np.linspace(foot, head, params.most_pieces + 1)))
+    own = [between(shape, *slab).hull() for slab in slabs]
+    hulls, start = [], 0
+    while start < len(own):
+        for end in range(len(own), start, -1):
+            hull = manifold3d.Manifold.batch_hull(own[start:end])
+            if all(between(hull, *slabs[k]).volume() <= params.openness * own[k].volume() for k in range(start, end)):
+                break
+        hulls.append(hull)
+        start = end
+    return hulls
+
+
+def _decomposed(shape: Any, seed: int) -> list[Points]:
     """CoACD parts; the mesh is decimated first, or it takes minutes (stack.md section 1)."""
     import coacd
     import fast_simplification
 
-    vertices, faces = np.asarray(shape.vertices), np.asarray(shape.faces)  # type: ignore[attr-defined]  # trimesh is untyped
+    mesh = shape.to_mesh64()
+    vertices, faces = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts)
     if len(faces) > 1200:
         vertices, faces = fast_simplification.simplify(vertices.astype(np.float32), faces.astype(np.int32), target_count=1200)
     coacd.set_log_level("error")

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from r2c2r_core.geometry.hollows import find_hollow
-from r2c2r_core.synthesize.things import Solid, convex_pieces
+from r2c2r_core.synthesize.things import convex_pieces
 from r2c2r_core.synthesize.vessels import staves
 
 RADIUS_M, WALL_M, FLOOR_M = 0.04, 0.004, 0.006
@@ -36,7 +36,7 @@ def test_colliders_of_a_mug_and_a_bowl_keep_the_cavity_open(height_m: float, rad
     hollow = find_hollow(vertices, faces)
     assert hollow is not None
     assert hollow.floor_z == pytest.approx(FLOOR_M - height_m / 2, abs=1e-5)
-    pieces = convex_pieces(Solid(vertices=vertices, faces=faces), np.ptp(vertices, axis=0))
+    pieces = convex_pieces(vertices, faces, np.ptp(vertices, axis=0))
     assert share_filled(hollow.points, [piece.vertices_link for piece in pieces]) < 0.05
 
 
