@@ -311,16 +311,20 @@ def _write_joint(stage: Any, object_path: str, body: Body) -> None:
     drive.CreateStiffnessAttr(0.0)
     drive.CreateDampingAttr(joint.damping / per_unit)
     drive.CreateMaxForceAttr(joint.effort)
-    _say_physx(
+    _say(
         prim.GetPrim(),
-        instance,
+        f"PhysxJointAxisAPI:{instance}",
+        f"physxJointAxis:{instance}",
         staticFrictionEffort=joint.friction,
         dynamicFrictionEffort=joint.friction,
         armature=ARMATURE[joint.type],
         maxJointVelocity=joint.velocity * per_unit,
     )
+    # read here by NVIDIA's exporter to URDF, which else writes 0, and by Isaac Lab
+    _say(prim.GetPrim(), "PhysxJointAPI", "physxJoint", maxJointVelocity=joint.velocity * per_unit)
     _say_newton(prim.GetPrim(), joint)
-    _say_state(prim.GetPrim(), instance)
+    # the joint state, closed and at rest; Isaac Sim reads and writes it here
+    _say(prim.GetPrim(), f"PhysicsJointStateAPI:{instance}", f"state:{instance}:physics", position=0.0, velocity=0.0)
 
 
 def _label(prim: Any, **tokens: Sequence[str]) -> None:
@@ -332,12 +336,13 @@ def _label(prim: Any, **tokens: Sequence[str]) -> None:
             UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr().Set([*words])
 
 
-def _say_physx(prim: Any, instance: str, **values: float) -> None:
+def _say(prim: Any, schema: str, prefix: str, **values: float) -> None:
+    """Apply a schema that USD itself lacks, and write its values as plain attributes."""
     from pxr import Sdf
 
-    prim.AddAppliedSchema(f"PhysxJointAxisAPI:{instance}")
+    prim.AddAppliedSchema(schema)
     for name, value in values.items():
-        prim.CreateAttribute(f"physxJointAxis:{instance}:{name}", Sdf.ValueTypeNames.Float, custom=False).Set(float(value))
+        prim.CreateAttribute(f"{prefix}:{name}", Sdf.ValueTypeNames.Float, custom=False).Set(float(value))
 
 
 def _say_newton(prim: Any, joint: Joint) -> None:
@@ -348,24 +353,14 @@ def _say_newton(prim: Any, joint: Joint) -> None:
     """
     from pxr import Sdf, Vt
 
-    prim.AddAppliedSchema("NewtonJointAPI")
-    for name, value in (("friction", joint.friction), ("armature", ARMATURE[joint.type])):
-        prim.CreateAttribute(f"newton:{name}", Sdf.ValueTypeNames.Float, custom=False).Set(float(value))
-        mjc = "mjc:frictionloss" if name == "friction" else "mjc:armature"
-        prim.CreateAttribute(mjc, Sdf.ValueTypeNames.Double, custom=False, variability=Sdf.VariabilityUniform).Set(float(value))
-    limit = prim.CreateAttribute(
-        "mjc:solreflimit", Sdf.ValueTypeNames.DoubleArray, custom=False, variability=Sdf.VariabilityUniform
-    )
-    limit.Set(Vt.DoubleArray(_SOLREF_LIMIT))
-
-
-def _say_state(prim: Any, instance: str) -> None:
-    """Write the joint state, closed and at rest; Isaac Sim reads and writes it here."""
-    from pxr import Sdf
-
-    prim.AddAppliedSchema(f"PhysicsJointStateAPI:{instance}")
-    for name in ("position", "velocity"):
-        prim.CreateAttribute(f"state:{instance}:physics:{name}", Sdf.ValueTypeNames.Float, custom=False).Set(0.0)
+    armature, kinds = ARMATURE[joint.type], Sdf.ValueTypeNames
+    _say(prim, "NewtonJointAPI", "newton", friction=joint.friction, armature=armature)
+    for name, kind, value in (
+        ("frictionloss", kinds.Double, float(joint.friction)),
+        ("armature", kinds.Double, float(armature)),
+        ("solreflimit", kinds.DoubleArray, Vt.DoubleArray(_SOLREF_LIMIT)),
+    ):
+        prim.CreateAttribute(f"mjc:{name}", kind, custom=False, variability=Sdf.VariabilityUniform).Set(value)
 
 
 def _cube(stage: Any, path: str, link_from_box: Rigid3, size_m: np.ndarray) -> Any:

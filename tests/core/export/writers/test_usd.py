@@ -92,7 +92,7 @@ def test_movable_objects_are_dynamic_and_counters_are_static(stage: Usd.Stage) -
     assert {j.GetBody1Rel().GetTargets()[0].name for j in fixed} == {"cabinet_1_base", "drawer_1_base", "double_1_base"}
 
 
-def test_drives_and_friction_use_usd_units(stage: Usd.Stage, plan: Plan) -> None:
+def test_drives_friction_and_velocity_limits_use_usd_units(stage: Usd.Stage, plan: Plan) -> None:
     for body in plan.bodies:
         if body.joint is None:
             continue
@@ -107,6 +107,9 @@ def test_drives_and_friction_use_usd_units(stage: Usd.Stage, plan: Plan) -> None
         ]
         say = prim.GetAttribute(f"physxJointAxis:{instance}:staticFrictionEffort")
         assert say.Get() == pytest.approx(body.joint.friction)
+        for prefix in (f"physxJointAxis:{instance}", "physxJoint"):  # readers know one or the other
+            limit = prim.GetAttribute(f"{prefix}:maxJointVelocity")
+            assert limit.Get() == pytest.approx(body.joint.velocity * degrees)
 
 
 def test_newton_gets_the_joint_parameters_that_mujoco_has_in_the_mjcf(stage: Usd.Stage, good_folder: Path) -> None:
