@@ -9,7 +9,7 @@ import numpy as np
 from r2c2r_core.arrays import Image, Points, Vector3
 from r2c2r_core.export.plan import WORLD, Body, Plan, facing
 from r2c2r_core.export.states import states_of
-from r2c2r_core.export.writers.meshes import box_mesh, png_bytes
+from r2c2r_core.export.writers.meshes import boxes_mesh, png_bytes
 from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, pixel_rays
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.texels import texture_colours
@@ -64,7 +64,7 @@ def scene_soup(plan: Plan, fraction: float, joints: Collection[str] | None = Non
     poses = poses_at(plan, fraction, joints)
     for number, body in enumerate(plan.bodies, start=1):
         visual = body.link.visual
-        vertices, faces = (visual.vertices, visual.faces) if visual is not None else box_mesh(body)
+        vertices, faces = (visual.vertices, visual.faces) if visual is not None else boxes_mesh(body)
         corners.append(poses[body.name].apply(vertices[faces].reshape(-1, 3)))
         uvs.append(visual.uv[faces].reshape(-1, 2) if visual is not None else np.zeros((3 * len(faces), 2)))
         ids.append(np.full(3 * len(faces), float(number)))

@@ -13,7 +13,7 @@ import numpy as np
 from r2c2r_core.arrays import Faces, Image, Points, Vector3
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.seen import Seen, unseen_words
-from r2c2r_core.export.writers.meshes import box_mesh, convex_hull
+from r2c2r_core.export.writers.meshes import boxes_mesh, convex_hull
 from r2c2r_core.model.report import Certificate, Finding
 
 _ASSETS = Path(__file__).parent / "review_page"
@@ -80,7 +80,7 @@ def _body(body: Body, numbers: dict[str, int], files: list[str]) -> dict[str, An
 def _surface(body: Body, files: list[str]) -> dict[str, Any] | None:
     visual = body.link.visual
     if visual is None or body.texture_file is None:
-        return _packed(*box_mesh(body), colour=body.link.colour)
+        return _packed(*boxes_mesh(body), colour=body.link.colour)
     number = files.index(body.texture_file)
     return _packed(visual.vertices, visual.faces, uv=visual.uv, texture=number, colour=body.link.colour)
 
@@ -104,7 +104,7 @@ def _packed(
 
 
 def _collider_mesh(body: Body) -> tuple[Points, Faces]:
-    meshes = [box_mesh(body), *(convex_hull(piece.vertices_link, piece.name) for piece in body.link.pieces)]
+    meshes = [boxes_mesh(body), *(convex_hull(piece.vertices_link, piece.name) for piece in body.link.pieces)]
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
     faces = [f + start for (_, f), start in zip(meshes, starts, strict=False)]
     return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)

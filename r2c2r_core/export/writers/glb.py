@@ -18,7 +18,7 @@ from r2c2r_core.export.assets import asset_file, assets_of
 from r2c2r_core.export.labels import labels_of, labels_of_handle
 from r2c2r_core.export.plan import WORLD, Body, Plan
 from r2c2r_core.export.states import states_of
-from r2c2r_core.export.writers.meshes import box_mesh
+from r2c2r_core.export.writers.meshes import boxes_mesh
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.handle import Handle
 
@@ -137,7 +137,7 @@ def _mesh(body: Body, gltf: _Gltf, materials: dict[str, int]) -> dict[str, int]:
             materials[body.texture_file] = _textured(gltf, body.texture_file)
         material = materials[body.texture_file]
     else:
-        vertices, faces = box_mesh(body)
+        vertices, faces = boxes_mesh(body)
         vertices, faces = vertices[faces].reshape(-1, 3), np.arange(3 * len(faces))  # flat shading: unshared corners
         plain = {"baseColorFactor": [*map(float, body.link.colour), 1.0], **_PLAIN}
         material = gltf.add("materials", {"name": f"{body.name}_vis", "pbrMetallicRoughness": plain})

@@ -9,7 +9,7 @@ import numpy as np
 from r2c2r_core.arrays import Faces, Image, Points
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.export.plan import Body
-from r2c2r_core.geometry.boxes import box_corners
+from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.model.mesh import TexturedMesh
 
 MOST_HULL_VERTICES = 64
@@ -88,12 +88,13 @@ def _sharpness(hull: Any) -> np.ndarray:
     return np.asarray((missing * area)[hull.vertices])
 
 
-def box_mesh(body: Body) -> tuple[Points, Faces]:
+def boxes_mesh(body: Body) -> tuple[Points, Faces]:
     """All boxes of a body as one triangle mesh in the body's frame."""
-    if not body.link.boxes:
-        return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    vertices = [box.link_from_box.apply(box_corners(box.size_m)) for box in body.link.boxes]
-    faces = [_BOX_FACES + 8 * k for k in range(len(vertices))]
+    vertices, faces = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)]
+    for number, box in enumerate(body.link.boxes):
+        corners, triangles = box_mesh(-box.size_m / 2, box.size_m / 2)
+        vertices.append(box.link_from_box.apply(corners))
+        faces.append(triangles + len(corners) * number)
     return np.concatenate(vertices), np.concatenate(faces)
 
 
@@ -136,22 +137,3 @@ def _bounded(texture: Image, longest_px: int) -> Image:
     factor = longest_px / max(height, width)
     size = (max(1, round(width * factor)), max(1, round(height * factor)))
     return np.asarray(cv2.resize(texture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-
-
-_BOX_FACES = np.array(
-    [
-        [0, 1, 3],
-        [0, 3, 2],
-        [4, 6, 7],
-        [4, 7, 5],
-        [0, 4, 5],
-        [0, 5, 1],
-        [2, 3, 7],
-        [2, 7, 6],
-        [0, 2, 6],
-        [0, 6, 4],
-        [1, 5, 7],
-        [1, 7, 3],
-    ]
-)
-"""Twelve outward triangles over corners ordered x, y, z from minus to plus."""

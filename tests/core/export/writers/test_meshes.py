@@ -6,7 +6,7 @@ import trimesh
 
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.export.plan import plan_bundle
-from r2c2r_core.export.writers.meshes import MOST_HULL_VERTICES, box_mesh, convex_hull
+from r2c2r_core.export.writers.meshes import MOST_HULL_VERTICES, boxes_mesh, convex_hull
 from tests.core.export.conftest import write_meshes
 from tests.core.export.kitchen import kitchen
 
@@ -62,8 +62,8 @@ def test_a_flat_collider_is_rejected_by_name() -> None:
         convex_hull(flat, "cup: collider wall")
 
 
-def test_box_meshes_face_outwards() -> None:
+def test_boxes_meshes_face_outwards() -> None:
     body = plan_bundle(kitchen()).bodies[0]
-    vertices, faces = box_mesh(body)
+    vertices, faces = boxes_mesh(body)
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     assert mesh.volume == pytest.approx(sum(np.prod(box.size_m) for box in body.link.boxes))
