@@ -141,7 +141,7 @@ def _far_colliders(fits: tuple[ColliderFit, ...]) -> tuple[Finding, ...]:
         finding("collider-far", fit.link, f"5 % of {what} is more than {1000 * gap.p95_m:.0f} mm from {other}")
         for fit in fits
         for what, gap, other in (
-            ("its visible surface", fit.drawn_to_collider, "every collider: a hand passes through it"),
+            ("its visible surface", fit.drawn_to_collider, "every collider's: a hand passes through it or stops before it"),
             ("its colliders' surface", fit.collider_to_drawn, "all that is visible: a hand stops before it"),
         )
         if gap.p95_m > FAR_COLLIDER_M

@@ -1,6 +1,7 @@
 """Distance between a link's collider and its visual mesh, for known offsets."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -56,10 +57,7 @@ def test_the_certificate_warns_of_a_collider_far_from_its_visual(tmp_path: Path)
     assert {fit.link for fit in collider_fits(read_urdf(folder / "scene.urdf"), BundleFiles(folder=folder))} >= {
         "cabinet_1_door"
     }
-    path = folder / "assets" / "bottle_1" / "meshes" / "bottle_1_body_vis.obj"
-    lines = path.read_text().splitlines()
-    moved = [_shifted(line, 3 * FAR_COLLIDER_M) if line.startswith("v ") else line for line in lines]
-    path.write_text("\n".join(moved) + "\n")
+    _edit_vertices(folder, lambda x, y, z: (x + 3 * FAR_COLLIDER_M, y, z))
     found = [f for f in certify(folder).findings if f.rule == "collider-far"]
     assert {f.where for f in found} == {"bottle_1_body"}
     assert {f.severity for f in found} == {"warning"}
@@ -82,6 +80,17 @@ def test_only_the_direction_in_which_a_collider_is_far_is_reported(tmp_path: Pat
     assert found.message.endswith("mm from all that is visible: a hand stops before it")
 
 
-def _shifted(line: str, metres: float) -> str:
-    _, x, *rest = line.split()
-    return " ".join(["v", str(float(x) + metres), *rest])
+def test_a_collider_around_its_visual_is_not_said_to_let_a_hand_through(tmp_path: Path) -> None:
+    """A hull over a shape with a dent: a hand stops before what is visible."""
+    folder = write_folder(kitchen(), tmp_path / "kitchen")
+    _edit_vertices(folder, lambda x, y, z: (x, y, 0.2 * z))
+    found = next(f for f in certify(folder).findings if f.message.startswith("5 % of its visible surface"))
+    assert found.message.endswith("mm from every collider's: a hand passes through it or stops before it")
+
+
+def _edit_vertices(folder: Path, moved: Callable[[float, float, float], tuple[float, float, float]]) -> None:
+    """Move the vertices of the bottle's visual."""
+    path = folder / "assets" / "bottle_1" / "meshes" / "bottle_1_body_vis.obj"
+    lines = [line.split() for line in path.read_text().splitlines()]
+    lines = [["v", *map(str, moved(*map(float, line[1:])))] if line[:1] == ["v"] else line for line in lines]
+    path.write_text("\n".join(" ".join(line) for line in lines) + "\n")
