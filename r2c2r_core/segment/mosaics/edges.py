@@ -233,12 +233,11 @@ def _end(low: float, high: float, seen: bool, profile: Profile, own: float, cell
         peaks = [i for i in _peaks(gradient[first:last], least) if not _is_behind(first + i, round(low), round(high), profile)]
     if not peaks:
         return start + (params.half_gap_m / cell_m if start == low else 0.0), False
-    window = gradient[first:last]
     i = peaks[-1]  # the innermost
     gap = _gap(slope, first + i, max(first, first + i - round(params.widest_gap_m / cell_m)))
     if gap is not None:
         return (gap[0] + gap[1]) / 2 + 0.5 + max(params.half_gap_m / cell_m, _dark_width(light, *gap, cell_m) / 2), True
-    a, b, c = (float(value) for value in window[i - 1 : i + 2])
+    a, b, c = (float(value) for value in gradient[first + i - 1 : first + i + 2])
     bend = a - 2 * b + c
     offset = float(np.clip((a - c) / (2 * bend), -0.5, 0.5)) if bend < -1e-9 else 0.0
     return first + i + 0.5 + offset, True
@@ -268,7 +267,7 @@ def _gap_in_one_colour(profile: Profile, low: float, high: float, last: int, cel
     inside = (dip[first:beyond], dip[first : min(first + round(params.rail_m / cell_m), beyond)])
     noise = 1.4826 * max(float(np.median(np.abs(part))) for part in inside)
     least = max(params.gap_noise * noise, params.gap_contrast)
-    for at in range(last, round(low) - 1, -1):
+    for at in range(last, max(round(low), half) - 1, -1):  # nearer to the mosaic's end, one side is not seen
         if dip[at] > least and differ[at] < params.one_colour * dip[at] and dip[at] == dip[at - half : at + half + 1].max():
             return at + int(np.argmax(profile.slope[at : at + half]))
     return None

@@ -84,6 +84,14 @@ def test_a_faint_gap_wins_over_the_clearer_end_of_the_face_frame() -> None:
     assert edges(framed, Cell(57, 60, 260, 300), Cell(52, 60, 260, 300))[0] == pytest.approx(60, abs=EDGE_CELLS)
 
 
+def test_a_front_that_begins_in_a_gap_at_the_mosaics_end_begins_there() -> None:
+    """A front that begins where the mosaic does, as where the film shows no more of it."""
+    cut = Cell(0, 60, 260, 300)
+    columns = [(Cell(k, 60, k + 1, 300), shade) for k, shade in enumerate([BLUE, (55, 85, 115), (62, 92, 122), (73, 103, 133)])]
+    image = mosaic((cut, BLUE), *columns, blur=0.3)
+    assert edges(image, cut, cut)[0] == pytest.approx(2, abs=EDGE_CELLS)
+
+
 def test_wood_grain_on_a_rail_is_not_taken_for_a_gap() -> None:
     oak, dark = (205, 170, 120), (197, 162, 112)
     grain = [(Cell(60, row, 260, row + 2), dark) for row in range(64, 84, 5)]
