@@ -11,7 +11,7 @@ from r2c2r_core.arrays import Colours, DepthMetres, Faces, Image, Mask, Points
 from r2c2r_core.generate.charts import Atlas
 from r2c2r_core.generate.consistency import VIEWS_KEPT, render_depth, sensor_depth
 from r2c2r_core.generate.evidence import View, moved_edge
-from r2c2r_core.generate.unseen import beside_handle, fill_unseen, own_texels, spread_colours
+from r2c2r_core.generate.unseen import beside_cover, beside_handle, fill_unseen, own_texels, spread_colours
 from r2c2r_core.geometry.camera import project, sample_nearest
 from r2c2r_core.geometry.texels import bilinear_colours
 from r2c2r_core.geometry.transforms import Rigid3
@@ -88,6 +88,8 @@ def bake(
         for side in sides:
             _prefer_best(side.weights)
     colours, seen = _blend(sides, len(views), len(atlas.points))
+    if front_y_m is not None:
+        seen &= ~beside_cover(atlas, seen, np.concatenate([side.covered for side in sides]), front_y_m, _blurred_m(views, eyes))
     seen &= own_texels(atlas, seen, front_y_m)
     if front_y_m is not None and handle is not None:
         seen &= ~beside_handle(atlas, front_y_m, handle)
@@ -103,6 +105,7 @@ class _Side(NamedTuple):
     texels: np.ndarray  # (t,) texels that at least one view shows
     samples: np.ndarray  # (3, k, t) uint8, a channel at a time: numpy is slow along an axis of three
     weights: np.ndarray  # (k, t) float32, 0 where a view does not show the texel
+    covered: np.ndarray  # (c,) texels before which more views measure something else than show the texel
 
 
 class _Photo(NamedTuple):
@@ -130,6 +133,12 @@ def _best_views(atlas: Atlas, eyes_local: Points, views: Sequence[View]) -> np.n
     return wanted
 
 
+def _blurred_m(views: Sequence[View], eyes_local: Points) -> float:
+    """Distance of a surface in front of the object within which depth takes it for the object's."""
+    distances = np.linalg.norm(eyes_local, axis=1)
+    return float(np.median([v.noise.reach(z, tuned(Params).sensor_gap_m) for v, z in zip(views, distances, strict=True)]))
+
+
 def _prefer_best(weights: np.ndarray) -> None:
     """Scale a side's weights (k, t) in place, so that the view with the largest total weight dominates."""
     params = tuned(Params)
@@ -152,20 +161,19 @@ def _gather(
         texels, chosen = np.flatnonzero(atlas.chart == chart), np.flatnonzero(wanted[:, chart])
         points, normals = (np.ascontiguousarray(of[texels].T, dtype=np.float32) for of in (atlas.points, atlas.normals))
         samples = np.zeros((3, len(chosen), len(texels)), np.uint8)
-        weights = np.zeros((len(chosen), len(texels)), np.float32)
+        weights, covered = np.zeros((len(chosen), len(texels)), np.float32), np.zeros(len(texels), np.uint16)
         for row, k in enumerate(chosen.tolist()):
-            _look(photos[k], points, normals, samples[:, row], weights[row])
+            _look(photos[k], points, normals, samples[:, row], weights[row], covered)
         seen = (weights > 0).any(axis=0)
-        sides.append(_Side(chosen, texels[seen], samples[:, :, seen], weights[:, seen]))
+        sides.append(
+            _Side(chosen, texels[seen], samples[:, :, seen], weights[:, seen], texels[covered > (weights > 0).sum(axis=0)])
+        )
     return sides
 
 
 def _photo(view: View, vertices_world: Points, faces: Faces, world_from_local: Rigid3) -> _Photo:
-    surface = render_depth(vertices_world, faces, view)
-    camera_from_local = view.world_from_camera.inverse @ world_from_local
-    return _Photo(
-        view, camera_from_local, _well_inside(view, tuned(Params).edge_share), surface, sensor_depth(view, surface.shape)
-    )
+    surface, inside = render_depth(vertices_world, faces, view), _well_inside(view, tuned(Params).edge_share)
+    return _Photo(view, view.world_from_camera.inverse @ world_from_local, inside, surface, sensor_depth(view, surface.shape))
 
 
 @lru_cache(maxsize=VIEWS_KEPT)
@@ -173,8 +181,10 @@ def _well_inside(view: View, edge_share: float) -> Mask:
     return moved_edge(view.mask, -max(1.0, edge_share * np.sqrt(view.mask.sum())))
 
 
-def _look(photo: _Photo, points: np.ndarray, normals: np.ndarray, samples: np.ndarray, weights: np.ndarray) -> None:
-    """Write one view's colours (3, t) and weights (t,) of texels at points (3, t) with normals (3, t)."""
+def _look(
+    photo: _Photo, points: np.ndarray, normals: np.ndarray, samples: np.ndarray, weights: np.ndarray, covered: np.ndarray
+) -> None:
+    """Write one view's colours (3, t) and weights (t,) at points (3, t) with normals (3, t); count the covered ones (t,)."""
     params = tuned(Params)
     dx, dy, dz = photo.camera_from_local.inverse.translation.astype(np.float32)[:, None] - points
     distance = np.sqrt(dx * dx + dy * dy + dz * dz)
@@ -184,15 +194,16 @@ def _look(photo: _Photo, points: np.ndarray, normals: np.ndarray, samples: np.nd
         return
     cosine = cosine[facing]
     in_camera = _moved(points[:, facing], photo.camera_from_local)
-    colours, shown = _look_up(photo, in_camera, cosine < params.grazing_cosine)
+    colours, shown, hidden = _look_up(photo, in_camera, cosine < params.grazing_cosine)
+    covered[facing] += hidden
     z = np.maximum(in_camera[:, 2], np.float32(0.05))
     sharpness = np.float32(0.3 + 0.7 * photo.view.sharpness)
     weights[facing] = np.where(shown, (cosine**2 * sharpness / z**2) ** params.power, np.float32(0))
     samples[:, facing] = colours.T
 
 
-def _look_up(photo: _Photo, in_camera: np.ndarray, grazing: np.ndarray) -> tuple[Colours, np.ndarray]:
-    """The view's colour at each camera-frame point, and whether it shows the point.
+def _look_up(photo: _Photo, in_camera: np.ndarray, grazing: np.ndarray) -> tuple[Colours, np.ndarray, np.ndarray]:
+    """The view's colour at each camera-frame point, whether it shows the point, and whether something else covers it.
 
     A shown point lies in the mask and is occluded neither by the mesh nor, where the sensor measured, by anything else. On
     grazing sides, where a mask that is a pixel too wide smears the neighbouring surface over a hand's breadth, depth must
@@ -208,7 +219,8 @@ def _look_up(photo: _Photo, in_camera: np.ndarray, grazing: np.ndarray) -> tuple
     surface, measured = both[:, 0], both[:, 1]
     hidden = noise.occluded(measured, z, params.sensor_gap_m)
     beyond = noise.seen_through(measured, z, params.sensor_gap_m) & grazing
-    return bilinear_colours(photo.view.rgb, uv), inside & in_mask & (z < surface + params.hidden_m) & ~hidden & ~beyond
+    shown = inside & in_mask & (z < surface + params.hidden_m) & ~hidden & ~beyond
+    return bilinear_colours(photo.view.rgb, uv), shown, inside & hidden
 
 
 def _moved(points: np.ndarray, transform: Rigid3) -> np.ndarray:

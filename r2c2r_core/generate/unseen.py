@@ -40,6 +40,18 @@ def own_texels(atlas: Atlas, seen: np.ndarray, front_y_m: float | None) -> np.nd
     return np.asarray((share > tuned(Params).least_share)[atlas.chart] | (atlas.chart == FRONT) | _stands_out(atlas, front_y_m))
 
 
+def beside_cover(atlas: Atlas, seen: np.ndarray, covered: np.ndarray, front_y_m: float, reach_m: float) -> np.ndarray:
+    """Texels of furniture's sides within `reach_m` of covered ones: what stands there, as a neighbour's front, colours them."""
+    from scipy.spatial import cKDTree
+
+    near, side = np.zeros(len(seen), dtype=bool), (atlas.chart != FRONT) & ~_stands_out(atlas, front_y_m)
+    for chart in np.unique(atlas.chart[covered]):
+        own, hidden = np.flatnonzero(side & seen & (atlas.chart == chart)), covered[atlas.chart[covered] == chart]
+        distance, _ = cKDTree(atlas.points[hidden]).query(atlas.points[own], distance_upper_bound=reach_m)
+        near[own] = np.isfinite(distance)
+    return near
+
+
 def beside_handle(atlas: Atlas, front_y_m: float, handle: FrontHandle) -> np.ndarray:
     """Texels of the front face behind a handle and beside it, up to an edge that is near: a strip left there shows the gap."""
     near = (atlas.chart == FRONT) & ~_stands_out(atlas, front_y_m)

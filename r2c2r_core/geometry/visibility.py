@@ -61,17 +61,18 @@ class DepthNoise:
         """One standard deviation at z-depths (...), metres."""
         return np.asarray(self.floor_m + self.per_m * z_m)
 
-    def _reach(self, z_m: Lengths, margin_m: float) -> np.ndarray:
+    def reach(self, z_m: Lengths, margin_m: float) -> np.ndarray:
+        """Difference (...) up to which two depths agree, by a margin and the noise."""
         return np.asarray(margin_m + tuned(Params).sure * self.sigma(z_m))
 
     def agrees(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
         """Mask where depth was measured and equals z within a margin and the noise. Arrays (...), 0 for unknown depth."""
-        return np.asarray((seen_m > 0) & (np.abs(seen_m - z_m) < self._reach(z_m, margin_m)))
+        return np.asarray((seen_m > 0) & (np.abs(seen_m - z_m) < self.reach(z_m, margin_m)))
 
     def occluded(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
         """Mask where the measured depth is nearer than z by more than a margin and the noise."""
-        return np.asarray((seen_m > 0) & (seen_m < z_m - self._reach(z_m, margin_m)))
+        return np.asarray((seen_m > 0) & (seen_m < z_m - self.reach(z_m, margin_m)))
 
     def seen_through(self, seen_m: Lengths, z_m: Lengths, margin_m: float) -> np.ndarray:
         """Mask where the measured depth is behind z by more than a margin and the noise: nothing opaque is at z."""
-        return np.asarray((seen_m > 0) & (seen_m > z_m + self._reach(z_m, margin_m)))  # z < 0: behind the camera
+        return np.asarray((seen_m > 0) & (seen_m > z_m + self.reach(z_m, margin_m)))  # z < 0: behind the camera

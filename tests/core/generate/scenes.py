@@ -72,12 +72,12 @@ def front_scene(seed=0, noise_m=0.004):
     return capture, track("door_1", "cabinet", "front", masks, front=panel)
 
 
-def appliance_scene(seed=0):
-    """A microwave 0.46 x 0.34 x 0.28 m on a counter, with a vertical bar handle."""
+def appliance_scene(seed=0, *beside):
+    """A microwave 0.46 x 0.34 x 0.28 m on a counter, with a vertical bar handle, and what stands beside it."""
     body = box((-0.23, 0, 0.9), (0.23, 0.34, 1.18), (70, 72, 75), 1)
     bar = box((0.08, -0.04, 0.95), (0.095, 0.005, 1.13), (220, 220, 220), 1)
     counter = box((-0.8, -0.15, 0.86), (0.8, WALL_Y, 0.9), (150, 110, 70), 0)
-    capture, masks = scan([body, bar, counter], target=(0, 0.1, 1.04), distance=1.1, seed=seed)
+    capture, masks = scan([body, bar, counter, *beside], target=(0, 0.1, 1.04), distance=1.1, seed=seed)
     handle = FrontHandle(left_m=0.08, right_m=0.095, bottom_m=-0.09, top_m=0.09, protrusion_m=0.04, confidence=0.9)
     panel = FrontPanel(
         world_from_front=Rigid3(np.eye(3), np.array([0.0, 0.0, 1.04])),

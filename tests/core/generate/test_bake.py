@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -10,12 +11,14 @@ from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.unseen import beside_handle
 from r2c2r_core.generate.variation import draw_variation
 from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.masks import pack_mask, unpack_mask
 from r2c2r_core.geometry.raster import render_textured
 from r2c2r_core.geometry.transforms import Rigid3
-from tests.core.generate.scenes import best_thing, box_shape
+from tests.core.generate.scenes import appliance_scene, best_thing, box, box_shape
 from tests.core.motions import motion
 
 FACING = Rigid3(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]), np.array([0.0, -2.0, 0.0]))  # looks along +Y from 2 m
+RIGHT = 1  # chart of the faces that look along +X
 CAMERA = Intrinsics(fx=800.0, fy=800.0, cx=200.0, cy=200.0, width=400, height=400)
 
 
@@ -92,6 +95,15 @@ def test_an_observed_dark_body_keeps_its_own_colour(appliance_scene):
     body = image[(depth > 1.97) & (depth < 2.07)]
     assert np.median(body, axis=0) == pytest.approx([70, 72, 75], abs=6)
     assert 0.2 < picture.seen_fraction < 1.0
+
+
+def test_the_front_of_a_neighbour_does_not_colour_the_side_that_it_covers() -> None:
+    """Its mask is some pixels too wide, and the neighbour's front nearer than depth can tell from the side behind it."""
+    capture, seen = appliance_scene(0, box((0.232, 0.08, 0.9), (0.6, 0.34, 1.04), (200, 30, 30), 0))
+    wider = {k: pack_mask(cv2.dilate(unpack_mask(m).astype(np.uint8), np.ones((15, 15))) > 0) for k, m in seen.masks.items()}
+    _, atlas, picture = pictured((capture, replace(seen, masks=wider)), box_shape, lambda v, f: planar_atlas(v, f, 768, 0.0012))
+    red, green, _ = picture.texture.reshape(-1, 3)[atlas.texel[atlas.chart == RIGHT]].astype(int).T
+    assert (red > green + 30).mean() < 0.002
 
 
 def test_the_parts_of_a_chair_keep_their_colours(chair_scene):
