@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2c2r_core.arrays import Points
-from r2c2r_core.export.plan import Plan
+from r2c2r_core.export.plan import Plan, collider_corners_world
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.model.scene import Box
 
 _SKIN_M = 2e-4  # mere contact does not count as collision
 
@@ -33,8 +32,7 @@ class Prism:
 
 def solids_of(plan: Plan) -> list[Solid]:
     """All colliders with joints closed, and the floor."""
-    solids = [_of_box(body.world_from_body @ box.link_from_box, box) for body in plan.bodies for box in body.link.boxes]
-    solids += [_of_points(body.world_from_body.apply(p.vertices_link)) for body in plan.bodies for p in body.link.pieces]
+    solids = [_of_points(corners) for body in plan.bodies for corners in collider_corners_world(body)]
     far = np.full(3, 1e3)
     floor = np.array([[0.0, 0.0, 1.0, -plan.floor_z_m]])
     return [*solids, Solid(planes=floor, low=-far, high=np.array([1e3, 1e3, plan.floor_z_m]))]
@@ -58,15 +56,6 @@ def _met_at(prism: Prism, solid: Solid) -> float:
     (x, y), length = prism.half_m, prism.length_m
     found = linprog([0, 0, 1], A_ub=normals, b_ub=-offsets - _SKIN_M, bounds=[(-x, x), (-y, y), (0, length)])
     return float(found.fun) if found.status == 0 else length
-
-
-def _of_box(world_from_box: Rigid3, box: Box) -> Solid:
-    half = np.asarray(box.size_m) / 2
-    normals = np.concatenate([world_from_box.rotation.T, -world_from_box.rotation.T])
-    offsets = -normals @ world_from_box.translation - np.concatenate([half, half])
-    reach = np.abs(world_from_box.rotation) @ half
-    centre = world_from_box.translation
-    return Solid(planes=np.column_stack([normals, offsets]), low=centre - reach, high=centre + reach)
 
 
 def _of_points(points: Points) -> Solid:

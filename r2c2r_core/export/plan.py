@@ -17,7 +17,7 @@ from r2c2r_core.geometry.boxes import box_corners
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.walls import floor_height
 from r2c2r_core.model.handle import Handle
-from r2c2r_core.model.scene import ArticulatedScene, Box, ConvexPiece, Inertial, Joint, Link, SceneObject
+from r2c2r_core.model.scene import ArticulatedScene, ConvexPiece, Inertial, Joint, Link, SceneObject
 
 WORLD = "world"
 ASSETS, MESHES = "assets", "meshes"
@@ -173,15 +173,11 @@ def _on_the_hinge(link: Link, joint: Joint) -> Link:
     return replace(
         link,
         object_from_link=object_from_new,
-        boxes=tuple(_moved_box(box, new_from_old) for box in link.boxes),
+        boxes=tuple(replace(box, link_from_box=new_from_old @ box.link_from_box) for box in link.boxes),
         pieces=tuple(ConvexPiece(name=p.name, vertices_link=new_from_old.apply(p.vertices_link)) for p in link.pieces),
         visual=None if link.visual is None else replace(link.visual, vertices=new_from_old.apply(link.visual.vertices)),
         inertial=_moved_inertial(link.inertial, new_from_old),
     )
-
-
-def _moved_box(box: Box, new_from_old: Rigid3) -> Box:
-    return replace(box, link_from_box=new_from_old @ box.link_from_box)
 
 
 def _moved_inertial(inertial: Inertial, new_from_old: Rigid3) -> Inertial:

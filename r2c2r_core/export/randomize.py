@@ -54,12 +54,9 @@ def of_object(item: SceneObject, mass_kg: float, placement: Placement | None) ->
 
 def of_joint(joint: Joint) -> dict[str, Range]:
     """Ranges of damping, friction and armature in the joint's units, and of its upper limit in rad or m."""
-    ranges = {name: _around(value) for name, value in _resistances(joint).items()}
+    resistances = {"damping": joint.damping, "friction": joint.friction, "armature": ARMATURE[joint.type]}
+    ranges = {name: _around(value) for name, value in resistances.items()}
     return ranges | {"upper": _limit(joint, joint.motion)}
-
-
-def _resistances(joint: Joint) -> dict[str, float]:
-    return {"damping": joint.damping, "friction": joint.friction, "armature": ARMATURE[joint.type]}
 
 
 def _around(value: float) -> Range:

@@ -47,7 +47,8 @@ def _support(thing: Body, bodies: Mapping[str, Body], floor_z_m: float) -> tuple
         lift = under_m + _GAP_M - float(points[:, 2].min())
         return {body.name: _lifted(body, lift) for body in bodies.values() if body.object_name == thing.object_name}, []
     plate = _plate(thing, points)
-    in_the_way = _in_the_way(plate, [c for b in bodies.values() if _moves(b) for c in collider_corners_world(b)])
+    moving = [body for body in bodies.values() if body.free or body.joint is not None]
+    in_the_way = _in_the_way(plate, [corners for body in moving for corners in collider_corners_world(body)])
     return {}, [] if in_the_way else [plate]
 
 
@@ -128,10 +129,6 @@ def _plate(thing: Body, points: Points) -> Body:
         texture=None,
         is_support=True,
     )
-
-
-def _moves(body: Body) -> bool:
-    return body.free or body.joint is not None
 
 
 def _in_the_way(plate: Body, movers: Sequence[Points]) -> bool:
