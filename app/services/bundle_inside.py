@@ -47,12 +47,12 @@ def object_alone(context: Context, project_id: str, version: int, name: str) -> 
 
 
 def _only(bundle: Path, name: str) -> bytes:
-    """Zip of the object's files, with relative paths preserved."""
+    """Zip of the object's files, with relative paths preserved; bundles of older versions keep its meshes in meshes/."""
     made = io.BytesIO()
     with zipfile.ZipFile(bundle) as archive, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as out:
         top = root_of(archive)
         for entry in archive.infolist():
-            if PurePosixPath(entry.filename.removeprefix(top)).parts[:2] == ("assets", name):
+            if PurePosixPath(entry.filename.removeprefix(top)).parts[:2] in (("assets", name), ("meshes", name)):
                 out.writestr(entry.filename.removeprefix(top), archive.read(entry))
     return made.getvalue()
 

@@ -193,7 +193,7 @@ def _with_formats(bundle: Path, formats: frozenset[str]) -> bytes:
 
     def stays(path: str) -> bool:
         inner = path.removeprefix(top)
-        return not any(entry.owns(inner) for entry in others) and (meshes or not inner.startswith("assets/"))
+        return not any(entry.owns(inner) for entry in others) and (meshes or inner.split("/")[0] not in ("meshes", "assets"))
 
     with zipfile.ZipFile(bundle) as archive, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as out:
         top = root_of(archive)
