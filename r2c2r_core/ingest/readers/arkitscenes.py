@@ -7,7 +7,7 @@ images in sensor orientation. (apple/ARKitScenes DATA.md, tenFpsDataLoader.py.)
 
 import re
 from collections.abc import Iterable
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
+from r2c2r_core.ingest.readers.frames import Z_UP, Found, joined_recording
+from r2c2r_core.ingest.readers.images import first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, read_numbers
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
@@ -43,26 +43,15 @@ def open_arkitscenes(files: Files) -> Recording:
         poses={n: p for n, t in times.items() if (p := trajectory.at(t, apart_s=_APART_S, gap_s=_GAP_S)) is not None},
         confidence=named_at(times, confidence, _SAME_S),
         times_s=times,
+        cameras=named_at(times, pincam, np.inf),
     )
-    size = first_size(files, colour.values(), "colour image")
-    depth_size = first_size(files, depth.values(), "depth image")
-    camera_names = named_at(times, pincam, np.inf)
+    size = first_size(files, colour.values())
 
     @cache
     def camera(number: int) -> Intrinsics:
-        return _camera(files, camera_names[number], size)
+        return _camera(files, found.cameras[number], size)
 
-    frames, notices = joined_frames(files, found, camera, lambda n: camera(n).resized(*depth_size))
-    return Recording(
-        format="ARKitScenes",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0),
-        up_capture=np.array([0.0, 0.0, 1.0]),
-        notices=tuple(notices),
-        other_names=(_TRAJECTORY, *(camera_names[f.index] for f in frames)),
-    )
+    return joined_recording(files, found, camera, format="ARKitScenes", up_capture=Z_UP, other_names=[_TRAJECTORY])
 
 
 def _by_time(names: Iterable[str], pattern: str) -> dict[float, str]:

@@ -8,7 +8,6 @@ flag for this; here it is detected from poses in which the images' up points dow
 
 import csv
 import re
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,10 +16,11 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
+from r2c2r_core.ingest.readers.frames import Found, joined_recording
+from r2c2r_core.ingest.readers.images import first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_quaternion, read_json_object, read_numbers
+from r2c2r_core.ingest.readers.stored_depth import depth_size
+from r2c2r_core.ingest.readers.texts import camera_of, pose_of_quaternion, read_json_object, read_numbers
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _COLOUR, _DEPTH = r"rgb/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.(?i:jpe?g)", r"depth/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.(?i:png)"
@@ -51,18 +51,16 @@ def open_arti4d(files: Files) -> Recording:
         poses=poses,
         times_s=times,
     )
-    rgb_camera = _camera(files, "rgb/camera_info.txt", first_size(files, found.colour.values(), "colour image"))
-    depth_camera = _camera(files, "depth/camera_info.txt", first_size(files, found.depth.values(), "depth image"))
-    frames, left_out = joined_frames(files, found, lambda _: rgb_camera, lambda _: depth_camera)
+    rgb_camera = _camera(files, "rgb/camera_info.txt", first_size(files, found.colour.values()))
+    depth_camera = _camera(files, "depth/camera_info.txt", depth_size(files, found.depth.values()))
     turned = ("the poses show the camera upside down: its images are assumed to be turned back by 180 deg",) if hangs else ()
-    return Recording(
+    return joined_recording(
+        files,
+        found,
+        rgb_camera,
+        depth_camera,
         format="Arti4D",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0),
-        up_capture=None,
-        notices=(*turned, *left_out),
+        notices=turned,
         other_names=("rgb/camera_info.txt", "depth/camera_info.txt", odometry, calibration),
     )
 
@@ -131,12 +129,12 @@ def _hangs(poses: list[Rigid3]) -> bool:
 def _camera(files: Files, name: str, size: tuple[int, int]) -> Intrinsics:
     """The camera of ROS's CameraInfo printed as text: a line `K: (fx, 0, cx, 0, fy, cy, 0, 0, 1)`."""
     match = re.search(r"^\s*K\s*:\s*[\[(]([^\])]*)[\])]", files.read(name).decode("utf-8", errors="replace"), re.MULTILINE)
-    matrix = None if match is None else read_numbers(match.group(1).encode())
-    if matrix is None or matrix.size != 9 or not (np.isfinite(matrix).all() and min(matrix[0], matrix[4]) > 0):
+    camera = None if match is None else camera_of(read_numbers(match.group(1).encode()), size)
+    if camera is None:
         raise CaptureError(
             f"{files.source}/{name}: no line K of nine numbers", hint="expected K: (fx, 0, cx, 0, fy, cy, 0, 0, 1)"
         )
-    return integer_centred(matrix[0], matrix[4], matrix[2], matrix[5], size)
+    return camera
 
 
 READER = Reader(

@@ -1,59 +1,71 @@
 """Polycam's raw export: keyframes/{images,cameras,depth,confidence}/<microseconds>.{jpg,json,png,png}.
 
-corrected_images and corrected_cameras (undistorted) are preferred where they exist; large scans have none. Camera files hold
+corrected_images and corrected_cameras (undistorted) are preferred frame by frame; large scans have none. Camera files hold
 fx, fy, cx, cy, width, height and t_00..t_23, row-major camera-to-world with ARKit's axes in a y-up world; since 2025 corrected
 ones have no width and height, which are those of the image. Depth is uint16 millimetres, confidence 0, 127 or 255. Frames are
 named by their time; their number here is its rank. (PolyCam/polyform; nerfstudio pull request 3725.)
 """
 
 from collections.abc import Iterable
-from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.frames import Y_UP, Found, joined_recording
+from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, pose_of_matrix, read_json_object
 
 _IMAGES, _CAMERAS = r"images/(\d+)\.(?i:jpe?g|png)", r"cameras/(\d+)\.json"
 _DEPTH, _CONFIDENCE = r"keyframes/depth/(\d+)\.(?i:png)", r"keyframes/confidence/(\d+)\.(?i:png)"
 _CONFIDENCE_LEVELS = (64, 192)  # between 0, 127 and 255
+_PARTLY = "{} of {} colour images were corrected (undistorted) by Polycam; the others are read as recorded"
+
+
+class _Shot(NamedTuple):
+    image: str | None
+    file: str | None  # its camera's
+    camera: Intrinsics | None
+    pose: Rigid3 | None
 
 
 def open_polycam(files: Files) -> Recording:
     """The recording in a Polycam raw export; raises CaptureError."""
     names = files.names()
-    corrected = all(_by_time(names, f"keyframes/corrected_{kind}") for kind in (_IMAGES, _CAMERAS))
-    kind = "keyframes/corrected_" if corrected else "keyframes/"
-    by_time = [_by_time(names, pattern) for pattern in (kind + _IMAGES, kind + _CAMERAS, _DEPTH, _CONFIDENCE)]
-    ranks = {time_us: rank for rank, time_us in enumerate(sorted(set().union(*by_time)))}
-    colour, cameras, depth, confidence = ({ranks[t]: name for t, name in held.items()} for held in by_time)
-    documents = {number: read_json_object(files, name) for number, name in cameras.items()}
-    size = first_size(files, colour.values(), "colour image")
-    depth_size = first_size(files, depth.values(), "depth image")
-    rgb_cameras = {number: camera for number, d in documents.items() if (camera := _camera(d, size)) is not None}
+    depth, confidence = (_by_time(names, pattern) for pattern in (_DEPTH, _CONFIDENCE))
+    shots: dict[int, _Shot] = {}
+    for kind in ("", "corrected_"):  # the last is preferred, frame by frame: an export may have corrected only some
+        colour, cameras = (_by_time(names, f"keyframes/{kind}{pattern}") for pattern in (_IMAGES, _CAMERAS))
+        size = first_size(files, colour.values()) if colour else (0, 0)
+        for time_us in colour.keys() | cameras.keys():
+            document = read_json_object(files, cameras[time_us]) if time_us in cameras else {}
+            shot = _Shot(
+                colour.get(time_us), cameras.get(time_us), _camera(document, size) if colour else None, _pose(document)
+            )
+            if time_us not in shots or None not in shot:
+                shots[time_us] = shot
+    ranks = {time_us: rank for rank, time_us in enumerate(sorted(shots.keys() | depth.keys() | confidence.keys()))}
+    taken = {ranks[time_us]: shot for time_us, shot in shots.items()}
     found = Found(
-        colour=colour,
-        depth=depth,
-        poses={number: _pose(documents[number]) if number in rgb_cameras else None for number in documents},
-        confidence=confidence,
+        colour={n: shot.image for n, shot in taken.items() if shot.image},
+        depth={ranks[t]: name for t, name in depth.items()},
+        poses={n: shot.pose for n, shot in taken.items() if shot.file},
+        confidence={ranks[t]: name for t, name in confidence.items()},
         times_s={rank: time_us * 1e-6 for time_us, rank in ranks.items()},
+        cameras={n: shot.file for n, shot in taken.items() if shot.file},
     )
-    frames, notices = joined_frames(files, found, rgb_cameras.__getitem__, lambda n: rgb_cameras[n].resized(*depth_size))
-    return Recording(
+    partly = sum("corrected_images" in name for name in found.colour.values())
+    return joined_recording(
+        files,
+        found,
+        lambda n: taken[n].camera,
         format="Polycam raw export",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0, confidence_levels=_CONFIDENCE_LEVELS),
-        up_capture=np.array([0.0, 1.0, 0.0]),
-        notices=tuple(notices),
-        other_names=tuple(cameras[f.index] for f in frames),
+        up_capture=Y_UP,
+        notices=[_PARTLY.format(partly, len(found.colour))] if 0 < partly < len(found.colour) else [],
+        confidence_levels=_CONFIDENCE_LEVELS,
     )
 
 

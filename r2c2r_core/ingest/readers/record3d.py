@@ -1,23 +1,27 @@
-"""Record3D `.r3d`: a zip (or its folder) of `metadata` and rgbd/N.jpg, N.depth, N.conf.
+"""Record3D `.r3d`: a zip (or its folder) of `metadata` and rgbd/N.jpg, N.depth, N.conf; and its export "EXR + JPG".
 
 .depth is LZFSE of little-endian float32 metres, row-major (some writers store it raw); .conf is LZFSE of uint8 0..2, LiDAR
 only.
-Colour, depth, calibration and pose all belong to the portrait image. Depth may contain NaN.
+Colour, depth, calibration and pose all belong to the portrait image. Depth may contain NaN. The export is metadata.json,
+rgb/N.jpg and depth/N.exr (one channel 'R', HALF or FLOAT metres), without confidence; numbers may be missing.
 """
 
-from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.images import colour_file, first_size, numbered
+from r2c2r_core.ingest.readers.frames import Found, joined_recording
+from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.lzfse_blocks import unpacked, unpacked_size
 from r2c2r_core.ingest.readers.protocol import Part, RawDepth, RawFrame, Reader, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.record3d_metadata import Record3DMetadata, parse_metadata
+from r2c2r_core.ingest.readers.stored_depth import depth_size
 
 _METADATA = "metadata"
+_EXR_METADATA, _EXR_COLOUR, _EXR_DEPTH = "metadata.json", r"rgb/(\d+)\.(?i:jpe?g|png)", r"depth/(\d+)\.exr"
 
 
 def open_record3d(files: Files) -> Recording:
@@ -37,67 +41,62 @@ def open_record3d(files: Files) -> Recording:
             f"{files.source}: {len(colour)} colour images but no depth, rgbd/N.depth were expected",
             hint="record with the LiDAR camera, not the video mode",
         )
-    shared = colour.keys() & depth.keys()
-    if not shared:
-        raise CaptureError(f"{files.source}: no colour image has a depth image of the same number", hint="export it again")
-    posed, notices = metadata.posed(shared)
-    if alone := len(colour.keys() ^ depth.keys()):
-        notices.append(f"{alone} frames lack their colour or their depth and were left out")
-    frames = record3d_frames(files, metadata, posed, colour, depth, confidence, _depth_size(files, metadata, depth, posed))
-    return Recording(
-        format="Record3D .r3d",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(_depth_of, files),
-        up_capture=metadata.up_capture,
-        other_ups=metadata.other_ups,
-        notices=tuple(notices),
-        other_names=(_METADATA,),
+    recording = _joined(
+        files, metadata, _METADATA, colour, depth, confidence, _depth_size(files, metadata, depth), "Record3D .r3d"
     )
+    return replace(recording, depth_of=partial(_depth_of, files))
 
 
-def record3d_frames(
+def open_record3d_exr(files: Files) -> Recording:
+    """The recording in an EXR+JPG export; raises CaptureError."""
+    metadata = parse_metadata(files.read(_EXR_METADATA), f"{files.source}, file '{_EXR_METADATA}'")
+    colour, depth = (numbered(files.names(), pattern) for pattern in (_EXR_COLOUR, _EXR_DEPTH))
+    size = metadata.depth_size or depth_size(files, depth.values())
+    return _joined(files, metadata, _EXR_METADATA, colour, depth, {}, size, "Record3D EXR+JPG")
+
+
+def _joined(
     files: Files,
     metadata: Record3DMetadata,
-    numbers: Iterable[int],
+    name: str,
     colour: dict[int, str],
     depth: dict[int, str],
     confidence: dict[int, str],
-    depth_size: tuple[int, int],
-) -> tuple[RawFrame, ...]:
-    """The frames with those numbers; cameras scaled to the sizes the images really have."""
-    chosen = list(numbers)
-    width, height = first_size(files, (colour[n] for n in chosen), "colour image")
-    _same_shape((width, height), (metadata.width, metadata.height), f"{files.source}: colour images are", "the metadata says")
-    _same_shape(depth_size, (width, height), f"{files.source}: depth images are", "colour images are")
-    frames = []
-    for number in chosen:
-        pose = metadata.poses[number]
-        assert pose is not None, "posed() chose the numbers"
-        camera = metadata.camera(number).resized(width, height)
-        frames.append(
-            RawFrame(
-                index=number,
-                timestamp_s=metadata.timestamp(number),
-                rgb_camera=camera,
-                depth_camera=camera.resized(*depth_size),
-                capture_from_camera=pose,
-                rgb_name=colour[number],
-                depth_name=depth[number],
-                confidence_name=confidence.get(number),
-            )
-        )
-    return tuple(frames)
+    depth_pixels: tuple[int, int],
+    format: str,
+) -> Recording:
+    """The recording of those images; cameras are scaled to the sizes that these really have."""
+    metadata.require_poses(colour.keys() & depth.keys())
+    size = first_size(files, colour.values())
+    _same_shape(size, (metadata.width, metadata.height), f"{files.source}: colour images are", "the metadata says")
+    _same_shape(depth_pixels, size, f"{files.source}: depth images are", "colour images are")
+    found = Found(
+        colour=colour,
+        depth=depth,
+        poses=dict(enumerate(metadata.poses)),
+        confidence=confidence,
+        times_s={n: time_s for n in range(len(metadata.poses)) if (time_s := metadata.timestamp(n)) is not None},
+    )
+    recording = joined_recording(
+        files,
+        found,
+        lambda n: metadata.camera(n).resized(*size),
+        lambda n: metadata.camera(n).resized(*size).resized(*depth_pixels),
+        format=format,
+        up_capture=metadata.up_capture,
+        other_names=[name],
+        units_per_metre=1.0,
+    )
+    return replace(recording, other_ups=metadata.other_ups)
 
 
-def _depth_size(files: Files, metadata: Record3DMetadata, depth: dict[int, str], numbers: list[int]) -> tuple[int, int]:
+def _depth_size(files: Files, metadata: Record3DMetadata, depth: dict[int, str]) -> tuple[int, int]:
     if metadata.depth_size is not None:
         return metadata.depth_size
     found = 0
-    for number in numbers[:5]:
+    for name in list(depth.values())[:5]:
         try:
-            found = unpacked_size(files.read(depth[number]), depth[number]) // 4
+            found = unpacked_size(files.read(name), name) // 4
         except UnreadableFrame:
             continue
         # The depth image has the shape of the colour image: w/h is known, w*h was just counted
@@ -144,4 +143,9 @@ READER = Reader(
         Part("metadata beside rgbd/N.jpg and N.depth", _METADATA),
     ),  # without its frames it is still recognised, to give a clear error
     open=open_record3d,
+)
+EXR_READER = Reader(
+    name="Record3D EXR+JPG",
+    parts=(Part(_EXR_METADATA, r"metadata\.json"), Part("rgb/N.jpg", _EXR_COLOUR), Part("depth/N.exr", _EXR_DEPTH)),
+    open=open_record3d_exr,
 )

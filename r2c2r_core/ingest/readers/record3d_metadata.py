@@ -5,7 +5,7 @@ poses are [qx, qy, qz, qw, x, y, z], camera-to-world, OpenGL camera axes; the ne
 the older app's starts at the first camera (poses[0] is the identity) and knows no gravity; pixel centres lie at integers.
 """
 
-from collections.abc import Iterable
+from collections.abc import Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3
-from r2c2r_core.ingest.readers.texts import integer_centred, parse_json_object, pose_of_quaternion
+from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, parse_json_object, pose_of_quaternion
 
 _TOLERATED_WITHOUT_POSE = 0.02  # the last frames of a recording may lack theirs
 
@@ -28,7 +28,7 @@ class Record3DMetadata:
     width: int  # of the RGB images
     height: int
     depth_size: tuple[int, int] | None  # width, height; older apps do not say
-    cameras: tuple[Intrinsics, ...]  # one, or one for each frame
+    cameras: tuple[Intrinsics, ...]  # one for each pose
     poses: tuple[Rigid3 | None, ...]  # capture_from_camera; None where tracking was lost
     timestamps_s: tuple[float, ...] | None
     fps: float | None
@@ -37,7 +37,7 @@ class Record3DMetadata:
 
     def camera(self, number: int) -> Intrinsics:
         """The RGB camera of a frame."""
-        return self.cameras[number] if len(self.cameras) > 1 else self.cameras[0]
+        return self.cameras[number]
 
     def timestamp(self, number: int) -> float | None:
         """Seconds from the start, where known."""
@@ -45,28 +45,14 @@ class Record3DMetadata:
             return self.timestamps_s[number]
         return number / self.fps if self.fps else None
 
-    def posed(self, numbers: Iterable[int]) -> tuple[list[int], list[str]]:
-        """The frame numbers that have a pose, and notices about the others; raises CaptureError on a mismatch."""
-        wanted = sorted(numbers)
-        beyond = [n for n in wanted if n >= len(self.poses)]
-        if len(beyond) > max(1, _TOLERATED_WITHOUT_POSE * len(wanted)):
+    def require_poses(self, numbers: Set[int]) -> None:
+        """Raise CaptureError when more than the last frames have none."""
+        beyond = [n for n in numbers if n >= len(self.poses)]
+        if len(beyond) > max(1, _TOLERATED_WITHOUT_POSE * len(numbers)):
             raise CaptureError(
-                f"{self.source}: {len(wanted)} frames up to number {wanted[-1]}, but {len(self.poses)} poses",
-                hint="the metadata belongs to another recording; export this one again",
+                f"{self.source}: {len(numbers)} frames up to number {max(beyond)}, but {len(self.poses)} poses",
+                hint="the metadata belongs to another recording: use its own",
             )
-        posed = [n for n in wanted if n < len(self.poses) and self.poses[n] is not None]
-        if not posed:
-            raise CaptureError(f"{self.source}: no frame has a usable pose", hint="record again with tracking")
-        notices = []
-        if beyond:
-            notices.append(f"{len(beyond)} frames at the end have no pose and were left out")
-        if lost := len(wanted) - len(beyond) - len(posed):
-            notices.append(f"{lost} frames have an unusable pose and were left out")
-        if missing := wanted[-1] + 1 - len(wanted):  # numbers are distinct
-            notices.append(
-                f"{missing} of {wanted[-1] + 1} frame numbers are missing; the others are matched to poses by number"
-            )
-        return posed, notices
 
 
 def parse_metadata(content: bytes, source: str) -> Record3DMetadata:
@@ -96,16 +82,19 @@ def parse_metadata(content: bytes, source: str) -> Record3DMetadata:
 
 
 def _cameras(metadata: dict[str, Any], width: int, height: int, count: int, source: str) -> tuple[Intrinsics, ...]:
-    rows = _table(metadata, "perFrameIntrinsicCoeffs", 4, source)
-    if rows is None or len(rows) < count:
-        k = metadata.get("K")
-        if not isinstance(k, list) or len(k) != 9 or not _all_numbers(k):
-            raise CaptureError(f"{source}: key 'K' should hold 9 numbers, found {_brief(k)}", hint="export the recording again")
-        matrix = np.array(k, dtype=np.float64).reshape(3, 3).T  # column-major
-        rows = np.array([[matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]])
-    if not (np.isfinite(rows).all() and (rows[:, :2] > 0).all()):
-        raise CaptureError(f"{source}: a focal length is not a positive number", hint="export the recording again")
-    return tuple(integer_centred(fx, fy, cx, cy, (width, height)) for fx, fy, cx, cy in rows)
+    """The camera of each frame: its own where it has one, else K's."""
+    own, k = metadata.get("perFrameIntrinsicCoeffs"), finite_numbers(metadata.get("K"), (9,))
+    common = None if k is None else k[[0, 4, 6, 7]]  # column-major
+    rows = [finite_numbers(row, (4,)) for row in own[:count]] if isinstance(own, list) else []
+    rows += [None] * (count - len(rows))
+    used = [row for own_row in rows if (row := own_row if own_row is not None and min(own_row[:2]) > 0 else common) is not None]
+    if len(used) < count or min(min(row[:2]) for row in used) <= 0:
+        found = _brief(metadata.get("K"))
+        raise CaptureError(
+            f"{source}: key 'K' should hold 9 numbers, found {found}; focal lengths should be positive",
+            hint="share the recording from the app again, or write fx, 0, 0, 0, fy, 0, cx, cy, 1",
+        )
+    return tuple(integer_centred(fx, fy, cx, cy, (width, height)) for fx, fy, cx, cy in used)
 
 
 def _pose(row: np.ndarray) -> Rigid3 | None:

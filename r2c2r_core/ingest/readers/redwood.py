@@ -9,7 +9,6 @@ is 4000); scripts around librealsense write metres a unit.
 
 import re
 from collections.abc import Collection, Mapping
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,12 +17,14 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.frames import Found, joined_recording
+from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_matrix, read_json_object, read_numbers
+from r2c2r_core.ingest.readers.stored_depth import ENDING
+from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, pose_of_matrix, read_json_object, read_numbers
 
-_COLOUR, _DEPTH = r"(?:color|image|rgb)/(\d+)(?:-\d+)?\.(?i:jpe?g|png)", r"depth/(\d+)(?:-\d+)?\.(?i:png)"
+_NUMBER = r"[^/\d]*(\d{1,8})(?:-\d+)?"  # ZED's tools write left000007.png beside depth000007.png
+_COLOUR, _DEPTH = rf"(?:color|image|rgb)/{_NUMBER}\.(?i:jpe?g|png)", rf"depth/{_NUMBER}\.{ENDING}"
 _LOG = r"(?:scene/)?trajectory\.log"
 _ROW = 3 + 16  # numbers of one frame
 _MILLIMETRES = 1000.0  # units a metre
@@ -45,23 +46,22 @@ def open_redwood(files: Files) -> Recording:
     if _starts_one_earlier(poses, colour.keys()):
         poses = {number + 1: pose for number, pose in poses.items()}
         notices.append(f"images are numbered from 1, {log} from 0: pose i belongs to image i + 1")
-    calibration = _calibration(files, first_size(files, colour.values(), "colour image"))
-    depth_camera = calibration.camera.resized(*first_size(files, depth.values(), "depth image"))
+    calibration = _calibration(files, first_size(files, colour.values()))
     if calibration.name is None:
-        notices.append("no calibration was found: a PrimeSense's 525 px is assumed")
+        notices.append(
+            "no calibration was found (fx, fy, cx, cy or intrinsic_matrix in a .json): a PrimeSense's 525 px is assumed"
+        )
     if calibration.units_per_metre != _MILLIMETRES:
         notices.append(f"depth is read in steps of {1000 / calibration.units_per_metre:g} mm, as {calibration.name} says")
     found = Found(colour=colour, depth=depth, poses=poses)
-    frames, left_out = joined_frames(files, found, lambda _: calibration.camera, lambda _: depth_camera)
-    return Recording(
+    return joined_recording(
+        files,
+        found,
+        calibration.camera,
         format="Redwood / Open3D",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, calibration.units_per_metre),
-        up_capture=None,
-        notices=(*notices, *left_out),
-        other_names=tuple(name for name in (log, calibration.name) if name),
+        notices=notices,
+        other_names=[name for name in (log, calibration.name) if name],
+        units_per_metre=calibration.units_per_metre,
     )
 
 
@@ -80,19 +80,25 @@ def _starts_one_earlier(poses: Collection[int], images: Collection[int]) -> bool
 
 
 def _calibration(files: Files, size: tuple[int, int]) -> _Calibration:
-    """Calibration from a JSON in Open3D's form (intrinsic_matrix column-major, width, height), else a PrimeSense's."""
+    """Calibration from the first JSON that holds one, else a PrimeSense's; of the images' size where it names none."""
     for name in sorted(n for n in files.names() if "/" not in n and n.endswith(".json")):
         document = read_json_object(files, name)
-        matrix, width, height = (document.get(key) for key in ("intrinsic_matrix", "width", "height"))
-        try:
-            k = np.array(matrix, np.float64).reshape(3, 3).T
-            full = integer_centred(k[0, 0], k[1, 1], k[0, 2], k[1, 2], (int(width or 0), int(height or 0)))
-        except (TypeError, ValueError, OverflowError):
-            continue
-        if np.isfinite(k).all() and min(full.fx, full.fy, full.width, full.height) > 0:
-            return _Calibration(full.resized(*size), _units_per_metre(document), name)
+        numbers, sizes = _coefficients(document), finite_numbers([document.get(key) for key in ("width", "height")], (2,))
+        if numbers is not None and min(numbers[:2]) > 0 and (sizes is None or min(sizes) >= 1):
+            fx, fy, cx, cy = numbers
+            camera = integer_centred(fx, fy, cx, cy, size if sizes is None else (int(sizes[0]), int(sizes[1])))
+            return _Calibration(camera.resized(*size), _units_per_metre(document), name)
     assumed = integer_centred(525.0, 525.0, 319.5, 239.5, (640, 480)).resized(*size)
     return _Calibration(assumed, _MILLIMETRES, None)
+
+
+def _coefficients(document: Mapping[str, Any]) -> np.ndarray | None:
+    """fx, fy, cx, cy of a matrix, in Open3D's column-major form or by rows as ROS writes it, or of four numbers by name."""
+    for key in ("intrinsic_matrix", "K", "k", "camera_matrix"):
+        listed, rows = (finite_numbers(document.get(key), shape) for shape in ((9,), (3, 3)))
+        if (matrix := rows if listed is None else listed.reshape(3, 3)) is not None:
+            return np.asarray((matrix if matrix[0, 2] else matrix.T)[[0, 1, 0, 1], [0, 1, 2, 2]])
+    return finite_numbers([document.get(key) for key in ("fx", "fy", "cx", "cy")], (4,))
 
 
 def _units_per_metre(document: Mapping[str, Any]) -> float:

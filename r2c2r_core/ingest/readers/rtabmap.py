@@ -7,7 +7,6 @@ uint16 millimetres, often smaller than the picture; pixel centres lie at integer
 """
 
 import re
-from functools import partial
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -17,10 +16,10 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import MOST_FRAMES, colour_file, depth_file, first_size
+from r2c2r_core.ingest.readers.frames import Z_UP, Found, joined_recording
+from r2c2r_core.ingest.readers.images import MOST_FRAMES, first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_matrix, pose_of_quaternion, read_numbers
+from r2c2r_core.ingest.readers.texts import camera_of, lines_of, pose_of_matrix, pose_of_quaternion, read_numbers
 
 _NODE = r"\d+(?:\.\d+)?"
 _COLOUR, _DEPTH, _CALIBRATION = (
@@ -29,6 +28,7 @@ _COLOUR, _DEPTH, _CALIBRATION = (
 _OF_CAMERA, _OF_DEVICE = r"[^/]+_camera_poses\.txt", r"[^/]+(?<!_camera)(?<!_scan)_poses\.txt"
 _SAME_S = 1e-4  # a file's name has six digits of its time
 _NO_LENS = 1e-6
+_DISTORTED = "the calibration has lens distortion, which is not corrected: export rectified images"
 
 
 class _Node(NamedTuple):
@@ -44,32 +44,33 @@ class _Calibration(NamedTuple):
 
 def open_rtabmap(files: Files) -> Recording:
     """The recording in a folder of rtabmap-export; raises CaptureError."""
-    name = min(n for n in files.names() if re.fullmatch(f"{_OF_CAMERA}|{_OF_DEVICE}", n))
-    of_camera = re.fullmatch(_OF_CAMERA, name) is not None
-    nodes = _nodes(files, name)
+    of_device, of_camera = ([n for n in sorted(files.names()) if re.fullmatch(p, n)][:1] for p in (_OF_DEVICE, _OF_CAMERA))
+    on_device, on_camera = (
+        {k: v for name in names for k, v in _nodes(files, name).items()} for names in (of_device, of_camera)
+    )
+    nodes = {**on_device, **on_camera}
     colour, depth, calibrations = (_by_node(files, pattern, nodes) for pattern in (_COLOUR, _DEPTH, _CALIBRATION))
     read = {number: _calibration(files, path) for number, path in calibrations.items()}
     if not read:
-        raise CaptureError(f"{files.source}: no calibration of a node of {name}", hint="export images and poses together")
-    size, depth_size = first_size(files, colour.values(), "colour image"), first_size(files, depth.values(), "depth image")
+        raise CaptureError(
+            f"{files.source}: no calibration of a node of {(*of_camera, *of_device)[0]}",
+            hint="export images and poses together",
+        )
+    size = first_size(files, colour.values())
     common = read[min(read)]
     cameras = {number: read.get(number, common).camera.resized(*size) for number in nodes}
-    poses = {
-        number: node.pose if of_camera else _of_camera(node.pose, read.get(number, common)) for number, node in nodes.items()
-    }
+    poses = {number: _of_camera(node.pose, read.get(number, common)) for number, node in on_device.items()}
+    poses.update({number: node.pose for number, node in on_camera.items()})  # preferred, node by node
     found = Found(colour=colour, depth=depth, poses=poses, times_s={number: node.time_s for number, node in nodes.items()})
-    frames, notices = joined_frames(files, found, cameras.__getitem__, lambda n: cameras[n].resized(*depth_size))
-    if any(one.distorted for one in read.values()):
-        notices.append("the calibration has lens distortion, which is not corrected: export rectified images")
-    return Recording(
+    distorted = any(one.distorted for one in read.values())
+    return joined_recording(
+        files,
+        found,
+        cameras.get,
         format="RTAB-Map export",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0),
-        up_capture=np.array([0.0, 0.0, 1.0]),
-        notices=tuple(notices),
-        other_names=(name, *calibrations.values()),
+        up_capture=Z_UP,
+        notices=[_DISTORTED] if distorted else [],
+        other_names=(*of_camera, *of_device, *calibrations.values()),
     )
 
 
@@ -105,15 +106,16 @@ def _by_node(files: Files, pattern: str, nodes: dict[int, _Node]) -> dict[int, s
 
 def _calibration(files: Files, name: str) -> _Calibration:
     text = files.read(name).decode("utf-8", errors="replace")
-    matrix, size = _data(text, "camera_matrix", 9), [_whole(text, key) for key in ("image_width", "image_height")]
-    if matrix is None or min(matrix[0], matrix[4]) <= 0 or min(size) <= 0:
+    width, height = (_whole(text, key) for key in ("image_width", "image_height"))
+    camera = camera_of(_data(text, "camera_matrix", 9), (width, height))
+    if camera is None or min(width, height) <= 0:
         raise CaptureError(
             f"{files.source}/{name}: expected camera_matrix with 9 numbers, image_width and image_height",
             hint="export it again",
         )
     local, lens = _data(text, "local_transform", 12), _data(text, "distortion_coefficients", None)
     return _Calibration(
-        camera=integer_centred(matrix[0], matrix[4], matrix[2], matrix[5], (size[0], size[1])),
+        camera=camera,
         device_from_camera=None if local is None else pose_of_matrix(local.reshape(3, 4)),
         distorted=lens is not None and bool(np.abs(lens).max(initial=0.0) > _NO_LENS),
     )

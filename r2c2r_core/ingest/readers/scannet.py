@@ -4,18 +4,15 @@ Depth is uint16 millimetres, aligned to colour up to scale, each with its own ca
 are 4x4 camera-to-world with OpenCV axes, -inf where tracking was lost; world z up; pixel centres lie at integers.
 """
 
-from functools import partial
-
-import numpy as np
-
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames, read_poses
-from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.frames import Z_UP, Found, joined_recording, read_poses
+from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
+from r2c2r_core.ingest.readers.stored_depth import ENDING, depth_size
 from r2c2r_core.ingest.readers.texts import read_calibration
 
-_COLOUR, _DEPTH, _POSE = r"color/(\d+)\.(?i:jpe?g|png)", r"depth/(\d+)\.(?i:png)", r"pose/(\d+)\.txt"
+_COLOUR, _DEPTH, _POSE = r"color/(\d+)\.(?i:jpe?g|png)", rf"depth/(\d+)\.{ENDING}", r"pose/(\d+)\.txt"
 _INTRINSIC_COLOUR, _INTRINSIC_DEPTH = "intrinsic/intrinsic_color.txt", "intrinsic/intrinsic_depth.txt"
 _SENSOR_SIZE = (1296, 968)  # of the colour images that intrinsic_color.txt is for
 
@@ -23,18 +20,17 @@ _SENSOR_SIZE = (1296, 968)  # of the colour images that intrinsic_color.txt is f
 def open_scannet(files: Files) -> Recording:
     """The recording in a ScanNet export; raises CaptureError."""
     colour, depth, poses = (numbered(files.names(), pattern) for pattern in (_COLOUR, _DEPTH, _POSE))
-    rgb_camera, notices = _colour_camera(files, first_size(files, colour.values(), "colour image"))
-    depth_camera = read_calibration(files, _INTRINSIC_DEPTH, first_size(files, depth.values(), "depth image"))
+    rgb_camera, notices = _colour_camera(files, first_size(files, colour.values()))
+    depth_camera = read_calibration(files, _INTRINSIC_DEPTH, depth_size(files, depth.values()))
     found = Found(colour=colour, depth=depth, poses=read_poses(files, poses))
-    frames, left_out = joined_frames(files, found, lambda _: rgb_camera, lambda _: depth_camera)
-    return Recording(
+    return joined_recording(
+        files,
+        found,
+        rgb_camera,
+        depth_camera,
         format="ScanNet export",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0),
-        up_capture=np.array([0.0, 0.0, 1.0]),
-        notices=(*notices, *left_out),
+        up_capture=Z_UP,
+        notices=notices,
         other_names=(_INTRINSIC_COLOUR, _INTRINSIC_DEPTH, *poses.values()),
     )
 

@@ -8,19 +8,16 @@ millimetres; pixel centres lie at integers. (scannetpp/scannetpp, README.md.)
 
 import re
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
-
-import numpy as np
 
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import MOST_FRAMES, colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.frames import Z_UP, Found, joined_recording
+from r2c2r_core.ingest.readers.images import MOST_FRAMES, first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, pose_of_matrix, read_json_object
+from r2c2r_core.ingest.readers.texts import camera_of, finite_numbers, pose_of_matrix, read_json_object
 
 _COLOUR, _DEPTH = r"rgb/frame_(\d+)\.(?i:jpe?g|png)", r"depth/frame_(\d+)\.(?i:png)"
 _CAMERAS = "pose_intrinsic_imu.json"
@@ -31,7 +28,7 @@ def open_scannetpp(files: Files) -> Recording:
     """The recording in the `iphone` folder of a ScanNet++ scene; raises CaptureError."""
     colour, depth = numbered(files.names(), _COLOUR), numbered(files.names(), _DEPTH)
     entries = {n: entry for n, entry in _entries(files).items() if n in colour or n in depth}  # of every frame of the film
-    size, depth_size = first_size(files, colour.values(), "colour image"), first_size(files, depth.values(), "depth image")
+    size = first_size(files, colour.values())
     cameras = {number: camera for number, entry in entries.items() if (camera := _camera(entry, size))}
     if not cameras:
         raise CaptureError(
@@ -41,17 +38,7 @@ def open_scannetpp(files: Files) -> Recording:
     poses = {number: _pose(entries[number]) for number in cameras}
     times = {n: float(t[0]) for n in cameras if (t := finite_numbers(entries[n].get("timestamp"), (1,))) is not None}
     found = Found(colour=colour, depth=depth, poses=poses, times_s=times)
-    frames, notices = joined_frames(files, found, cameras.__getitem__, lambda n: cameras[n].resized(*depth_size))
-    return Recording(
-        format="ScanNet++ iPhone",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0),
-        up_capture=np.array([0.0, 0.0, 1.0]),
-        notices=tuple(notices),
-        other_names=(_CAMERAS,),
-    )
+    return joined_recording(files, found, cameras.get, format="ScanNet++ iPhone", up_capture=Z_UP, other_names=[_CAMERAS])
 
 
 def _entries(files: Files) -> dict[int, Mapping[str, Any]]:
@@ -62,10 +49,8 @@ def _entries(files: Files) -> dict[int, Mapping[str, Any]]:
 
 
 def _camera(entry: Mapping[str, Any], size: tuple[int, int]) -> Intrinsics | None:
-    matrix = finite_numbers(entry.get("intrinsic"), (3, 3))
-    if matrix is None or min(matrix[0, 0], matrix[1, 1]) <= 0:
-        return None
-    return integer_centred(matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], _FILM_SIZE).resized(*size)
+    camera = camera_of(finite_numbers(entry.get("intrinsic"), (3, 3)), _FILM_SIZE)
+    return None if camera is None else camera.resized(*size)
 
 
 def _pose(entry: Mapping[str, Any]) -> Rigid3 | None:

@@ -4,44 +4,32 @@ Depth is uint16 millimetres (0 and 65535 unknown), registered to colour; poses a
 rotations off by up to 4e-4; pixel centres lie at integers; gravity-direction.txt points down.
 """
 
-from functools import partial
-
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames, read_poses
-from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.frames import Found, joined_recording, read_poses
+from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
+from r2c2r_core.ingest.readers.stored_depth import ENDING
 from r2c2r_core.ingest.readers.texts import read_calibration, read_numbers
 
 _INTRINSICS = "intrinsics_color.txt"
 _GRAVITY = "gravity-direction.txt"
 _COLOUR = r"color/(?:frame-)?(\d+)(?:\.color)?\.(?i:jpe?g|png)"
-_DEPTH = r"depth/(?:frame-)?(\d+)(?:\.depth)?\.(?i:png)"
+_DEPTH = rf"depth/(?:frame-)?(\d+)(?:\.depth)?\.{ENDING}"
 _POSE = r"pose/(?:frame-)?(\d+)(?:\.pose)?\.txt"
 
 
 def open_seven_scenes(files: Files) -> Recording:
     """The recording in a 7-Scenes-like folder; raises CaptureError."""
     colour, depth, poses = (numbered(files.names(), pattern) for pattern in (_COLOUR, _DEPTH, _POSE))
-    rgb_camera = read_calibration(files, _INTRINSICS, first_size(files, colour.values(), "colour image"))
-    depth_camera = rgb_camera.resized(*first_size(files, depth.values(), "depth image"))
+    rgb_camera = read_calibration(files, _INTRINSICS, first_size(files, colour.values()))
     found = Found(colour=colour, depth=depth, poses=read_poses(files, poses))
-    frames, notices = joined_frames(files, found, lambda _: rgb_camera, lambda _: depth_camera)
     up = _up(files)
     others = [_INTRINSICS, *poses.values(), *([_GRAVITY] if up is not None else [])]
-    return Recording(
-        format="7-Scenes folder",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0),
-        up_capture=up,
-        notices=tuple(notices),
-        other_names=tuple(others),
-    )
+    return joined_recording(files, found, rgb_camera, format="7-Scenes folder", up_capture=up, other_names=others)
 
 
 def _up(files: Files) -> Vector3 | None:

@@ -7,6 +7,7 @@ integers. (StrayRobots/scanner, docs/format.md and OdometryEncoder.swift.)
 """
 
 import csv
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,14 +15,15 @@ import numpy as np
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import MOST_FRAMES, colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.frames import Y_UP, Found, joined_recording
+from r2c2r_core.ingest.readers.images import MOST_FRAMES, first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Colour, Part, RawFrame, Reader, Recording
+from r2c2r_core.ingest.readers.stored_depth import ENDING
 from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_quaternion, read_calibration
 from r2c2r_core.ingest.readers.video import Video
 
 _VIDEO, _MATRIX, _ODOMETRY = "rgb.mp4", "camera_matrix.csv", "odometry.csv"
-_COLOUR, _DEPTH, _CONFIDENCE = r"rgb/(\d+)\.(?i:jpe?g|png)", r"depth/(\d+)\.(?i:png|npy)", r"confidence/(\d+)\.(?i:png)"
+_COLOUR, _DEPTH, _CONFIDENCE = r"rgb/(\d+)\.(?i:jpe?g|png)", rf"depth/(\d+)\.{ENDING}", r"confidence/(\d+)\.(?i:png)"
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _CAMERA = ("fx", "fy", "cx", "cy")
 
@@ -32,10 +34,9 @@ def open_stray(files: Files) -> Recording:
     depth = numbered(files.names(), _DEPTH)
     video = Video(files, _VIDEO) if _VIDEO in files.names() else None
     colour = dict.fromkeys(odometry, _VIDEO) if video else numbered(files.names(), _COLOUR)
-    size = video.size if video else first_size(files, colour.values(), "colour image")
+    size = video.size if video else first_size(files, colour.values())
     common = read_calibration(files, _MATRIX, size)
     cameras = {number: _camera(row, common) for number, row in odometry.items()}
-    depth_size = first_size(files, depth.values(), "depth image")
     found = Found(
         colour=colour,
         depth=depth,
@@ -43,17 +44,10 @@ def open_stray(files: Files) -> Recording:
         confidence=numbered(files.names(), _CONFIDENCE),
         times_s={n: row["timestamp"] for n, row in odometry.items()},
     )
-    frames, notices = joined_frames(files, found, cameras.__getitem__, lambda n: cameras[n].resized(*depth_size))
-    return Recording(
-        format="Stray Scanner",
-        files=files,
-        frames=frames,
-        colour_of=partial(_video_frame, video) if video else partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0),
-        up_capture=np.array([0.0, 1.0, 0.0]),
-        notices=tuple(notices),
-        other_names=(_MATRIX, _ODOMETRY),
+    recording = joined_recording(
+        files, found, cameras.get, format="Stray Scanner", up_capture=Y_UP, other_names=(_MATRIX, _ODOMETRY)
     )
+    return replace(recording, colour_of=partial(_video_frame, video)) if video else recording
 
 
 def _video_frame(video: Video, frame: RawFrame) -> Colour:

@@ -1,5 +1,6 @@
 """The recording formats. To add one: a file with a READER, and a line here."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from r2c2r_core.ingest.readers import (
     nerfstudio,
     polycam,
     record3d,
-    record3d_exr,
     redwood,
     rtabmap,
     scanner_app,
@@ -26,12 +26,13 @@ from r2c2r_core.ingest.readers import (
 )
 from r2c2r_core.ingest.readers.plausible import plausible
 from r2c2r_core.ingest.readers.protocol import Reader, Recording
+from r2c2r_core.ingest.readers.stored_depth import ENDING, WRITE
 from r2c2r_core.ingest.upright import upright
 from r2c2r_core.plugins import added
 
 READERS: tuple[Reader, ...] = (
     record3d.READER,
-    record3d_exr.READER,
+    record3d.EXR_READER,
     stray.READER,
     polycam.READER,
     scanner_app.READER,
@@ -52,6 +53,8 @@ _BRING = (
     "bring colour, depth and poses: an .r3d of Record3D, a Stray Scanner folder, Polycam's Raw data or 3D Scanner App's "
     "All data; docs/recordings.md names every format"
 )
+_DEPTH = r"(?i)(?:^|/)depth[^/]*(?:/[^/]+)?$"
+_KNOWN = rf".*\.(?:{ENDING}|json|txt|csv)"
 _DEEPEST, _WIDEST = 6, 50  # folders searched
 
 
@@ -104,6 +107,9 @@ def _unknown(source: Path, files: Files, roots: list[Files]) -> CaptureError:
     others = "".join(f"; {other.name} would need {' and '.join(lacking)}" for other, lacking in nearest[1:])
     lacks = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
     has_depth = any("depth" in name.lower() for name in files.names())
+    unread = next((n for n in sorted(files.names()) if re.search(_DEPTH, n) and not re.fullmatch(_KNOWN, n)), None)
+    if unread and any("depth" in part for part in missing):
+        return CaptureError(f"{source}: depth such as {unread} is not read", hint=WRITE)
     flat = "" if has_depth else "; captures without depth, as in a photo mode, cannot be used"
     return CaptureError(
         f"{source}: {_found(files)}; looks like {reader.name}, but {lacks}", hint=f"it holds {reader.expects}{flat}{others}"

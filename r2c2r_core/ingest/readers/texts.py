@@ -62,6 +62,14 @@ def read_calibration(files: Files, name: str, size: tuple[int, int]) -> Intrinsi
     return integer_centred(matrix[0], matrix[side + 1], matrix[2], matrix[side + 2], size)
 
 
+def camera_of(matrix: np.ndarray | None, size: tuple[int, int]) -> Intrinsics | None:
+    """The camera of nine numbers, row by row, with pixel centres at integers; None when they are no calibration."""
+    if matrix is None or matrix.size != 9 or not np.isfinite(matrix).all():
+        return None
+    fx, _, cx, _, fy, cy = matrix.ravel()[:6]
+    return integer_centred(fx, fy, cx, cy, size) if min(fx, fy) > 0 else None
+
+
 def integer_centred(fx: float, fy: float, cx: float, cy: float, size: tuple[int, int]) -> Intrinsics:
     """A camera whose format puts pixel centres at integers, in our convention; `size` is (width, height)."""
     return Intrinsics(

@@ -6,18 +6,18 @@ camera-to-world with OpenCV axes; pixel centres lie at integers.
 """
 
 import re
-from functools import partial
 
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames, read_poses
-from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size, numbered
+from r2c2r_core.ingest.readers.frames import Found, joined_recording, read_poses
+from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
+from r2c2r_core.ingest.readers.stored_depth import ENDING, depth_size
 from r2c2r_core.ingest.readers.texts import integer_centred, read_calibration
 
 _INTRINSICS = "camera-intrinsics.txt"
 _FOLDER = r"(?:[^/]+/)?"
-_COLOUR, _DEPTH, _POSE = (rf"frame-(\d+)\.{kind}" for kind in (r"color\.(?i:jpe?g|png)", r"depth\.(?i:png)", r"pose\.txt"))
+_COLOUR, _DEPTH, _POSE = (rf"frame-(\d+)\.{kind}" for kind in (r"color\.(?i:jpe?g|png)", rf"depth\.{ENDING}", r"pose\.txt"))
 
 
 def open_threedmatch(files: Files) -> Recording:
@@ -25,33 +25,31 @@ def open_threedmatch(files: Files) -> Recording:
     folders = sorted({name.rpartition("/")[0] for name in files.names() if re.fullmatch(_FOLDER + _DEPTH, name)})
     prefix = f"{folders[0]}/" if folders[0] else ""
     colour, depth, poses = (numbered(files.names(), prefix + pattern) for pattern in (_COLOUR, _DEPTH, _POSE))
-    size, depth_size = first_size(files, colour.values(), "colour image"), first_size(files, depth.values(), "depth image")
-    rgb_camera, depth_camera, others, notices = _cameras(files, prefix, size, depth_size)
+    sizes = first_size(files, colour.values()), depth_size(files, depth.values())
+    rgb_camera, depth_camera, others, notices = _cameras(files, prefix, *sizes)
     if len(folders) > 1:
         notices.append(f"of {len(folders)} sequences {folders[0]} is read; to read another one, give its folder")
     found = Found(colour=colour, depth=depth, poses=read_poses(files, poses))
-    frames, left_out = joined_frames(files, found, lambda _: rgb_camera, lambda _: depth_camera)
-    return Recording(
+    return joined_recording(
+        files,
+        found,
+        rgb_camera,
+        depth_camera,
         format="3DMatch / 7-Scenes sequence",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, 1000.0),
-        up_capture=None,
-        notices=(*notices, *left_out),
+        notices=notices,
         other_names=(*others, *poses.values()),
     )
 
 
 def _cameras(
-    files: Files, prefix: str, size: tuple[int, int], depth_size: tuple[int, int]
+    files: Files, prefix: str, size: tuple[int, int], depth_pixels: tuple[int, int]
 ) -> tuple[Intrinsics, Intrinsics, list[str], list[str]]:
     for name in (prefix + _INTRINSICS, _INTRINSICS):
         if name in files.names():
             camera = read_calibration(files, name, size)
-            return camera, camera.resized(*depth_size), [name], []
+            return camera, camera.resized(*depth_pixels), [name], []
     colour, depth = (
-        integer_centred(f, f, 319.5, 239.5, (640, 480)).resized(*pixels) for f, pixels in ((525.0, size), (585.0, depth_size))
+        integer_centred(f, f, 319.5, 239.5, (640, 480)).resized(*pixels) for f, pixels in ((525.0, size), (585.0, depth_pixels))
     )
     return (
         colour,

@@ -2,12 +2,12 @@
 
 Also the key-frame layout whose pose file is truth_cam_poses.txt (line i belongs to image i, the clocks differ) and whose
 calibration is an ORB-SLAM settings file; and sets whose two lists are one, associations.txt (`time file time file`, colour or
-depth first), as ICL-NUIM's, whose poses are in a .freiburg file. Clocks are associated within 20 ms, poses interpolated. Pixel
-centres lie at integers.
+depth first), as ICL-NUIM's. Its poses, in a .freiburg file or one renamed, are of a renderer's left-handed world, so they are
+reflected; its camera is 481.2, 480, 319.5, 239.5, and which way is up is left to the planes. Clocks are associated within
+20 ms, poses interpolated. Pixel centres lie at integers.
 """
 
 import re
-from functools import partial
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -16,8 +16,8 @@ import numpy as np
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
-from r2c2r_core.ingest.readers.frames import Found, joined_frames
-from r2c2r_core.ingest.readers.images import colour_file, depth_file, first_size
+from r2c2r_core.ingest.readers.frames import Z_UP, Found, joined_recording
+from r2c2r_core.ingest.readers.images import first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_quaternion, read_numbers
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
@@ -34,6 +34,12 @@ _KNOWN_CAMERAS = {  # vision.in.tum.de, intrinsic page; fx, fy, cx, cy at 640x48
     "freiburg3": (535.4, 539.2, 320.1, 247.6),
 }
 _GENERIC_CAMERA = (525.0, 525.0, 319.5, 239.5)
+_ICL, _ICL_CAMERA = (
+    r"\.freiburg\b|(?:living|office)_room_traj\d|traj\d\w*_frei_png",
+    (481.2, 480.0, 319.5, 239.5),
+)  # and 640x480
+_MIRROR = np.diag([1.0, -1.0, 1.0])
+_LEFT_HANDED = "ICL-NUIM's world is left-handed: its poses were reflected about the XZ plane"
 
 
 class _Calibration(NamedTuple):
@@ -49,27 +55,28 @@ def open_tum(files: Files) -> Recording:
     rgb, rgb_lines = _present(files, *lists.colour)
     depth, _ = _present(files, *lists.depth)
     pose_name = next((name for name in sorted(files.names()) if re.fullmatch(_POSES, name)), None)
-    calibration = _calibration(files)
+    icl = re.search(_ICL, f"{files.source} {pose_name}", re.IGNORECASE) is not None
+    calibration = _calibration(files, icl)
     colour, times = {n: name for n, (_, name) in rgb.items()}, {n: time_s for n, (time_s, _) in rgb.items()}
-    placed = _placed(files, pose_name, times, rgb_lines) if pose_name else _Placed({}, times, None)
+    placed = _placed(files, pose_name, times, rgb_lines, icl) if pose_name else _Placed({}, times, None)
     found = Found(
         colour=colour,
         depth=named_at(times, dict(depth.values()), _APART_S),
         poses=placed.poses,
         times_s=placed.times_s,
     )
-    camera = integer_centred(*calibration.coefficients, first_size(files, colour.values(), "colour image"))
-    depth_camera = camera.resized(*first_size(files, found.depth.values(), "depth image"))
-    frames, left_out = joined_frames(files, found, lambda _: camera, lambda _: depth_camera)
-    return Recording(
+    camera = integer_centred(*calibration.coefficients, first_size(files, colour.values()))
+    return joined_recording(
+        files,
+        found,
+        camera,
         format="TUM RGB-D",
-        files=files,
-        frames=frames,
-        colour_of=partial(colour_file, files),
-        depth_of=partial(depth_file, files, calibration.units_per_metre),
-        up_capture=np.array([0.0, 0.0, 1.0]) if pose_name and not pose_name.endswith(".freiburg") else None,
-        notices=(*(notice for notice in (calibration.notice, placed.notice) if notice), *left_out),
-        other_names=tuple({lists.colour[0], lists.depth[0], *(name for name in (pose_name, calibration.name) if name)}),
+        up_capture=Z_UP if pose_name and not icl else None,
+        notices=[
+            notice for notice in (calibration.notice, placed.notice, _LEFT_HANDED if icl and pose_name else None) if notice
+        ],
+        other_names={lists.colour[0], lists.depth[0], *(name for name in (pose_name, calibration.name) if name)},
+        units_per_metre=calibration.units_per_metre,
     )
 
 
@@ -79,9 +86,13 @@ class _Placed(NamedTuple):
     notice: str | None
 
 
-def _placed(files: Files, pose_name: str, times_s: dict[int, float], rgb_lines: int) -> _Placed:
+def _placed(files: Files, pose_name: str, times_s: dict[int, float], rgb_lines: int, icl: bool) -> _Placed:
     """A pose for each image, by time; by line if the clocks do not overlap and the line counts are equal."""
     posed, pose_lines = _timed_poses(files, pose_name)
+    if icl:
+        posed = {
+            n: (time_s, Rigid3(_MIRROR @ p.rotation @ _MIRROR, _MIRROR @ p.translation)) for n, (time_s, p) in posed.items()
+        }
     by_time = sorted(posed.values(), key=lambda timed: timed[0])
     trajectory = Trajectory(np.array([time_s for time_s, _ in by_time]), [pose for _, pose in by_time])
     near = {n: trajectory.at(t, apart_s=_APART_S, gap_s=_GAP_S) for n, t in times_s.items()}
@@ -152,7 +163,7 @@ def _present(files: Files, name: str, images: _Listed) -> tuple[dict[int, tuple[
     return present, len(images)
 
 
-def _calibration(files: Files) -> _Calibration:
+def _calibration(files: Files, icl: bool) -> _Calibration:
     """Calibration from a settings file beside the images, else from the sequence's name, else the generic Kinect's.
 
     The last comes with a notice. The sequence is named in the comments at the head of its lists (`# file:
@@ -165,6 +176,8 @@ def _calibration(files: Files) -> _Calibration:
             factor = re.search(rf"^\s*(?:RGBD\.)?Dep[t]?h?MapFactor\s*:\s*({_NUMBER})", text, re.MULTILINE)
             units = float(factor.group(1)) if factor and float(factor.group(1)) > 1.0 else 5000.0
             return _Calibration((found["fx"], found["fy"], found["cx"], found["cy"]), units, None, name)
+    if icl:
+        return _Calibration(_ICL_CAMERA, 5000.0, None, None)
     told = (*(_heading(files, name) for name in _NAMED_IN if name in files.names()), str(files.source))
     for name in (name for text in told for name in _KNOWN_CAMERAS if name in text.lower()):
         notice = None if name == "freiburg3" else f"{name}'s colour images are distorted; the lens is treated as ideal"

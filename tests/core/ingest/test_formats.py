@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from r2c2r_core.errors import CaptureError
-from r2c2r_core.ingest.readers.protocol import UnreadableFrame
 from r2c2r_core.ingest.readers.table import open_recording
 
 from .tiny import TinyRoom, integer_centred, write_seven_scenes, write_tum, zip_folder
@@ -484,9 +483,9 @@ def test_eight_bit_depth_reports_that_16_bit_is_expected(tmp_path):
     folder = write_redwood(tmp_path / "r", SMALL)
     for path in (folder / "depth").iterdir():
         cv2.imwrite(str(path), (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) // 16).astype(np.uint8))
-    recording = open_recording(folder)
-    with pytest.raises(UnreadableFrame, match="1 x uint8 a pixel, one uint16 expected"):
-        recording.depth_of(recording.frames[0])
+    with pytest.raises(CaptureError, match="1 x uint8 a pixel, one uint16 expected") as caught:
+        open_recording(folder)
+    assert "write depth as 16-bit PNG" in caught.value.hint
 
 
 def test_nested_wrapper_folders_in_a_zip_are_skipped(tmp_path):

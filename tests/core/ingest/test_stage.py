@@ -356,7 +356,6 @@ BAD = {
     "focal length 0": (metadata(K=[0.0] * 9), "focal length"),
     "no size": (metadata(w=None), "'w' should be a positive number of pixels, found nothing"),
     "no json": (no_json, "not usable JSON"),
-    "lost tracking": (metadata(poses=[[0.0] * 7] * ROOM.count), "no frame has a usable pose"),
     "rotated images": (rotated, "another shape"),
     "odd depth size": (odd_depth, "have no size of the shape"),
     "kitchen without calibration": (without("intrin*"), "looks like 7-Scenes folder, but intrinsics_color.txt is missing"),
