@@ -7,12 +7,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, rotation_about_z
-from r2c2r_core.ingest.doctor.pairs import Centres, Pairs, Rotations, Views, compare
+from r2c2r_core.ingest.doctor.pairs import Centres, Disagreement, Pairs, Rotations, Views, compare
 from r2c2r_core.tuning import param, tuned
 
 Cause = Literal[
     "poses_inverted",
     "camera_axes",
+    "poses_mirrored",
     "rotation_transposed",
     "quaternion_order",
     "image_rotated",
@@ -89,7 +90,8 @@ def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Pos
     agreement, cause, text, changed = best
     before = float(given.agreement.mean())
     params = tuned(Params)
-    if agreement < before + params.gain or agreement < params.gain_ratio * before:
+    so = compare(changed, pairs)
+    if agreement < before + params.gain or agreement < params.gain_ratio * before or not _is_usable(so):
         return None, views
     finding = Finding(
         cause=cause,
@@ -98,7 +100,7 @@ def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Pos
         agreement_given=before,
         agreement_so=agreement,
         error_given_mm=_millimetres(given.error_m),
-        error_so_mm=_millimetres(compare(changed, pairs).error_m),
+        error_so_mm=_millimetres(so.error_m),
     )
     return finding, changed
 
@@ -120,6 +122,8 @@ def find_scale(views: Views, pairs: Pairs) -> Finding | None:
     if best.factor is not None and abs(np.log(best.factor)) < params.least_log:
         return None
     so = compare(views, pairs, **best.change)
+    if not _is_usable(so):
+        return None
     # A short path hardly separates a scale from a focal length: then both are named
     alike = [t.text for t in tries if t.cause != best.cause and t.cost.mean() < params.alike * best.cost.mean()]
     return Finding(
@@ -131,6 +135,11 @@ def find_scale(views: Views, pairs: Pairs) -> Finding | None:
         error_given_mm=_millimetres(given.error_m),
         error_so_mm=_millimetres(so.error_m),
     )
+
+
+def _is_usable(so: Disagreement) -> bool:
+    """Whether frames agree on most of what both see: a change that leaves them apart is not the cause."""
+    return bool(2 * so.agrees.sum() > so.comparable.sum() > 0)
 
 
 class _Try(NamedTuple):
@@ -151,6 +160,7 @@ def _conventions(shifted: Sequence[tuple[int, Poses]]) -> list[_Change]:
         ]
     for axes in (CAMERA_CV_FROM_GL, np.diag([-1.0, 1.0, -1.0])):  # the second: of images that stood upside down and were turned
         changes.append(_Change("camera_axes", _FLIPPED, _turned(axes)))
+    changes += [_Change("poses_mirrored", _MIRRORED, _mirrored(axis)) for axis in range(3)]
     for quarters in (1, 2, 3):
         text = f"the images are rotated by {90 * quarters} deg relative to their poses"
         changes.append(_Change("image_rotated", text, _turned(rotation_about_z(quarters * np.pi / 2))))
@@ -162,6 +172,7 @@ def _conventions(shifted: Sequence[tuple[int, Poses]]) -> list[_Change]:
 
 _INVERTED = "the poses are inverted (world to camera where camera to world is expected)"
 _FLIPPED = "the camera axes are flipped (OpenGL taken for OpenCV, or the reverse)"
+_MIRRORED = "the poses are mirrored (of a left-handed world, such as a renderer's)"
 _ORDER = "the quaternions are read in the wrong order"
 _ORDERS = ((1, 2, 3, 0), (3, 0, 1, 2))  # w first for w last, and the reverse
 # What ingest multiplied the file's rotations by: the format's own flip of axes, and a turn that set the images upright
@@ -195,6 +206,13 @@ def _inverted(poses: Poses) -> Poses:
 
 def _transposed(poses: Poses) -> Poses:
     return np.ascontiguousarray(np.swapaxes(poses[0], 1, 2)), poses[1]
+
+
+def _mirrored(axis: int) -> Callable[[Poses], Poses]:
+    """Poses reflected along an axis; which axis of the world it is does not matter to frames, that of their camera does."""
+    mirror = np.eye(3)
+    mirror[axis, axis] = -1.0
+    return lambda poses: (mirror @ poses[0] @ mirror, poses[1] @ mirror)
 
 
 def _reordered(order: tuple[int, ...]) -> Callable[[Poses], Poses]:

@@ -11,6 +11,7 @@ from r2c2r_core.ingest.doctor.unit import Unit
 from r2c2r_core.tuning import param, tuned
 
 _FIRST = ("gravity_off",)  # heights, the floor and all upright directions depend on it
+_UNKNOWN = "the cause is unknown: check the poses (order, handedness), the calibration, the unit of the depth"
 _REGISTER = "read it with --register-depth, which registers the depth by this fit"
 
 
@@ -143,11 +144,11 @@ def worst(remarks: tuple[Remark, ...]) -> Verdict:
 def _depth(figures: CaptureFigures, unit: Unit | None) -> list[Remark]:
     params, shares = tuned(Params), figures.confidence_shares
     low = f"{shares[0]:.0%} of the depth has low confidence" if shares and shares[0] > params.unsure else None
+    recorded = figures.recorded_depth_m
+    if figures.depth_coverage < params.depth[1] and recorded is not None and not plausible(recorded):
+        text = f"the median recorded depth is {recorded:.4g} m: not in the unit of the format"
+        return [_remark("unusable", "depth_unit", text, _unit_advice(unit))]
     if figures.depth_coverage < params.depth[0]:
-        recorded = figures.recorded_depth_m
-        if recorded is not None and not plausible(recorded):
-            text = f"the median recorded depth is {recorded:.4g} m: not in the unit of the format"
-            return [_remark("unusable", "depth_unit", text, _unit_advice(unit))]
         if low:
             advice = "film in more light and from 0.5 to 3 m away, or check the confidence files"
             return [
@@ -191,7 +192,12 @@ def _conventions(
     if convention is not None:
         gain = f"{convention.agreement_so:.0%} of neighbours agree if corrected, {convention.agreement_given:.0%} as recorded"
         remarks.append(
-            _remark("unusable", convention.cause, f"{convention.text}: {gain}", "export again, or correct the poses")
+            _remark(
+                "unusable",
+                convention.cause,
+                f"{convention.text}: {gain}",
+                "correct the poses in the files, or where they were written",
+            )
         )
     if registration is not None and registration.wrong:
         remarks.append(_unregistered(registration))
@@ -252,7 +258,7 @@ def _tracking(figures: CaptureFigures, *, explained: bool) -> list[Remark]:
     if error > limit and not explained:
         text = f"neighbouring frames disagree by {error:.0f} mm, expected at most {limit:.0f} mm"
         verdict: Verdict = "unusable" if error > params.wrong * limit else "usable with care"
-        remarks.append(_remark(verdict, "disagreement", text, "poses, calibration or depth are wrong; the cause is unknown"))
+        remarks.append(_remark(verdict, "disagreement", text, _UNKNOWN))
     if figures.drift_mm is not None and figures.drift_mm > params.drift_mm[0] and not explained:
         text = f"the poses drift: revisited surfaces are {figures.drift_mm:.0f} mm apart"
         verdict = "unusable" if figures.drift_mm > params.drift_mm[1] else "usable with care"

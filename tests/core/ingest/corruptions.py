@@ -130,7 +130,6 @@ CORRUPTIONS: tuple[Corruption, ...] = (
     Corruption(name="depth 30 mm beside colour", causes=("unregistered",), depth=shifted_depth),
     Corruption(name="dropped frames", causes=("dropped_frames",), keep=lambda number: number % 10 not in (3, 4, 5)),
     Corruption(name="some NaN poses", causes=("poses_lost",), pose=_nan),
-    Corruption(name="all poses NaN", refusal="pose", pose=lambda _, pose: np.full((4, 4), np.nan)),
     Corruption(name="poses drift", causes=("drift",), pose=_drifting),
     Corruption(name="some truncated LZFSE", causes=("frames_unreadable",), truncate=lambda number: number % 10 == 1),
     Corruption(name="all LZFSE truncated", refusal="LZFSE", truncate=lambda number: True),

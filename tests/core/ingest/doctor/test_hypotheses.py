@@ -33,6 +33,11 @@ def quaternions_reordered(views: Views) -> Views:
     return views.posed(Rotation.from_quat(quat_xyzw[:, [3, 0, 1, 2]]).as_matrix(), views.translation)
 
 
+def mirrored(views: Views) -> Views:
+    mirror = np.diag([-1.0, 1.0, 1.0])
+    return views.posed(mirror @ views.rotation @ mirror, views.translation @ mirror)
+
+
 @pytest.mark.parametrize(
     ("damage", "cause"),
     [
@@ -40,6 +45,7 @@ def quaternions_reordered(views: Views) -> Views:
         (transposed, "rotation_transposed"),
         (flipped, "camera_axes"),
         (quaternions_reordered, "quaternion_order"),
+        (mirrored, "poses_mirrored"),
     ],
 )
 def test_a_wrong_pose_convention_is_identified_and_corrected(damage: Damage, cause: str) -> None:
@@ -59,6 +65,12 @@ def test_poses_shifted_by_frames_are_reported_with_the_shift() -> None:
     assert finding is not None
     assert finding.cause == "frames_shifted"
     assert "3 later" in finding.text
+
+
+def test_a_cause_that_leaves_the_frames_apart_is_not_named() -> None:
+    views = inverted(quaternions_reordered(views_of(16)))  # neither alone explains it
+    assert find_convention(views, neighbours(views), ()) == (None, views)
+    assert find_scale(views, far_pairs(views, 12)) is None
 
 
 def test_a_correctly_interpreted_recording_has_no_finding() -> None:
