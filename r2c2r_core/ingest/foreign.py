@@ -20,16 +20,22 @@ class Foreign(NamedTuple):
 
 
 _OPEN3D = "Open3D saves its frames: `open3d.t.io.RGBDVideoReader.create(FILE).save_frames(FOLDER)`; bring that folder"
+_CAMERA = 'and add camera.json: {"width": 640, "height": 480, "fx": 525, "fy": 525, "cx": 320, "cy": 240}'
 _RAW = "Polycam's Raw data, 3D Scanner App's All data, or record with Record3D or Stray Scanner"
 
 # In the order in which they are named where a folder holds several kinds.
 _KINDS: tuple[tuple[Foreign, tuple[str, ...]], ...] = (
     (
-        Foreign("a ROS or RealSense bag", f"{_OPEN3D} (a .bag of a RealSense), or export color/, depth/ and camera.json"),
+        Foreign(
+            "a ROS or RealSense bag", f"{_OPEN3D} (a .bag of a RealSense), or export color/N.png and depth/N.png, {_CAMERA}"
+        ),
         (".bag",),
     ),
     (
-        Foreign("a ROS 2 bag", "export its images to color/ and depth/ with a camera.json, or record it with RTAB-Map"),
+        Foreign(
+            "a ROS 2 bag",
+            f"export its images to color/ and depth/ by number, 16-bit in mm, {_CAMERA}; or record it with RTAB-Map",
+        ),
         (".db3", ".mcap"),
     ),
     (
@@ -43,14 +49,15 @@ _KINDS: tuple[tuple[Foreign, tuple[str, ...]], ...] = (
     (
         Foreign(
             "ScanNet's packed .sens stream",
-            "unpack it with ScanNet's SensReader (color images, depth images, poses and intrinsics); bring that folder",
+            "unpack it with ScanNet's SensReader/python: `reader.py --filename FILE --output_path FOLDER --export_depth_images "
+            "--export_color_images --export_poses --export_intrinsics`; bring that folder",
         ),
         (".sens",),
     ),
     (
         Foreign(
             "a recording of a ZED camera",
-            "export left images and 16-bit depth to color/ and depth/ with a camera.json, by the ZED SDK's SVO export",
+            f"export left images and 16-bit depth by `ZED_SVO_Export FILE FOLDER 4`, move them to color/ and depth/, {_CAMERA}",
         ),
         (".svo", ".svo2"),
     ),

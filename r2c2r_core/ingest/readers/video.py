@@ -47,7 +47,8 @@ class Video:
             named = codec.decode("latin-1").strip("\0 ") or "unknown"
             raise CaptureError(
                 f"{self._path}: OpenCV's FFmpeg cannot decode the codec '{named}'",
-                hint="install opencv-python-headless from PyPI, or convert the video: ffmpeg -i rgb.mp4 -c:v libx264 -crf 14",
+                hint="install opencv-python-headless from PyPI, or convert the video: "
+                "ffmpeg -noautorotate -i rgb.mp4 -c:v libx264 -crf 14 new.mp4, then name new.mp4 rgb.mp4",
             ) from problem
 
     def frame(self, number: int) -> Image:

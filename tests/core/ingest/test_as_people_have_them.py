@@ -1,7 +1,9 @@
 """Recordings as people have them: partial sources, data sets as published, depth in other files, our own advice followed."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import PurePath
 
 import cv2
 import numpy as np
@@ -10,11 +12,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from r2c2r_core.errors import CaptureError
+from r2c2r_core.ingest.foreign import foreign
+from r2c2r_core.ingest.readers.protocol import UnreadableFrame
 from r2c2r_core.ingest.readers.stored_depth import are_depth16
 from r2c2r_core.ingest.readers.table import open_recording
+from r2c2r_core.ingest.readers.video import Video
 
 from .tiny import TinyRoom, integer_centred, write_r3d, write_tum
-from .tiny_formats import millimetres, told, write_nerfstudio, write_polycam, write_redwood, write_rtabmap
+from .tiny_formats import millimetres, told, write_nerfstudio, write_polycam, write_redwood, write_rtabmap, write_stray
 
 SMALL = replace(TinyRoom(), count=4)
 HALF_STEP_M = 0.0011  # of HALF between 2 and 4 m
@@ -256,6 +261,30 @@ def test_a_camera_json_as_people_write_it_is_read(matrix, tmp_path):
     said["ros"] = {"k": k.ravel().tolist(), "width": SMALL.rgb_size[0], "height": SMALL.rgb_size[1]}
     (folder / "camera.json").write_text(json.dumps(said[matrix]))
     assert open_recording(folder).frames[0].rgb_camera == expected
+
+
+@pytest.mark.parametrize("name", ["a.svo2", "a.mcap", "a.bag"])
+def test_the_camera_json_of_a_hint_is_read(name, tmp_path):
+    folder = write_redwood(tmp_path / "r", replace(SMALL, rgb_size=(320, 240)))
+    said = re.search(r"camera\.json: (\{.*?\})", foreign(PurePath(name)).bring)
+    (folder / "camera.json").write_text(said[1])
+    recording = open_recording(folder)
+    assert "camera.json" in recording.names
+    assert (recording.frames[0].rgb_camera.fx, recording.frames[0].rgb_camera.width) == (262.5, 320)
+
+
+def test_a_refused_film_is_converted_by_the_command_that_its_refusal_names(tmp_path, monkeypatch):
+    folder = write_stray(tmp_path / "s", SMALL)
+    monkeypatch.setattr(Video, "frame", _unreadable)
+    with pytest.raises(CaptureError) as caught:
+        open_recording(folder)
+    words = re.search(r"ffmpeg (.*?), then", caught.value.hint)[1].split()
+    assert words[words.index("-i") + 1] == "rgb.mp4"
+    assert words[-1] == "new.mp4"  # ffmpeg writes nothing without it
+
+
+def _unreadable(*_):
+    raise UnreadableFrame("no frame")
 
 
 def test_the_names_that_zeds_export_writes_are_read_from_color_and_depth(tmp_path):
