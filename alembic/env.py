@@ -7,7 +7,8 @@ from sqlmodel import SQLModel
 
 from alembic import context
 from app.db import tables  # noqa: F401  (defines the metadata)
-from app.settings import DATABASE, default_data_dir
+from app.settings import DATABASE
+from r2c2r_core.disk import data_default, data_folder
 
 
 def run(connection: Connection) -> None:
@@ -22,5 +23,5 @@ if given is not None:
     run(given)
 else:
     named = os.environ.get("R2C2R_DATABASE", "")
-    with create_engine(named or f"sqlite:///{default_data_dir() / DATABASE}").begin() as opened:
+    with create_engine(named or f"sqlite:///{data_folder(data_default()) / DATABASE}").begin() as opened:
         run(opened)

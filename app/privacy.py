@@ -2,6 +2,7 @@
 
 import re
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 from app.settings import Settings
@@ -12,11 +13,12 @@ def without_places(text: str, settings: Settings) -> str:
     places = {
         settings.data_dir,
         *settings.roots,
-        Path.home(),
         Path(tempfile.gettempdir()),
-        Path.cwd(),
         Path(__file__).parents[1],
     }
+    for look_up in (Path.home, Path.cwd):
+        with suppress(RuntimeError, OSError):  # this user has no home; the folder of the start is deleted
+            places.add(look_up())
     for place in sorted({str(folder) for folder in places} - {"/"}, key=len, reverse=True):
         text = re.sub(rf"(?<!\w){re.escape(place)}(?![\w-])", "…", text)
     return text

@@ -160,12 +160,12 @@ class Settings:
     @property
     def roots(self) -> tuple[Path, ...]:
         """Folders from which a recording may be imported by path."""
-        return self.import_roots or (Path.home(), self.data_dir)
-
-
-def default_data_dir() -> Path:
-    """Default data folder, the same as on the command line."""
-    return Path(os.environ.get("R2C2R_DATA", Path.home() / ".local" / "share" / "r2c2r")).expanduser().resolve()
+        try:
+            home = Path.home()
+        except RuntimeError:  # this user has none
+            home = self.data_dir
+        of_service = home in (self.data_dir, Path(home.anchor))  # not the whole disk
+        return self.import_roots or ((self.data_dir,) if of_service else (home, self.data_dir))
 
 
 def shipped(name: str, marker: str) -> Path:

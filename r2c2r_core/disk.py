@@ -38,6 +38,19 @@ def resolved(path: Path) -> Path:
     return found
 
 
+def data_default() -> str:
+    """The data folder where none is given: R2C2R_DATA, else below the home folder, which is looked up only when it is used."""
+    return os.environ.get("R2C2R_DATA") or "~/.local/share/r2c2r"
+
+
+def data_folder(text: str) -> Path:
+    """The data folder of that name; raises EnvironmentProblem where it is below a home folder that this user lacks."""
+    try:
+        return Path(text).expanduser()
+    except RuntimeError as error:
+        raise EnvironmentProblem(f"{text}: this user has no home folder", hint="set HOME or R2C2R_DATA") from error
+
+
 def is_below(path: Path, folder: Path) -> bool:
     """Whether a path with links resolved stays in the folder; False for unresolvable paths."""
     try:

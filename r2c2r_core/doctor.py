@@ -152,7 +152,13 @@ def _disk(data_dir: Path) -> MachineFinding:
 
 def _privacy(data_dir: Path) -> MachineFinding:
     """Finding on access of other users to the data folder."""
-    mode = open_to_others(data_dir) if data_dir.exists() else None
+    existing = next(folder for folder in (data_dir, *data_dir.parents) if folder.exists())
+    if not (existing.is_dir() and os.access(existing, os.W_OK)):
+        detail = f"{data_dir} cannot be written or made in {existing}: set R2C2R_DATA, or give --data"
+        return MachineFinding("data folder", "problem", detail)
+    if existing != data_dir:
+        return MachineFinding("data folder", "ok", f"{data_dir} does not exist yet: the first start makes it")
+    mode = open_to_others(data_dir)
     if mode:
         return MachineFinding("data folder", "problem", f"other users have access ({mode}): chmod go= {data_dir}")
     return MachineFinding("data folder", "ok", f"only its owner has access to {data_dir}")

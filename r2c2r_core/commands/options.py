@@ -4,7 +4,6 @@ import argparse
 import gc
 import importlib
 import json
-import os
 import re
 import stat
 from collections.abc import Callable
@@ -12,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from r2c2r_core.disk import data_default, data_folder
 from r2c2r_core.documents import kind_of_file
 from r2c2r_core.errors import InputError
 from r2c2r_core.workspace import write_atomically
@@ -24,7 +24,6 @@ Parsers = Any  # what ArgumentParser.add_subparsers returns: argparse has no pub
 
 _LARGEST_FACTOR = 10_000.0
 _LEAST_SIDE_PX, _MOST_SIDE_PX = 64, 4096  # of a synthetic recording: a phone's videos are at most 3840 wide
-DATA = Path(os.environ.get("R2C2R_DATA", Path.home() / ".local" / "share" / "r2c2r"))
 
 
 def add_command(parsers: Parsers, name: str, command: Command) -> argparse.ArgumentParser:
@@ -38,12 +37,13 @@ def add_command(parsers: Parsers, name: str, command: Command) -> argparse.Argum
 
 def add_data(parser: argparse.ArgumentParser) -> None:
     """Add --data: the project folder of the web app."""
-    parser.add_argument("--data", type=Path, default=DATA, help="folder of the projects (default: %(default)s)")
+    parser.add_argument("--data", type=data_folder, default=data_default(), help="project folder (default: %(default)s)")
 
 
 def add_data_folder(parser: argparse.ArgumentParser) -> None:
     """Add DATA: the same folder as a positional argument."""
-    parser.add_argument("folder", type=Path, nargs="?", default=DATA, metavar="DATA", help="data folder (default: %(default)s)")
+    folder = "data folder (default: %(default)s)"
+    parser.add_argument("folder", type=data_folder, nargs="?", default=data_default(), metavar="DATA", help=folder)
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

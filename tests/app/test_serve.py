@@ -1,5 +1,6 @@
 import io
 import json
+import pwd
 import socket
 import urllib.error
 import urllib.request
@@ -11,6 +12,7 @@ from typing import Any
 import pytest
 
 from app.db.engine import open_engine
+from app.privacy import without_places
 from app.serve import serve
 from app.services import accounts, audit
 from app.settings import Settings
@@ -182,3 +184,16 @@ def test_a_missing_import_folder_is_reported_in_one_line(tmp_path: Path, capsys:
     assert main(["serve", "--data", str(tmp_path), "--import-from", str(tmp_path / "none")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "none: no such file or folder" in line
+
+
+def test_without_a_home_folder_recordings_are_imported_from_the_data_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert Settings(data_dir=tmp_path).roots == (Path.home(), tmp_path)
+    monkeypatch.setenv("HOME", "/")  # of a service: not the whole disk
+    assert Settings(data_dir=tmp_path).roots == (tmp_path,)
+    monkeypatch.delenv("HOME")
+    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
+    assert Settings(data_dir=tmp_path).roots == (tmp_path,)
+    monkeypatch.setattr(Path, "cwd", lambda: tmp_path.joinpath("deleted").resolve(strict=True))
+    assert without_places(f"{tmp_path}/a", Settings(data_dir=tmp_path)) == "…/a"

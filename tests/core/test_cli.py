@@ -309,3 +309,34 @@ def test_an_interrupt_while_importing_commands_prints_one_line(
     monkeypatch.setattr(cli, "_commands", interrupted)
     assert cli.main(["doctor"]) == 1
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_without_a_home_folder_only_the_commands_that_need_one_say_so(tmp_path: Path) -> None:
+    nobody = (
+        "import os, pwd, sys\n"
+        "def unknown(uid): raise KeyError(f'getpwuid(): uid not found: {uid}')\n"
+        "pwd.getpwuid = unknown\n"
+        "from r2c2r_core.cli import main\n"
+        "print([main(['info', 'nothing']), main(['key']), main(['key', '--data', sys.argv[1]])])\n"
+    )
+    lacking = {name: value for name, value in os.environ.items() if name not in ("HOME", "R2C2R_DATA")}
+    words = [sys.executable, "-c", nobody, str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True, env=lacking, check=True)
+    nothing, homeless, unserved = done.stderr.splitlines()
+    assert "nothing: no such file or folder" in nothing
+    assert "no home folder; set HOME or R2C2R_DATA" in homeless
+    assert "no r2c2r serves this folder" in unserved
+
+
+def test_doctor_does_not_call_a_missing_or_unwritable_data_folder_private(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def told() -> tuple[str, str]:
+        found = next(f for f in examine_machine(tmp_path / "none" / "r2c2r") if f.what == "data folder")
+        return found.state, found.detail
+
+    assert told()[1].endswith("does not exist yet: the first start makes it")
+    monkeypatch.setattr(os, "access", lambda *_: False)  # a read-only file system: root may write all else
+    state, detail = told()
+    assert state == "problem"
+    assert "set R2C2R_DATA" in detail
