@@ -5,6 +5,10 @@
 const SESSION_ENDED = 4401;
 const TOO_MANY_TABS = 4429;
 const CROWDED_MS = 15_000; // until a tab refused as one too many tries again
+const ANSWER_MS = 5_000; // that the server has to answer a request, when no connection opens
+const BLOCKED =
+  "a proxy before the server does not pass WebSockets (Upgrade); until it does, pages are refreshed every few seconds";
+const REFRESHED = ["online", "projects", "project"]; // the events on which pages load again
 
 class Live extends EventTarget {
   /** @type {WebSocket | null} */
@@ -17,6 +21,7 @@ class Live extends EventTarget {
   #epoch = "";
   #seq = 0;
   #wait = 500;
+  #blocked = 0; // connections in a row that did not open although requests were answered
 
   /** Whether the connection is open. */
   get connected() {
@@ -68,12 +73,30 @@ class Live extends EventTarget {
     socket.addEventListener("close", ({ code, reason }) => {
       if (code === SESSION_ENDED)
         return location.assign(`/login?${new URLSearchParams({ next: location.pathname + location.search })}`);
-      this.refusal = code === TOO_MANY_TABS ? reason : "";
-      if (this.refusal) this.#wait = CROWDED_MS;
+      this.refusal = code === TOO_MANY_TABS ? reason : this.#reason();
+      if (code === TOO_MANY_TABS) this.#wait = CROWDED_MS;
+      else this.#ask();
       this.dispatchEvent(new Event("offline"));
       setTimeout(() => this.#open(), this.#wait);
       this.#wait = Math.min(this.#wait * 1.8, 8000);
     });
+  }
+
+  /** Reason why no connection opens; one may fail by chance, as while the server starts. */
+  #reason() {
+    return this.#blocked > 1 ? BLOCKED : "";
+  }
+
+  /** Ask the server whether it answers requests: then a proxy blocks the connection, and pages load again in its place. */
+  async #ask() {
+    const limit = AbortSignal.timeout(ANSWER_MS);
+    const answers = await fetch("/healthz", { signal: limit })
+      .then(async (response) => response.ok && (await response.json()).state === "ok")
+      .catch(() => false); // a proxy's own page is no answer
+    this.#blocked = answers ? this.#blocked + 1 : 0;
+    if (this.connected) return;
+    this.refusal = this.#reason();
+    for (const type of this.refusal ? ["offline", ...REFRESHED] : ["offline"]) this.dispatchEvent(new Event(type));
   }
 
   /** @param {Message} message */
@@ -81,6 +104,7 @@ class Live extends EventTarget {
     if (message.type === "hello") {
       this.#wait = 500;
       this.refusal = "";
+      this.#blocked = 0;
       this.#epoch = String(message.epoch);
       this.tab = String(message.tab);
       if (message.reset || this.#seq === 0) this.#seq = Number(message.seq);
