@@ -18,7 +18,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Z_UP, Found, joined_recording
 from r2c2r_core.ingest.readers.images import first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, read_numbers
+from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, read_numbers, tried
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _TRAJECTORY = "lowres_wide.traj"
@@ -48,8 +48,9 @@ def open_arkitscenes(files: Files) -> Recording:
     size = first_size(files, colour.values())
 
     @cache
-    def camera(number: int) -> Intrinsics:
-        return _camera(files, found.cameras[number], size)
+    def camera(number: int) -> Intrinsics | None:
+        read = tried(_camera, files, found.cameras[number])
+        return None if read is None else read.resized(*size)
 
     return joined_recording(files, found, camera, format="ARKitScenes", up_capture=Z_UP, other_names=[_TRAJECTORY])
 
@@ -70,12 +71,12 @@ def _trajectory(files: Files) -> Trajectory:
     return Trajectory(table[:, 0], [Rigid3(r, t).inverse for r, t in zip(camera_from_world, table[:, 4:], strict=True)])
 
 
-def _camera(files: Files, name: str, size: tuple[int, int]) -> Intrinsics:
+def _camera(files: Files, name: str) -> Intrinsics:
     numbers = read_numbers(files.read(name))
     if numbers is None or numbers.size != 6 or not (np.isfinite(numbers).all() and (numbers[:4] >= 1).all()):
         raise CaptureError(f"{files.source}/{name}: expected 'w h fx fy cx cy'", hint="download the recording again")
     width, height, fx, fy, cx, cy = numbers
-    return integer_centred(fx, fy, cx, cy, (width, height)).resized(*size)
+    return integer_centred(fx, fy, cx, cy, (width, height))
 
 
 READER = Reader(

@@ -31,7 +31,7 @@ def image_size(content: bytes, name: str, formats: tuple[str, ...] = _COLOUR) ->
             with Image.open(io.BytesIO(content), formats=formats) as image:
                 width, height = image.size
     except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as problem:
-        expected = "neither a JPEG nor a PNG image" if formats == _COLOUR else f"not read as {', '.join(formats)}"
+        expected = "neither a JPEG nor a PNG image" if formats == _COLOUR else f"no {', '.join(formats)} of a kind that is read"
         raise UnreadableFrame(f"{name}: {expected} ({len(content)} bytes, begins with {content[:4]!r})") from problem
     if width * height > MAX_PIXELS:
         raise UnreadableFrame(f"{name}: {width}x{height} pixels, at most {MAX_PIXELS // 10**6} megapixels are expected")

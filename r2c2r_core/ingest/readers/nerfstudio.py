@@ -122,7 +122,7 @@ def _camera(setting: dict[str, Any], size: tuple[int, int]) -> Intrinsics | None
 
 def _focal(angle: float | None, side: float) -> float | None:
     """The focal length that sees `side` pixels under that angle."""
-    return side / 2 / np.tan(angle / 2) if angle and 0 < angle < np.pi else None
+    return float(side / 2 / np.tan(angle / 2)) if angle and 0 < angle < np.pi else None
 
 
 def _lens(setting: dict[str, Any]) -> Lens:

@@ -17,7 +17,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Y_UP, Found, joined_recording
 from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, pose_of_matrix, read_json_object
+from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, pose_of_matrix, read_json_object, tried
 
 _IMAGES, _CAMERAS = r"images/(\d+)\.(?i:jpe?g|png)", r"cameras/(\d+)\.json"
 _DEPTH, _CONFIDENCE = r"keyframes/depth/(\d+)\.(?i:png)", r"keyframes/confidence/(\d+)\.(?i:png)"
@@ -41,7 +41,7 @@ def open_polycam(files: Files) -> Recording:
         colour, cameras = (_by_time(names, f"keyframes/{kind}{pattern}") for pattern in (_IMAGES, _CAMERAS))
         size = first_size(files, colour.values()) if colour else (0, 0)
         for time_us in colour.keys() | cameras.keys():
-            document = read_json_object(files, cameras[time_us]) if time_us in cameras else {}
+            document = (tried(read_json_object, files, cameras[time_us]) if time_us in cameras else None) or {}
             shot = _Shot(
                 colour.get(time_us), cameras.get(time_us), _camera(document, size) if colour else None, _pose(document)
             )

@@ -19,7 +19,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Z_UP, Found, joined_recording
 from r2c2r_core.ingest.readers.images import MOST_FRAMES, first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import camera_of, lines_of, pose_of_matrix, pose_of_quaternion, read_numbers
+from r2c2r_core.ingest.readers.texts import camera_of, lines_of, pose_of_matrix, pose_of_quaternion, read_numbers, tried
 
 _NODE = r"\d+(?:\.\d+)?"
 _COLOUR, _DEPTH, _CALIBRATION = (
@@ -50,10 +50,10 @@ def open_rtabmap(files: Files) -> Recording:
     )
     nodes = {**on_device, **on_camera}
     colour, depth, calibrations = (_by_node(files, pattern, nodes) for pattern in (_COLOUR, _DEPTH, _CALIBRATION))
-    read = {number: _calibration(files, path) for number, path in calibrations.items()}
+    read = {number: one for number, path in calibrations.items() if (one := tried(_calibration, files, path)) is not None}
     if not read:
         raise CaptureError(
-            f"{files.source}: no calibration of a node of {(*of_camera, *of_device)[0]}",
+            f"{files.source}: no calibration of a node of {(*of_camera, *of_device)[0]} with its camera_matrix and image size",
             hint="export images and poses together",
         )
     size = first_size(files, colour.values())

@@ -14,7 +14,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Y_UP, Found, joined_recording
 from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import camera_of, finite_numbers, pose_of_matrix, read_json_object
+from r2c2r_core.ingest.readers.texts import camera_of, finite_numbers, pose_of_matrix, read_json_object, tried
 
 _PHOTO, _CAMERA = r"frame_(\d+)\.(?i:jpe?g)", r"frame_(\d+)\.json"
 _DEPTH, _CONFIDENCE = r"depth_(\d+)\.(?i:png)", r"conf_(\d+)\.(?i:png)"
@@ -24,7 +24,7 @@ def open_scanner_app(files: Files) -> Recording:
     """The recording in a raw export of 3D Scanner App; raises CaptureError."""
     photos, cameras, depth, confidence = (numbered(files.names(), p) for p in (_PHOTO, _CAMERA, _DEPTH, _CONFIDENCE))
     size = first_size(files, photos.values())
-    documents = {number: read_json_object(files, name) for number, name in cameras.items()}
+    documents = {number: tried(read_json_object, files, name) or {} for number, name in cameras.items()}
     found = Found(
         colour=photos,
         depth=depth,

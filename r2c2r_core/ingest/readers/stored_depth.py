@@ -62,7 +62,7 @@ def stored_values(content: bytes, name: str) -> np.ndarray:
         values = _array(content, name)
     else:
         values = decoded(content, name, _FORMATS)
-    if values.ndim == 3 and (values == values[..., :1]).all():  # grey, saved as colour
+    if values.ndim == 3 and (values[..., :3] == values[..., :1]).all():  # grey, saved as colour
         values = values[..., 0]
     if values.ndim != 2 or values.dtype.itemsize < 2:
         channels = 1 if values.ndim == 2 else values.shape[2]
@@ -106,7 +106,7 @@ def _metres(stored: np.ndarray, units_per_metre: float) -> np.ndarray:
     if stored.dtype.kind == "f" and few.size and np.median(few) < _NEAREST_M * units_per_metre:
         units_per_metre = 1.0
     metres = values / np.float32(units_per_metre)
-    metres[values == 65535] = 0
+    metres[values >= _SKY if stored.dtype.kind == "f" else values == 65535] = 0
     return metres
 
 
@@ -155,6 +155,7 @@ def _array(content: bytes, name: str) -> np.ndarray:
 def _only_member(content: bytes) -> bytes:
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
+        members = [member for member in members if "depth" in member.filename] or members
         if len(members) != 1 or members[0].file_size > 8 * MAX_PIXELS + 1024:
             raise ValueError(f"{', '.join(m.filename for m in members)[:80]}: one array of depth expected")
         return archive.read(members[0])

@@ -1,6 +1,7 @@
 """Numbers in text files: matrices, poses and cameras as the folder formats write them."""
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3, nearest_rotation
 from r2c2r_core.ingest.files import Files
+
+T = TypeVar("T")
 
 
 def read_numbers(content: bytes) -> np.ndarray | None:
@@ -75,6 +78,14 @@ def integer_centred(fx: float, fy: float, cx: float, cy: float, size: tuple[int,
     return Intrinsics(
         fx=float(fx), fy=float(fy), cx=float(cx) + 0.5, cy=float(cy) + 0.5, width=int(size[0]), height=int(size[1])
     )
+
+
+def tried(read: Callable[[Files, str], T], files: Files, name: str) -> T | None:
+    """What the file of one frame holds; None when it is damaged, which costs that frame and not the recording."""
+    try:
+        return read(files, name)
+    except CaptureError:
+        return None
 
 
 def read_json_object(files: Files, name: str) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import PurePath
 
 import cv2
@@ -19,7 +20,17 @@ from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.readers.video import Video
 
 from .tiny import TinyRoom, integer_centred, write_r3d, write_tum
-from .tiny_formats import millimetres, told, write_nerfstudio, write_polycam, write_redwood, write_rtabmap, write_stray
+from .tiny_formats import (
+    millimetres,
+    told,
+    write_arkitscenes,
+    write_nerfstudio,
+    write_polycam,
+    write_redwood,
+    write_rtabmap,
+    write_scanner_app,
+    write_stray,
+)
 
 SMALL = replace(TinyRoom(), count=4)
 HALF_STEP_M = 0.0011  # of HALF between 2 and 4 m
@@ -104,6 +115,22 @@ def test_frames_without_usable_poses_are_opened_to_be_tracked_although_another_p
     assert [frame.capture_from_camera for frame in recording.frames] == [None] * 4
 
 
+@pytest.mark.parametrize(
+    ("write", "cameras", "left"),
+    [
+        (partial(write_polycam, corrected=False), "keyframes/cameras", 3),
+        (write_arkitscenes, "lowres_wide_intrinsics", 3),
+        (write_rtabmap, "kitchen_calib", 4),
+        (write_scanner_app, "frame_*.json", 3),
+    ],
+)
+def test_a_damaged_camera_file_costs_at_most_its_frame(write, cameras, left, tmp_path):
+    folder = write(tmp_path / "r", SMALL)
+    found = sorted((folder / cameras).iterdir()) if (folder / cameras).is_dir() else sorted(folder.glob(cameras))
+    found[0].write_bytes(b"")
+    assert len(open_recording(folder).frames) == left
+
+
 def test_a_recording_without_any_camera_is_refused_in_one_line(tmp_path):
     folder = write_polycam(tmp_path / "p", SMALL)
     for path in (folder / "keyframes").glob("*cameras/*.json"):
@@ -177,7 +204,7 @@ def _saved(path, metres, kind):
     if kind == "exr":
         OpenEXR.File({"type": OpenEXR.scanlineimage}, {"Z": metres, "A": np.ones_like(metres)}).write(str(path))
     elif kind in ("npy", "npz"):
-        np.save(path, metres) if kind == "npy" else np.savez_compressed(path, depth=metres)
+        np.save(path, metres) if kind == "npy" else np.savez_compressed(path, depth=metres, mask=metres > 0)
     else:
         cv2.imwrite(str(path), millimetres(metres) if kind in ("tif", "pgm") else metres)
 
@@ -196,8 +223,9 @@ def test_depth_in_another_file_is_read_in_its_own_unit(kind, tmp_path):
 
 def test_grey_depth_saved_as_colour_is_read(tmp_path):
     folder = write_redwood(tmp_path / "r", SMALL)
+    opaque = np.zeros(SMALL.rgb_size[::-1], np.uint16)
     for path in (folder / "depth").iterdir():
-        cv2.imwrite(str(path), cv2.merge([cv2.imread(str(path), cv2.IMREAD_UNCHANGED)] * 3))
+        cv2.imwrite(str(path), cv2.merge([*[cv2.imread(str(path), cv2.IMREAD_UNCHANGED)] * 3, np.full_like(opaque, 65535)]))
     recording = open_recording(folder)
     assert np.abs(recording.depth_of(recording.frames[1]).metres - exact(recording, recording.frames[1])).max() < HALF_STEP_M
 
@@ -231,7 +259,7 @@ def test_far_walls_and_unknown_pixels_are_not_taken_for_depth16():
     ("ending", "content", "found"),
     [
         ("png", cv2.imencode(".png", np.arange(36, dtype=np.uint8).reshape(3, 4, 3))[1].tobytes(), "3 x uint8 a pixel"),
-        ("tiff", b"II*\0 no more", "not read as PNG, TIFF, PPM"),
+        ("tiff", b"II*\0 no more", "no PNG, TIFF, PPM of a kind that is read"),
         ("raw", b"\0" * 24, r"depth/00000\.raw is not read"),
         ("jpg", b"\xff\xd8\xff", r"depth/00000\.jpg is not read"),
         ("npz", b"PK\x03\x04", "not a readable depth array"),
