@@ -24,6 +24,12 @@ Cause = Literal[
 ]
 Poses = tuple[Rotations, Centres]
 
+_UNITS = {
+    0.1: "1/10000 m read as 1/1000 m",
+    0.2: "1/5000 m read as 1/1000 m",
+    5.0: "1/1000 m read as 1/5000 m",
+    10.0: "1/1000 m read as 1/10000 m",
+}
 _SCALES = np.geomspace(0.8, 1.25, 23)
 
 
@@ -114,7 +120,7 @@ def find_scale(views: Views, pairs: Pairs) -> Finding | None:
     if len(pairs) < params.least_pairs:
         return None
     given = compare(views, pairs)
-    tries = [*_unit_tries(views, pairs), *_fine_tries(views, pairs)]
+    tries = _tries(views, pairs)
     best = min(tries, key=lambda t: t.cost.mean())
     better = best.cost < given.cost
     if best.cost.mean() > params.cost * given.cost.mean() or better.mean() < params.better:
@@ -225,50 +231,26 @@ def _reordered(order: tuple[int, ...]) -> Callable[[Poses], Poses]:
     return change
 
 
-def _unit_tries(views: Views, pairs: Pairs) -> list[_Try]:
-    units = (
-        (0.1, "1/10000 m read as 1/1000 m"),
-        (0.2, "1/5000 m read as 1/1000 m"),
-        (5.0, "1/1000 m read as 1/5000 m"),
-        (10.0, "1/1000 m read as 1/10000 m"),
-    )
-    return [
-        _Try(
-            "depth_scale",
-            f"the depth has the wrong unit ({text})",
-            f,
-            {"depth_scale": f},
-            compare(views, pairs, depth_scale=f).cost,
-        )
-        for f, text in units
-    ]
-
-
-def _fine_tries(views: Views, pairs: Pairs) -> list[_Try]:
+def _tries(views: Views, pairs: Pairs) -> list[_Try]:
     scale, focal = (_best_factor(views, pairs, name) for name in ("depth_scale", "focal_scale"))
-    along = compare(views, pairs, along_ray=True).cost
-    return [
-        _Try("depth_scale", f"the depth is {_percent_off(scale[0])}", scale[0], {"depth_scale": scale[0]}, scale[1]),
-        _Try("focal_length", f"the focal length is {_percent_off(focal[0])}", focal[0], {"focal_scale": focal[0]}, focal[1]),
-        _Try(
-            "ray_distance", "the depth is measured along the ray, not along the camera's axis", None, {"along_ray": True}, along
-        ),
+    along = "the depth is measured along the ray, not along the camera's axis"
+    changes: list[tuple[Cause, str, float | None, dict]] = [
+        *(("depth_scale", f"the depth has the wrong unit ({text})", f, {"depth_scale": f}) for f, text in _UNITS.items()),
+        ("depth_scale", f"the depth is {_percent_off(scale)}", scale, {"depth_scale": scale}),
+        ("focal_length", f"the focal length is {_percent_off(focal)}", focal, {"focal_scale": focal}),
+        ("ray_distance", along, None, {"along_ray": True}),
     ]
+    return [_Try(*change, compare(views, pairs, **change[-1]).cost) for change in changes]
 
 
-def _best_factor(views: Views, pairs: Pairs, name: str) -> tuple[float, np.ndarray]:
+def _best_factor(views: Views, pairs: Pairs, name: str) -> float:
     """The factor with the least cost: a grid scan, then the vertex of the parabola through the minimum and its neighbours."""
-
-    def cost(factor: float) -> np.ndarray:
-        return compare(views, pairs, **{name: factor}).cost  # type: ignore[arg-type]  # both are numbers
-
-    costs = [float(cost(f).mean()) for f in _SCALES]
+    costs = [float(compare(views, pairs, **{name: f}).cost.mean()) for f in _SCALES]
     k = int(np.clip(np.argmin(costs), 1, len(costs) - 2))
     left, middle, right = costs[k - 1 : k + 2]
     bend = left - 2 * middle + right
     shift = float(np.clip(0.5 * (left - right) / bend, -1.0, 1.0)) if bend > 1e-12 else 0.0
-    factor = float(_SCALES[k] * (_SCALES[k + 1] / _SCALES[k]) ** shift)
-    return factor, cost(factor)
+    return float(_SCALES[k] * (_SCALES[k + 1] / _SCALES[k]) ** shift)
 
 
 def _percent_off(factor: float) -> str:

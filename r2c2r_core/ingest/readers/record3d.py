@@ -73,15 +73,15 @@ def _joined(
     found = Found(
         colour=colour,
         depth=depth,
-        poses=dict(enumerate(metadata.poses)),
+        poses=metadata.poses,
         confidence=confidence,
-        times_s={n: time_s for n in range(len(metadata.poses)) if (time_s := metadata.timestamp(n)) is not None},
+        times_s=metadata.times_s,
     )
     recording = joined_recording(
         files,
         found,
-        lambda n: metadata.camera(n).resized(*size),
-        lambda n: metadata.camera(n).resized(*size).resized(*depth_pixels),
+        lambda n: metadata.cameras[n].resized(*size),
+        lambda n: metadata.cameras[n].resized(*size).resized(*depth_pixels),
         format=format,
         up_capture=metadata.up_capture,
         other_names=[name],
@@ -139,9 +139,7 @@ def _same_shape(found: tuple[int, int], expected: tuple[int, int], found_is: str
 
 READER = Reader(
     name="Record3D .r3d",
-    parts=(
-        Part("metadata beside rgbd/N.jpg and N.depth", _METADATA),
-    ),  # without its frames it is still recognised, to give a clear error
+    parts=(Part("metadata beside rgbd/N.jpg and N.depth", _METADATA),),  # without its frames the error is a clear one
     open=open_record3d,
 )
 EXR_READER = Reader(

@@ -5,7 +5,7 @@ poses are [qx, qy, qz, qw, x, y, z], camera-to-world, OpenGL camera axes; the ne
 the older app's starts at the first camera (poses[0] is the identity) and knows no gravity; pixel centres lie at integers.
 """
 
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,22 +28,11 @@ class Record3DMetadata:
     width: int  # of the RGB images
     height: int
     depth_size: tuple[int, int] | None  # width, height; older apps do not say
-    cameras: tuple[Intrinsics, ...]  # one for each pose
-    poses: tuple[Rigid3 | None, ...]  # capture_from_camera; None where tracking was lost
-    timestamps_s: tuple[float, ...] | None
-    fps: float | None
+    cameras: Mapping[int, Intrinsics]  # of each pose
+    poses: Mapping[int, Rigid3 | None]  # capture_from_camera; None where tracking was lost
+    times_s: Mapping[int, float]  # from the start, where known
     up_capture: Vector3 | None
     other_ups: tuple[Vector3, ...]  # alternative interpretations of initPose
-
-    def camera(self, number: int) -> Intrinsics:
-        """The RGB camera of a frame."""
-        return self.cameras[number]
-
-    def timestamp(self, number: int) -> float | None:
-        """Seconds from the start, where known."""
-        if self.timestamps_s is not None and number < len(self.timestamps_s):
-            return self.timestamps_s[number]
-        return number / self.fps if self.fps else None
 
     def require_poses(self, numbers: Set[int]) -> None:
         """Raise CaptureError when more than the last frames have none."""
@@ -59,23 +48,26 @@ def parse_metadata(content: bytes, source: str) -> Record3DMetadata:
     """Read the JSON; `source` names it in messages. Raises CaptureError."""
     metadata = parse_json_object(content, source)
     width, height = _positive(metadata, "w", source), _positive(metadata, "h", source)
-    raw_poses = _table(metadata, "poses", 7, source)
-    if raw_poses is None or not len(raw_poses):
+    rows = metadata.get("poses")
+    if not isinstance(rows, list) or not rows:
         raise CaptureError(f"{source}: no poses", hint="record with the LiDAR camera and tracking switched on")
+    if not any(isinstance(row, list) and len(row) == 7 for row in rows):
+        hint = "share the recording from the app again: a pose is qx, qy, qz, qw, x, y, z"
+        raise CaptureError(f"{source}: key 'poses' should hold rows of 7 numbers", hint=hint)
+    poses = [finite_numbers(row, (7,)) for row in rows]
     has_depth_size = bool(metadata.get("dw")) and bool(metadata.get("dh"))
-    times = metadata.get("frameTimestamps")
-    ups = _ups(metadata, raw_poses)
+    fps, times = finite_numbers(metadata.get("fps"), (1,)), metadata.get("frameTimestamps")
+    timed = finite_numbers(times, (len(times),)) if isinstance(times, list) else None
+    by_rate = {n: float(n / fps[0]) for n in range(len(rows))} if fps is not None and fps[0] > 0 else {}
+    ups = _ups(finite_numbers(metadata.get("initPose"), (7,)), poses[0])
     return Record3DMetadata(
         source=source,
         width=width,
         height=height,
         depth_size=(_positive(metadata, "dw", source), _positive(metadata, "dh", source)) if has_depth_size else None,
-        cameras=_cameras(metadata, width, height, len(raw_poses), source),
-        poses=tuple(_pose(row) for row in raw_poses),
-        timestamps_s=tuple(float(t) for t in times)
-        if isinstance(times, list) and _all_numbers(times) and np.isfinite(times).all()
-        else None,
-        fps=float(metadata["fps"]) if isinstance(metadata.get("fps"), int | float) and metadata["fps"] > 0 else None,
+        cameras=dict(enumerate(_cameras(metadata, width, height, len(rows), source))),
+        poses={n: None if row is None else _pose(row) for n, row in enumerate(poses)},
+        times_s=by_rate if timed is None else {**by_rate, **dict(enumerate(timed.tolist()))},
         up_capture=ups[0] if ups else None,
         other_ups=ups[1:],
     )
@@ -101,7 +93,7 @@ def _pose(row: np.ndarray) -> Rigid3 | None:
     return pose_of_quaternion(np.concatenate([row[4:], row[:4]]), CAMERA_CV_FROM_GL)
 
 
-def _ups(metadata: dict[str, Any], poses: np.ndarray) -> tuple[Vector3, ...]:
+def _ups(first: np.ndarray | None, pose: np.ndarray | None) -> tuple[Vector3, ...]:
     """+y of ARKit's world in the recording's, for each known interpretation of initPose; empty for the older app.
 
     If initPose is not the identity, it maps the recording's world to ARKit's, or is already included in the poses, or is the
@@ -110,26 +102,12 @@ def _ups(metadata: dict[str, Any], poses: np.ndarray) -> tuple[Vector3, ...]:
     from scipy.spatial.transform import Rotation
 
     up = np.array([0.0, 1.0, 0.0])
-    first = metadata.get("initPose")
-    if isinstance(first, list) and len(first) == 7 and _all_numbers(first) and 0.5 < np.linalg.norm(first[:4]) < 2.0:
-        turn = Rotation.from_quat(np.array(first[:4], dtype=np.float64))
+    if first is not None and 0.5 < np.linalg.norm(first[:4]) < 2.0:
+        turn = Rotation.from_quat(first[:4])
         if turn.magnitude() > 1e-4:
             return np.asarray(turn.inv().apply(up)), up, np.asarray(turn.apply(up))
-    starts_at_camera = abs(abs(poses[0, 3]) - 1.0) < 1e-5 and np.linalg.norm(poses[0, 4:]) < 1e-6
+    starts_at_camera = pose is not None and abs(abs(pose[3]) - 1.0) < 1e-5 and np.linalg.norm(pose[4:]) < 1e-6
     return () if starts_at_camera else (up,)
-
-
-def _table(metadata: dict[str, Any], key: str, columns: int, source: str) -> np.ndarray | None:
-    value = metadata.get(key)
-    if value is None:
-        return None
-    try:
-        table = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        table = np.zeros((0, 0))
-    if not (isinstance(value, list) and (not value or (table.ndim == 2 and table.shape[1] == columns))):
-        raise CaptureError(f"{source}: key '{key}' should hold rows of {columns} numbers", hint="export the recording again")
-    return table.reshape(-1, columns)
 
 
 def _positive(metadata: dict[str, Any], key: str, source: str) -> int:
@@ -140,10 +118,6 @@ def _positive(metadata: dict[str, Any], key: str, source: str) -> int:
             hint="is this a Record3D export?",
         )
     return int(value)
-
-
-def _all_numbers(values: list[Any]) -> bool:
-    return all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
 
 
 def _brief(value: object) -> str:

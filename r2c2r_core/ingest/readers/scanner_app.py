@@ -51,10 +51,6 @@ def _pose(document: Mapping[str, Any]) -> Rigid3 | None:
 
 READER = Reader(
     name="3D Scanner App",
-    parts=(
-        Part("frame_N.jpg", _PHOTO),
-        Part("frame_N.json", _CAMERA),
-        Part("depth_N.png", _DEPTH),
-    ),
+    parts=(Part("frame_N.jpg", _PHOTO), Part("frame_N.json", _CAMERA), Part("depth_N.png", _DEPTH)),
     open=open_scanner_app,
 )

@@ -45,10 +45,6 @@ def _up(files: Files) -> Vector3 | None:
 
 READER = Reader(
     name="7-Scenes folder",
-    parts=(
-        Part("color/N.jpg", _COLOUR),
-        Part("depth/N.png", _DEPTH),
-        Part(_INTRINSICS, _INTRINSICS),
-    ),
+    parts=(Part("color/N.jpg", _COLOUR), Part("depth/N.png", _DEPTH), Part(_INTRINSICS, _INTRINSICS)),
     open=open_seven_scenes,
 )

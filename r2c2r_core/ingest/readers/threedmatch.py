@@ -61,9 +61,6 @@ def _cameras(
 
 READER = Reader(
     name="3DMatch / 7-Scenes sequence",
-    parts=(
-        Part("frame-N.color.png", _FOLDER + _COLOUR),
-        Part("frame-N.depth.png", _FOLDER + _DEPTH),
-    ),
+    parts=(Part("frame-N.color.png", _FOLDER + _COLOUR), Part("frame-N.depth.png", _FOLDER + _DEPTH)),
     open=open_threedmatch,
 )
