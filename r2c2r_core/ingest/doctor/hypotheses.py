@@ -86,22 +86,16 @@ def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Pos
     if not len(pairs):
         return None, views
     given = compare(views, pairs)
-    best: tuple[float, Cause, str, Views] | None = None
-    for cause, text, change in _conventions(shifted):
-        changed = views.posed(*change((views.rotation, views.translation)))
-        agreement = float(compare(changed, pairs).agreement.mean())
-        if best is None or agreement > best[0]:
-            best = (agreement, cause, text, changed)
-    assert best is not None
-    agreement, cause, text, changed = best
-    before = float(given.agreement.mean())
-    params = tuned(Params)
+    posed = [(change, views.posed(*change.poses((views.rotation, views.translation)))) for change in _conventions(shifted)]
+    change, changed = max(posed, key=lambda one: compare(one[1], pairs).agreement.mean())
     so = compare(changed, pairs)
+    agreement, before = float(so.agreement.mean()), float(given.agreement.mean())
+    params = tuned(Params)
     if agreement < before + params.gain or agreement < params.gain_ratio * before or not _is_usable(so):
         return None, views
     finding = Finding(
-        cause=cause,
-        text=text,
+        cause=change.cause,
+        text=change.text,
         factor=None,
         agreement_given=before,
         agreement_so=agreement,

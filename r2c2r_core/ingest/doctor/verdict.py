@@ -142,28 +142,22 @@ def worst(remarks: tuple[Remark, ...]) -> Verdict:
 
 
 def _depth(figures: CaptureFigures, unit: Unit | None) -> list[Remark]:
-    params, shares = tuned(Params), figures.confidence_shares
-    low = f"{shares[0]:.0%} of the depth has low confidence" if shares and shares[0] > params.unsure else None
+    params, shares, coverage = tuned(Params), figures.confidence_shares, figures.depth_coverage
+    if coverage >= params.depth[1]:
+        return []
     recorded = figures.recorded_depth_m
-    if figures.depth_coverage < params.depth[1] and recorded is not None and not plausible(recorded):
+    if recorded is not None and not plausible(recorded):
         text = f"the median recorded depth is {recorded:.4g} m: not in the unit of the format"
         return [_remark("unusable", "depth_unit", text, _unit_advice(unit))]
-    if figures.depth_coverage < params.depth[0]:
-        if low:
-            advice = "film in more light and from 0.5 to 3 m away, or check the confidence files"
-            return [
-                _remark(
-                    "unusable", "confidence", f"{low}, {figures.depth_coverage:.0%} of the median frame can be used", advice
-                )
-            ]
-        text = f"usable depth covers {figures.depth_coverage:.0%} of the median frame"
-        return [_remark("unusable", "depth_coverage", text, "check the unit of the depth; stay 0.5 to 3 m away")]
-    if figures.depth_coverage < params.depth[1]:
-        text = f"usable depth covers only {figures.depth_coverage:.0%} of the median frame" + (f": {low}" if low else "")
-        return [
-            _remark("usable with care", "confidence" if low else "depth_coverage", text, "stay 0.5 to 3 m away, in good light")
-        ]
-    return []
+    unsure = shares is not None and shares[0] > params.unsure
+    text = f"usable depth covers only {coverage:.0%} of the median frame"
+    advice = "stay 0.5 to 3 m away, in good light"
+    if shares and unsure:
+        text = f"{text}: {shares[0]:.0%} of the depth has low confidence"
+    if coverage < params.depth[0]:
+        advice = f"{advice}, or check the {'confidence files' if unsure else 'unit of the depth'}"
+    verdict: Verdict = "unusable" if coverage < params.depth[0] else "usable with care"
+    return [_remark(verdict, "confidence" if unsure else "depth_coverage", text, advice)]
 
 
 def _gravity(figures: CaptureFigures) -> list[Remark]:

@@ -41,9 +41,9 @@ def open_record3d(files: Files) -> Recording:
             f"{files.source}: {len(colour)} colour images but no depth, rgbd/N.depth were expected",
             hint="record with the LiDAR camera, not the video mode",
         )
-    recording = _joined(
-        files, metadata, _METADATA, colour, depth, confidence, _depth_size(files, metadata, depth), "Record3D .r3d"
-    )
+    size = _depth_size(files, metadata, depth)
+    found = Found(colour=colour, depth=depth, confidence=confidence, poses=metadata.poses, times_s=metadata.times_s)
+    recording = _joined(files, metadata, _METADATA, found, size, "Record3D .r3d")
     return replace(recording, depth_of=partial(_depth_of, files))
 
 
@@ -52,31 +52,18 @@ def open_record3d_exr(files: Files) -> Recording:
     metadata = parse_metadata(files.read(_EXR_METADATA), f"{files.source}, file '{_EXR_METADATA}'")
     colour, depth = (numbered(files.names(), pattern) for pattern in (_EXR_COLOUR, _EXR_DEPTH))
     size = metadata.depth_size or depth_size(files, depth.values())
-    return _joined(files, metadata, _EXR_METADATA, colour, depth, {}, size, "Record3D EXR+JPG")
+    found = Found(colour=colour, depth=depth, poses=metadata.poses, times_s=metadata.times_s)
+    return _joined(files, metadata, _EXR_METADATA, found, size, "Record3D EXR+JPG")
 
 
 def _joined(
-    files: Files,
-    metadata: Record3DMetadata,
-    name: str,
-    colour: dict[int, str],
-    depth: dict[int, str],
-    confidence: dict[int, str],
-    depth_pixels: tuple[int, int],
-    format: str,
+    files: Files, metadata: Record3DMetadata, name: str, found: Found, depth_pixels: tuple[int, int], format: str
 ) -> Recording:
     """The recording of those images; cameras are scaled to the sizes that these really have."""
-    metadata.require_poses(colour.keys() & depth.keys())
-    size = first_size(files, colour.values())
+    metadata.require_poses(found.colour.keys() & found.depth.keys())
+    size = first_size(files, found.colour.values())
     _same_shape(size, (metadata.width, metadata.height), f"{files.source}: colour images are", "the metadata says")
     _same_shape(depth_pixels, size, f"{files.source}: depth images are", "colour images are")
-    found = Found(
-        colour=colour,
-        depth=depth,
-        poses=metadata.poses,
-        confidence=confidence,
-        times_s=metadata.times_s,
-    )
     recording = joined_recording(
         files,
         found,
