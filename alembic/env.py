@@ -8,7 +8,7 @@ from sqlmodel import SQLModel
 from alembic import context
 from app.db import tables  # noqa: F401  (defines the metadata)
 from app.settings import DATABASE
-from r2c2r_core.disk import data_default, data_folder
+from r2c2r_core.disk import DATA_FOLDER, data_folder
 
 
 def run(connection: Connection) -> None:
@@ -23,5 +23,5 @@ if given is not None:
     run(given)
 else:
     named = os.environ.get("R2C2R_DATABASE", "")
-    with create_engine(named or f"sqlite:///{data_folder(data_default()) / DATABASE}").begin() as opened:
+    with create_engine(named or f"sqlite:///{data_folder(DATA_FOLDER) / DATABASE}").begin() as opened:
         run(opened)

@@ -9,6 +9,9 @@ from pathlib import Path
 from r2c2r_core.errors import EnvironmentProblem, InputError
 
 _SHOWN = 200  # maximum characters of an invalid path in a message
+DATA_FOLDER = os.environ.get("R2C2R_DATA") or "~/.local/share/r2c2r"
+"""The data folder where none is given; the home folder is looked up only where it is used."""
+
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -36,11 +39,6 @@ def resolved(path: Path) -> Path:
         if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
             raise InputError(f"{str(path)[:_SHOWN]!r}: {error.strerror}", hint="check the path") from error
     return found
-
-
-def data_default() -> str:
-    """The data folder where none is given: R2C2R_DATA, else below the home folder, which is looked up only when it is used."""
-    return os.environ.get("R2C2R_DATA") or "~/.local/share/r2c2r"
 
 
 def data_folder(text: str) -> Path:

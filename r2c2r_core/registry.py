@@ -4,7 +4,6 @@ import importlib
 import importlib.util
 import os
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, cast
@@ -161,10 +160,7 @@ def find_weights(named: str, holds: tuple[str, ...] = MODEL_FILES) -> Path | Non
 def hub_cache() -> Path:
     """Download cache of Hugging Face's tools (HF_HUB_CACHE, HF_HOME, else the user's cache folder)."""
     home = os.environ.get("HF_HOME") or Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "huggingface"
-    cache = Path(os.environ.get("HF_HUB_CACHE") or Path(home) / "hub")
-    with suppress(RuntimeError):  # a user without a home folder has no cache
-        return cache.expanduser()
-    return cache
+    return Path(os.path.expanduser(os.environ.get("HF_HUB_CACHE") or Path(home) / "hub"))  # a user may have no home folder
 
 
 def _is_written(method: object) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from r2c2r_core.disk import data_default, data_folder
+from r2c2r_core.disk import DATA_FOLDER, data_folder
 from r2c2r_core.documents import kind_of_file
 from r2c2r_core.errors import InputError
 from r2c2r_core.workspace import write_atomically
@@ -37,13 +37,13 @@ def add_command(parsers: Parsers, name: str, command: Command) -> argparse.Argum
 
 def add_data(parser: argparse.ArgumentParser) -> None:
     """Add --data: the project folder of the web app."""
-    parser.add_argument("--data", type=data_folder, default=data_default(), help="project folder (default: %(default)s)")
+    parser.add_argument("--data", type=data_folder, default=DATA_FOLDER, help="project folder (default: %(default)s)")
 
 
 def add_data_folder(parser: argparse.ArgumentParser) -> None:
     """Add DATA: the same folder as a positional argument."""
     folder = "data folder (default: %(default)s)"
-    parser.add_argument("folder", type=data_folder, nargs="?", default=data_default(), metavar="DATA", help=folder)
+    parser.add_argument("folder", type=data_folder, nargs="?", default=DATA_FOLDER, metavar="DATA", help=folder)
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

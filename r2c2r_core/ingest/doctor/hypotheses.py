@@ -160,7 +160,7 @@ def _conventions(shifted: Sequence[tuple[int, Poses]]) -> list[_Change]:
         ]
     for axes in (CAMERA_CV_FROM_GL, np.diag([-1.0, 1.0, -1.0])):  # the second: of images that stood upside down and were turned
         changes.append(_Change("camera_axes", _FLIPPED, _turned(axes)))
-    changes += [_Change("poses_mirrored", _MIRRORED, _mirrored(axis)) for axis in range(3)]
+    changes += [_Change("poses_mirrored", _MIRRORED, _mirrored(np.diag(1.0 - 2.0 * axis))) for axis in np.eye(3)]
     for quarters in (1, 2, 3):
         text = f"the images are rotated by {90 * quarters} deg relative to their poses"
         changes.append(_Change("image_rotated", text, _turned(rotation_about_z(quarters * np.pi / 2))))
@@ -208,10 +208,8 @@ def _transposed(poses: Poses) -> Poses:
     return np.ascontiguousarray(np.swapaxes(poses[0], 1, 2)), poses[1]
 
 
-def _mirrored(axis: int) -> Callable[[Poses], Poses]:
+def _mirrored(mirror: np.ndarray) -> Callable[[Poses], Poses]:
     """Poses reflected along an axis; which axis of the world it is does not matter to frames, that of their camera does."""
-    mirror = np.eye(3)
-    mirror[axis, axis] = -1.0
     return lambda poses: (mirror @ poses[0] @ mirror, poses[1] @ mirror)
 
 
