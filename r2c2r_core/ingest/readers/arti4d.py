@@ -6,7 +6,6 @@ registered to colour. Some scenes were filmed with the camera upside down and th
 flag for this; here it is detected from poses in which the images' up points down. Pixel centres lie at integers.
 """
 
-import csv
 import re
 from typing import Any
 
@@ -20,7 +19,7 @@ from r2c2r_core.ingest.readers.frames import Found, joined_recording
 from r2c2r_core.ingest.readers.images import first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.stored_depth import depth_size
-from r2c2r_core.ingest.readers.texts import camera_of, pose_of_quaternion, read_json_object, read_numbers
+from r2c2r_core.ingest.readers.texts import camera_of, pose_of_quaternion, read_json_object, read_numbers, read_table
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _COLOUR, _DEPTH = r"rgb/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.(?i:jpe?g)", r"depth/(?:[^/]*_)?(\d{11,}|\d+\.\d+)\.(?i:png)"
@@ -88,13 +87,11 @@ def _calibration_name(files: Files) -> str:
 
 def _trajectory(files: Files, name: str) -> Trajectory:
     """The tracked base's poses by time."""
-    lines = files.read(name).decode("utf-8", errors="replace").splitlines()  # of any line endings, damaged ones too
     timed = []
-    for row in csv.DictReader(lines, skipinitialspace=True):
-        values = read_numbers(" ".join(str(row.get(column)) for column in _COLUMNS).encode())
-        pose = None if values is None or values.size != len(_COLUMNS) else pose_of_quaternion(values[1:])
-        if values is not None and pose is not None and np.isfinite(values[0]):
-            timed.append((float(values[0]), pose))
+    for row in read_table(files, name, _COLUMNS):
+        time_s, *numbers = (row[column] for column in _COLUMNS)
+        if np.isfinite(time_s) and (pose := pose_of_quaternion(np.array(numbers))) is not None:
+            timed.append((time_s, pose))
     if not timed:
         raise CaptureError(f"{files.source}/{name}: no line of {','.join(_COLUMNS)}", hint="check the odometry file")
     timed.sort(key=lambda each: each[0])

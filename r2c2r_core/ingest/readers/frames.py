@@ -14,7 +14,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.images import colour_file
 from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.stored_depth import are_depth16, depth_file, depth_size, stored_values
-from r2c2r_core.ingest.readers.texts import read_pose
+from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_numbers
 
 Cameras = Intrinsics | Callable[[int], Intrinsics | None]
 """One camera, or each frame's."""
@@ -116,7 +116,8 @@ def _joined_frames(
 
 def read_poses(files: Files, names: Mapping[int, str]) -> dict[int, Rigid3 | None]:
     """The pose in each of those text files (4x4, camera-to-world, OpenCV axes)."""
-    return {number: read_pose(files.read(name)) for number, name in names.items()}
+    read = {number: read_numbers(files.read(name)) for number, name in names.items()}  # -inf or NaN where tracking was lost
+    return {k: None if n is None or n.size != 16 else pose_of_matrix(n.reshape(4, 4)) for k, n in read.items()}
 
 
 def _of(cameras: Cameras, number: int) -> Intrinsics | None:

@@ -21,7 +21,14 @@ from r2c2r_core.ingest.readers.frames import Found, joined_recording
 from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.stored_depth import ENDING
-from r2c2r_core.ingest.readers.texts import finite_numbers, integer_centred, pose_of_matrix, read_json_object, read_numbers
+from r2c2r_core.ingest.readers.texts import (
+    camera_of,
+    finite_numbers,
+    integer_centred,
+    pose_of_matrix,
+    read_json_object,
+    read_numbers,
+)
 
 _NUMBER = r"[^/\d]*(\d{1,8})(?:-\d+)?"  # ZED's tools write left000007.png beside depth000007.png
 _COLOUR, _DEPTH = rf"(?:color|image|rgb)/{_NUMBER}\.(?i:jpe?g|png)", rf"depth/{_NUMBER}\.{ENDING}"
@@ -83,22 +90,21 @@ def _calibration(files: Files, size: tuple[int, int]) -> _Calibration:
     """Calibration from the first JSON that holds one, else a PrimeSense's; of the images' size where it names none."""
     for name in sorted(n for n in files.names() if "/" not in n and n.endswith(".json")):
         document = read_json_object(files, name)
-        numbers, sizes = _coefficients(document), finite_numbers([document.get(key) for key in ("width", "height")], (2,))
-        if numbers is not None and min(numbers[:2]) > 0 and (sizes is None or min(sizes) >= 1):
-            fx, fy, cx, cy = numbers
-            camera = integer_centred(fx, fy, cx, cy, size if sizes is None else (int(sizes[0]), int(sizes[1])))
+        said = finite_numbers([document.get(key) for key in ("width", "height")], (2,))
+        if (camera := camera_of(_matrix(document), size if said is None else (int(said[0]), int(said[1])))) is not None:
             return _Calibration(camera.resized(*size), _units_per_metre(document), name)
     assumed = integer_centred(525.0, 525.0, 319.5, 239.5, (640, 480)).resized(*size)
     return _Calibration(assumed, _MILLIMETRES, None)
 
 
-def _coefficients(document: Mapping[str, Any]) -> np.ndarray | None:
-    """fx, fy, cx, cy of a matrix, in Open3D's column-major form or by rows as ROS writes it, or of four numbers by name."""
+def _matrix(document: Mapping[str, Any]) -> np.ndarray | None:
+    """The matrix in Open3D's column-major form or by rows as ROS writes it, or of fx, fy, cx, cy by name."""
     for key in ("intrinsic_matrix", "K", "k", "camera_matrix"):
         listed, rows = (finite_numbers(document.get(key), shape) for shape in ((9,), (3, 3)))
         if (matrix := rows if listed is None else listed.reshape(3, 3)) is not None:
-            return np.asarray((matrix if matrix[0, 2] else matrix.T)[[0, 1, 0, 1], [0, 1, 2, 2]])
-    return finite_numbers([document.get(key) for key in ("fx", "fy", "cx", "cy")], (4,))
+            return matrix if matrix[0, 2] else matrix.T
+    four = finite_numbers([document.get(key) for key in ("fx", "fy", "cx", "cy")], (4,))
+    return None if four is None else np.array([four[0], 0, four[2], 0, four[1], four[3], 0, 0, 1])
 
 
 def _units_per_metre(document: Mapping[str, Any]) -> float:

@@ -108,7 +108,7 @@ def _calibration(files: Files, name: str) -> _Calibration:
     text = files.read(name).decode("utf-8", errors="replace")
     width, height = (_whole(text, key) for key in ("image_width", "image_height"))
     camera = camera_of(_data(text, "camera_matrix", 9), (width, height))
-    if camera is None or min(width, height) <= 0:
+    if camera is None:
         raise CaptureError(
             f"{files.source}/{name}: expected camera_matrix with 9 numbers, image_width and image_height",
             hint="export it again",

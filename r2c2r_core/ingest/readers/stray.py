@@ -6,20 +6,18 @@ which are preferred to camera_matrix.csv (the last frame's). Columns go by name,
 integers. (StrayRobots/scanner, docs/format.md and OdometryEncoder.swift.)
 """
 
-import csv
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Y_UP, Found, joined_recording
 from r2c2r_core.ingest.readers.images import MOST_FRAMES, first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Colour, Part, RawFrame, Reader, Recording
 from r2c2r_core.ingest.readers.stored_depth import ENDING
-from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_quaternion, read_calibration
+from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_quaternion, read_calibration, read_table
 from r2c2r_core.ingest.readers.video import Video
 
 _VIDEO, _MATRIX, _ODOMETRY = "rgb.mp4", "camera_matrix.csv", "odometry.csv"
@@ -30,7 +28,8 @@ _CAMERA = ("fx", "fy", "cx", "cy")
 
 def open_stray(files: Files) -> Recording:
     """The recording in a Stray Scanner folder; raises CaptureError."""
-    odometry = _odometry(files)
+    rows = read_table(files, _ODOMETRY, ("timestamp", "frame", *_POSE))
+    odometry = {int(row["frame"]): row for row in rows if 0 <= row["frame"] < MOST_FRAMES}
     depth = numbered(files.names(), _DEPTH)
     video = Video(files, _VIDEO) if _VIDEO in files.names() else None
     colour = dict.fromkeys(odometry, _VIDEO) if video else numbered(files.names(), _COLOUR)
@@ -54,38 +53,11 @@ def _video_frame(video: Video, frame: RawFrame) -> Colour:
     return video.frame(frame.index)
 
 
-def _odometry(files: Files) -> dict[int, dict[str, float]]:
-    """The rows of odometry.csv by frame number; a value that is no number is NaN."""
-    try:
-        header, *lines = csv.reader(lines_of(files, _ODOMETRY) or [""], skipinitialspace=True)
-    except csv.Error as problem:
-        raise CaptureError(
-            f"{files.source}/{_ODOMETRY}: {problem}", hint="copy the recording from the phone again"
-        ) from problem
-    columns = [name.strip() for name in header]
-    lacking = [c for c in ("timestamp", "frame", *_POSE) if c not in columns]
-    if lacking:
-        raise CaptureError(
-            f"{files.source}/{_ODOMETRY}: no column {', '.join(lacking)} among {', '.join(columns)[:80] or 'none'}",
-            hint="the first line names the columns; copy the recording from the phone again",
-        )
-    absent = dict.fromkeys(columns, np.nan)
-    rows = ({**absent, **{c: _number(value) for c, value in zip(columns, line, strict=False)}} for line in lines)
-    return {int(row["frame"]): row for row in rows if 0 <= row["frame"] < MOST_FRAMES}
-
-
 def _camera(row: dict[str, float], common: Intrinsics) -> Intrinsics:
     fx, fy, cx, cy = (row.get(c, np.nan) for c in _CAMERA)
     if not (np.isfinite([fx, fy, cx, cy]).all() and min(fx, fy) > 0):
         return common
     return integer_centred(fx, fy, cx, cy, (common.width, common.height))
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return np.nan
 
 
 READER = Reader(

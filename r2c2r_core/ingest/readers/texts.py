@@ -1,5 +1,6 @@
 """Numbers in text files: matrices, poses and cameras as the folder formats write them."""
 
+import csv
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -32,12 +33,6 @@ def finite_numbers(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
     return numbers if numbers.shape == shape and np.isfinite(numbers).all() else None
 
 
-def read_pose(content: bytes) -> Rigid3 | None:
-    """A 4x4 camera-to-world matrix; None where tracking was lost (written as -inf or NaN) or the matrix is no pose."""
-    numbers = read_numbers(content)
-    return None if numbers is None or numbers.size != 16 else pose_of_matrix(numbers.reshape(4, 4))
-
-
 def pose_of_matrix(matrix: np.ndarray, camera_axes: Matrix3 | None = None) -> Rigid3 | None:
     """The pose in a (3 or 4, 4) matrix, for cameras whose axes `camera_axes` turns into ours; None when it is no pose."""
     rotation = matrix[:3, :3]
@@ -58,16 +53,16 @@ def pose_of_quaternion(numbers: np.ndarray, camera_axes: Matrix3 | None = None) 
 
 def read_calibration(files: Files, name: str, size: tuple[int, int]) -> Intrinsics:
     """The camera of a 3x3 or 4x4 calibration matrix with pixel centres at integers; raises CaptureError."""
-    matrix = read_numbers(files.read(name))
-    side = {9: 3, 16: 4}.get(0 if matrix is None else matrix.size)
-    if matrix is None or side is None or not (np.isfinite(matrix).all() and min(matrix[0], matrix[side + 1]) > 0):
+    numbers = read_numbers(files.read(name))
+    camera = camera_of(numbers if numbers is None or numbers.size != 16 else numbers.reshape(4, 4)[:3, :3], size)
+    if camera is None:
         raise CaptureError(f"{files.source}/{name}: expected a 3x3 calibration matrix", hint="write fx 0 cx / 0 fy cy / 0 0 1")
-    return integer_centred(matrix[0], matrix[side + 1], matrix[2], matrix[side + 2], size)
+    return camera
 
 
 def camera_of(matrix: np.ndarray | None, size: tuple[int, int]) -> Intrinsics | None:
     """The camera of nine numbers, row by row, with pixel centres at integers; None when they are no calibration."""
-    if matrix is None or matrix.size != 9 or not np.isfinite(matrix).all():
+    if matrix is None or matrix.size != 9 or not np.isfinite(matrix).all() or min(size) < 1:
         return None
     fx, _, cx, _, fy, cy = matrix.ravel()[:6]
     return integer_centred(fx, fy, cx, cy, size) if min(fx, fy) > 0 else None
@@ -81,7 +76,7 @@ def integer_centred(fx: float, fy: float, cx: float, cy: float, size: tuple[int,
 
 
 def tried(read: Callable[[Files, str], T], files: Files, name: str) -> T | None:
-    """What the file of one frame holds; None when it is damaged, which costs that frame and not the recording."""
+    """Content of one frame's file; None when it is damaged, which costs that frame and not the recording."""
     try:
         return read(files, name)
     except CaptureError:
@@ -106,3 +101,26 @@ def lines_of(files: Files, name: str) -> list[str]:
     """The lines of a text that are neither empty nor comments."""
     text = files.read(name).decode("utf-8", errors="replace")
     return [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+
+
+def read_table(files: Files, name: str, needed: tuple[str, ...]) -> list[dict[str, float]]:
+    """The rows of a CSV by the names in its first line; a value that is no number is NaN. Raises CaptureError."""
+    try:
+        header, *lines = csv.reader(lines_of(files, name) or [""], skipinitialspace=True)
+    except csv.Error as problem:
+        raise CaptureError(f"{files.source}/{name}: {problem}", hint="copy the recording again") from problem
+    columns = [column.strip() for column in header]
+    if lacking := [column for column in needed if column not in columns]:
+        raise CaptureError(
+            f"{files.source}/{name}: no column {', '.join(lacking)} among {', '.join(columns)[:80] or 'none'}",
+            hint="the first line names the columns",
+        )
+    absent = dict.fromkeys(columns, np.nan)
+    return [absent | {c: _number(value) for c, value in zip(columns, line, strict=False)} for line in lines]
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
