@@ -8,6 +8,7 @@ import numpy as np
 
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, rotation_about_z
 from r2c2r_core.ingest.doctor.pairs import Centres, Disagreement, Pairs, Rotations, Views, compare
+from r2c2r_core.ingest.doctor.unit import UNITS
 from r2c2r_core.tuning import param, tuned
 
 Cause = Literal[
@@ -24,12 +25,7 @@ Cause = Literal[
 ]
 Poses = tuple[Rotations, Centres]
 
-_UNITS = {
-    0.1: "1/10000 m read as 1/1000 m",
-    0.2: "1/5000 m read as 1/1000 m",
-    5.0: "1/1000 m read as 1/5000 m",
-    10.0: "1/1000 m read as 1/10000 m",
-}
+_UNITS = {f: UNITS[f] for f in (0.1, 0.2, 5.0)} | {10.0: "1/1000 m read as 1/10000 m"}
 _SCALES = np.geomspace(0.8, 1.25, 23)
 
 

@@ -12,7 +12,7 @@ from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFr
 from r2c2r_core.model.capture import Capture, Depth
 from r2c2r_core.tuning import param, tuned
 
-_UNITS = {  # factor to metres: description
+UNITS = {  # factor to metres: description
     0.001: "millimetres read as metres",
     0.01: "centimetres read as metres",
     0.0125: "1/10000 m, rotated by three bits (as in APC), read as 1/1000 m",
@@ -52,15 +52,15 @@ def likely_unit(capture: Capture, recording: Recording, median_m: float, rng: np
     """The unit with a plausible median depth and the best agreement of views; None where none fits."""
     params = tuned(Params)
     nearest, farthest = params.near_m
-    fitting = [f for f in _UNITS if nearest < f * median_m < farthest]
+    fitting = [f for f in UNITS if nearest < f * median_m < farthest]
     if not fitting:
         return None
     costs = {factor: cost for factor in fitting if (cost := _disagreement(capture, recording, factor, rng)) is not None}
     ranked = sorted(costs, key=lambda factor: costs[factor])
     if ranked and (len(ranked) == 1 or costs[ranked[0]] < params.clear * costs[ranked[1]]):
-        return Unit(ranked[0], _UNITS[ranked[0]], measured=len(ranked) > 1)
+        return Unit(ranked[0], UNITS[ranked[0]], measured=len(ranked) > 1)
     usual = min(fitting, key=lambda f: abs(np.log(f * median_m / params.usual_m)))
-    return Unit(usual, _UNITS[usual], measured=False)
+    return Unit(usual, UNITS[usual], measured=False)
 
 
 def _disagreement(capture: Capture, recording: Recording, factor: float, rng: np.random.Generator) -> float | None:

@@ -56,8 +56,8 @@ def open_arti4d(files: Files) -> Recording:
     return joined_recording(
         files,
         found,
-        rgb_camera,
-        depth_camera,
+        lambda _: rgb_camera,
+        lambda _: depth_camera,
         format="Arti4D",
         notices=turned,
         other_names=("rgb/camera_info.txt", "depth/camera_info.txt", odometry, calibration),

@@ -16,9 +16,7 @@ from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFr
 from r2c2r_core.ingest.readers.stored_depth import are_depth16, depth_file, depth_size, stored_values
 from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_numbers
 
-Cameras = Intrinsics | Callable[[int], Intrinsics | None]
-"""One camera, or each frame's."""
-
+Cameras = Callable[[int], Intrinsics | None]  # by frame number; None: the frame's own is unusable
 Y_UP, Z_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 _MILLIMETRES = 1000.0  # units a metre
 _DEPTH16 = "the depth is Android's DEPTH16: its lower 13 bits are read as millimetres, the upper 3 as confidence"
@@ -86,7 +84,7 @@ def _joined_frames(
         hint = "name the colour image, depth image and pose of a frame by the same number"
         raise CaptureError(f"{files.source}: {counts}, none with the same number", hint=hint)
     posed = [number for number in sorted(shared) if poses[number] is not None or not found.poses]
-    cameras = {number: camera for number in posed if (camera := _of(rgb_camera, number)) is not None}
+    cameras = {number: camera for number in posed if (camera := rgb_camera(number)) is not None}
     if not cameras:
         raise CaptureError(
             f"{files.source}: none of {len(posed)} frames has a usable camera (focal length and centre)",
@@ -96,7 +94,7 @@ def _joined_frames(
         size = depth_size(files, (found.depth[number] for number in cameras))
         depth_cameras = {number: camera.resized(*size) for number, camera in cameras.items()}
     else:
-        depth_cameras = {number: _of(depth_camera, number) or camera for number, camera in cameras.items()}
+        depth_cameras = {number: depth_camera(number) or camera for number, camera in cameras.items()}
     start_s = min(found.times_s.values(), default=0.0)
     frames = tuple(
         RawFrame(
@@ -118,10 +116,6 @@ def read_poses(files: Files, names: Mapping[int, str]) -> dict[int, Rigid3 | Non
     """The pose in each of those text files (4x4, camera-to-world, OpenCV axes)."""
     read = {number: read_numbers(files.read(name)) for number, name in names.items()}  # -inf or NaN where tracking was lost
     return {k: None if n is None or n.size != 16 else pose_of_matrix(n.reshape(4, 4)) for k, n in read.items()}
-
-
-def _of(cameras: Cameras, number: int) -> Intrinsics | None:
-    return cameras if isinstance(cameras, Intrinsics) else cameras(number)
 
 
 def _left_out(found: Found, shared: set[int], posed: int, usable: int) -> list[str]:

@@ -64,7 +64,7 @@ def open_redwood(files: Files) -> Recording:
     return joined_recording(
         files,
         found,
-        calibration.camera,
+        lambda _: calibration.camera,
         format="Redwood / Open3D",
         notices=notices,
         other_names=[name for name in (log, calibration.name) if name],

@@ -26,8 +26,8 @@ def open_scannet(files: Files) -> Recording:
     return joined_recording(
         files,
         found,
-        rgb_camera,
-        depth_camera,
+        lambda _: rgb_camera,
+        lambda _: depth_camera,
         format="ScanNet export",
         up_capture=Z_UP,
         notices=notices,

@@ -29,7 +29,7 @@ def open_seven_scenes(files: Files) -> Recording:
     found = Found(colour=colour, depth=depth, poses=read_poses(files, poses))
     up = _up(files)
     others = [_INTRINSICS, *poses.values(), *([_GRAVITY] if up is not None else [])]
-    return joined_recording(files, found, rgb_camera, format="7-Scenes folder", up_capture=up, other_names=others)
+    return joined_recording(files, found, lambda _: rgb_camera, format="7-Scenes folder", up_capture=up, other_names=others)
 
 
 def _up(files: Files) -> Vector3 | None:

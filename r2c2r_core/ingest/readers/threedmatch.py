@@ -33,8 +33,8 @@ def open_threedmatch(files: Files) -> Recording:
     return joined_recording(
         files,
         found,
-        rgb_camera,
-        depth_camera,
+        lambda _: rgb_camera,
+        lambda _: depth_camera,
         format="3DMatch / 7-Scenes sequence",
         notices=notices,
         other_names=(*others, *poses.values()),

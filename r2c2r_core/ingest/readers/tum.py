@@ -69,7 +69,7 @@ def open_tum(files: Files) -> Recording:
     return joined_recording(
         files,
         found,
-        camera,
+        lambda _: camera,
         format="TUM RGB-D",
         up_capture=Z_UP if pose_name and not icl else None,
         notices=[
