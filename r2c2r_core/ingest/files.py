@@ -19,6 +19,7 @@ _MAX_MEMBER_BYTES = 256 * 2**20  # the largest honest member is a 12-megapixel P
 _VIDEOS = (".mp4", ".mov", ".m4v")  # are streamed, so they may be larger
 _LFS_POINTER = b"version https://git-lfs.github.com/spec/"  # what Git has in the place of a large file that was not fetched
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
+_DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, UnicodeDecodeError, OSError)
 _MAX_RATIO, _RATIO_MATTERS_BYTES = 300, 256 * 2**20  # deflate reaches 1000 on zeros only
 
 
@@ -136,22 +137,14 @@ class ZipFiles:
         """The content; raises CaptureError when the member is damaged."""
         try:
             return _fetched(self._zip.read(self._members.get(name, name)), f"{self.source}: member '{name}'")
-        except (
-            zipfile.BadZipFile,
-            zlib.error,
-            EOFError,
-            NotImplementedError,
-            RuntimeError,
-            UnicodeDecodeError,
-            OSError,
-        ) as problem:
+        except _DAMAGED as problem:
             raise self._damaged(name, problem) from problem
 
     def open(self, name: str) -> BinaryIO:
         """The member as a stream; raises CaptureError when it is damaged."""
         try:
             return cast(BinaryIO, self._zip.open(self._members.get(name, name)))
-        except (zipfile.BadZipFile, NotImplementedError, RuntimeError, UnicodeDecodeError, OSError) as problem:
+        except _DAMAGED as problem:
             raise self._damaged(name, problem) from problem
 
     def place(self, name: str) -> tuple[str, ...]:

@@ -12,12 +12,14 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Image
-from r2c2r_core.errors import CaptureError, EnvironmentProblem
+from r2c2r_core.disk import explained_io
+from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.depth import decode_depth, encode_depth
 from r2c2r_core.model.capture import Depth, Frame
 
 _CACHED_IMAGES, _CACHED_DEPTHS = 12, 48  # 25 MB at 960x720, 9 MB at 256x192
 _PARTIAL = ".partial"
+_OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR)
 
 
 class StoredImages:
@@ -74,15 +76,10 @@ def new_store(store: Path) -> Iterator[Path]:
         shutil.rmtree(store, ignore_errors=True)
         partial.rename(store)
     except OSError as problem:
-        if problem.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise EnvironmentProblem(
-                f"{store}: the disk is full", hint="free some space and read the recording again"
-            ) from problem
-        if problem.errno in (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR):
-            raise EnvironmentProblem(
-                f"{store}: cannot be written ({problem.strerror})", hint="choose another folder"
-            ) from problem
-        raise
+        if problem.errno not in _OF_WRITING:
+            raise
+        with explained_io(store):
+            raise
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 

@@ -28,6 +28,7 @@ def upright(recording: Recording) -> Recording:
     turns = needed_turns(recording.frames, recording.up_capture)
     if turns == 0 or any(needed_turns(recording.frames, up) != turns for up in recording.other_ups):
         return recording  # upright, or it is not known yet which of its readings the scan supports
+    told = f"images were turned by {(90, 180, -90)[turns - 1]} deg counter-clockwise to stand upright"
     original = {frame.index: frame for frame in recording.frames}
 
     def colour_of(frame: RawFrame) -> Colour:
@@ -44,10 +45,7 @@ def upright(recording: Recording) -> Recording:
         frames=tuple(_turned(frame, turns) for frame in recording.frames),
         colour_of=colour_of,
         depth_of=depth_of,
-        notices=(
-            *recording.notices,
-            f"images were turned by {(90, 180, -90)[turns - 1]} deg counter-clockwise to stand upright",
-        ),
+        notices=(*recording.notices, told),
     )
 
 

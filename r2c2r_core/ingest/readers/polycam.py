@@ -9,8 +9,6 @@ named by their time; their number here is its rank. (PolyCam/polyform; nerfstudi
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL, Rigid3
 from r2c2r_core.ingest.files import Files
@@ -75,7 +73,7 @@ def _by_time(names: Iterable[str], pattern: str) -> dict[int, str]:
 
 def _camera(document: dict[str, Any], size: tuple[int, int]) -> Intrinsics | None:
     sized = {"width": size[0], "height": size[1], **document}
-    numbers = _numbers(sized, ("fx", "fy", "cx", "cy", "width", "height"))
+    numbers = finite_numbers([sized.get(key) for key in ("fx", "fy", "cx", "cy", "width", "height")], (6,))
     if numbers is None or not (numbers[[0, 1, 4, 5]] >= 1).all():
         return None
     fx, fy, cx, cy, width, height = numbers
@@ -83,12 +81,8 @@ def _camera(document: dict[str, Any], size: tuple[int, int]) -> Intrinsics | Non
 
 
 def _pose(document: dict[str, Any]) -> Rigid3 | None:
-    numbers = _numbers(document, tuple(f"t_{row}{column}" for row in range(3) for column in range(4)))
-    return None if numbers is None else pose_of_matrix(numbers.reshape(3, 4), CAMERA_CV_FROM_GL)
-
-
-def _numbers(document: dict[str, Any], keys: tuple[str, ...]) -> np.ndarray | None:
-    return finite_numbers([document.get(key) for key in keys], (len(keys),))
+    numbers = finite_numbers([[document.get(f"t_{row}{column}") for column in range(4)] for row in range(3)], (3, 4))
+    return None if numbers is None else pose_of_matrix(numbers, CAMERA_CV_FROM_GL)
 
 
 READER = Reader(

@@ -7,7 +7,6 @@ integers. (StrayRobots/scanner, docs/format.md and OdometryEncoder.swift.)
 """
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Y_UP, Found, joined_recording
 from r2c2r_core.ingest.readers.images import MOST_FRAMES, first_size, numbered
-from r2c2r_core.ingest.readers.protocol import Colour, Part, RawFrame, Reader, Recording
+from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.stored_depth import ENDING
 from r2c2r_core.ingest.readers.texts import integer_centred, pose_of_quaternion, read_calibration, read_table
 from r2c2r_core.ingest.readers.video import Video
@@ -46,11 +45,7 @@ def open_stray(files: Files) -> Recording:
     recording = joined_recording(
         files, found, cameras.get, format="Stray Scanner", up_capture=Y_UP, other_names=(_MATRIX, _ODOMETRY)
     )
-    return replace(recording, colour_of=partial(_video_frame, video)) if video else recording
-
-
-def _video_frame(video: Video, frame: RawFrame) -> Colour:
-    return video.frame(frame.index)
+    return replace(recording, colour_of=lambda frame: video.frame(frame.index)) if video else recording
 
 
 def _camera(row: dict[str, float], common: Intrinsics) -> Intrinsics:
