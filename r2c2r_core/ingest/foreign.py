@@ -20,6 +20,8 @@ class Foreign(NamedTuple):
 
 
 _OPEN3D = "Open3D saves its frames: `open3d.t.io.RGBDVideoReader.create(FILE).save_frames(FOLDER)`; bring that folder"
+_EXAMPLE = "open3d.examples.reconstruction_system.sensors.azure_kinect_mkv_reader"  # RGBDVideoReader refuses a .mkv
+_KINECT = f"Open3D saves its frames: `python -m {_EXAMPLE} --input FILE --output FOLDER`; bring that folder"
 _CAMERA = 'and add camera.json: {"width": 640, "height": 480, "fx": 525, "fy": 525, "cx": 320, "cy": 240}'
 _RAW = "Polycam's Raw data, 3D Scanner App's All data, or record with Record3D or Stray Scanner"
 
@@ -39,7 +41,7 @@ _KINDS: tuple[tuple[Foreign, tuple[str, ...]], ...] = (
         (".db3", ".mcap"),
     ),
     (
-        Foreign("a Matroska film, such as an Azure Kinect's recording", f"{_OPEN3D}; a film without depth cannot be used"),
+        Foreign("a Matroska film, such as an Azure Kinect's recording", f"{_KINECT}; a film without depth cannot be used"),
         (".mkv",),
     ),
     (

@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import PurePath
 
 import cv2
@@ -299,6 +300,10 @@ def test_the_camera_json_of_a_hint_is_read(name, tmp_path):
     recording = open_recording(folder)
     assert "camera.json" in recording.names
     assert (recording.frames[0].rgb_camera.fx, recording.frames[0].rgb_camera.width) == (262.5, 320)
+
+
+def test_the_module_that_the_hint_for_an_azure_kinect_names_is_open3ds():
+    assert find_spec(re.search(r"python -m (\S+)", foreign(PurePath("k4a.mkv")).bring)[1])
 
 
 def test_a_refused_film_is_converted_by_the_command_that_its_refusal_names(tmp_path, monkeypatch):

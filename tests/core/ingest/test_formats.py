@@ -364,7 +364,7 @@ def test_an_unknown_folder_reports_the_two_closest_formats(tmp_path):
         ("scan.ply", "a finished 3D model", "Raw data"),
         ("2026-11-02.bag", "RealSense bag", "save_frames"),
         ("rosbag2_0.mcap", "a ROS 2 bag", "color/ and depth/"),
-        ("k4a.mkv", "Azure Kinect", "save_frames"),
+        ("k4a.mkv", "Azure Kinect", "azure_kinect_mkv_reader"),
         ("rtabmap.db", "a database of RTAB-Map", "rtabmap-export"),
         ("scene0000_00.sens", "ScanNet's packed .sens stream", "reader.py --filename"),
         ("HD720.svo2", "a ZED camera", "ZED_SVO_Export"),
