@@ -67,15 +67,14 @@ def joined_recording(
 
 
 def _joined_frames(
-    files: Files,
-    found: Found,
-    rgb_camera: Cameras,
-    depth_camera: Cameras | None,
+    files: Files, found: Found, rgb_camera: Cameras, depth_camera: Cameras | None
 ) -> tuple[tuple[RawFrame, ...], list[str]]:
     both, notices = found.colour.keys() & found.depth.keys(), []
     usable = {number for number, pose in found.poses.items() if pose is not None}
     if found.poses and not usable & both and (both & found.poses.keys() or not usable):
-        notices.append(f"none of {len(found.poses)} poses is a finite rigid transform: all are left out")
+        notices.append(
+            f"none of {len(both & found.poses.keys()) or len(found.poses)} poses is a finite rigid transform: all are left out"
+        )
         found = replace(found, poses={})
     poses = found.poses or dict.fromkeys(found.colour)
     shared = both & poses.keys()

@@ -41,7 +41,7 @@ def depth_file(
     """
     stored = stored_values(files.read(frame.depth_name), frame.depth_name)
     _require_size(stored, frame.depth_name, frame)
-    if packed:
+    if packed and stored.dtype == np.uint16:
         return _unpacked(stored)
     metres = _metres(stored, units_per_metre)
     if frame.confidence_name is None:
@@ -94,7 +94,7 @@ def _unpacked(stored: np.ndarray) -> RawDepth:
     """Depth and confidence of DEPTH16, whose code 0 is certain and 1 to 7 are 0 to 100 %, here in equal thirds."""
     codes = stored >> _CODES
     confidence = np.where(codes == 0, 2, np.minimum((np.maximum(codes, 1) - 1) // 2, 2)).astype(np.uint8)
-    return RawDepth((stored & _DEPTH).astype(np.float32) / np.float32(1000), confidence)
+    return RawDepth(np.where(stored == 65535, 0, stored & _DEPTH).astype(np.float32) / np.float32(1000), confidence)
 
 
 def _metres(stored: np.ndarray, units_per_metre: float) -> np.ndarray:
