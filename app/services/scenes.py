@@ -122,6 +122,11 @@ def _item(entry: dict[str, Any], item: SceneObject | None, files: ProjectFiles, 
     )
 
 
+def sources_of(joint: dict[str, Any]) -> dict[str, str]:
+    """Sources of a joint's numbers; the closed end has one only where a person moved it (older results say: default)."""
+    return {key: source for key, source in joint["sources"].items() if (key, source) != ("lower", "default")}
+
+
 def _joint(joint: dict[str, Any]) -> schemas.SceneJoint:
     return schemas.SceneJoint(
         name=joint["name"],
@@ -130,7 +135,7 @@ def _joint(joint: dict[str, Any]) -> schemas.SceneJoint:
         origin=joint["origin_object"],
         lower=joint["lower"],
         upper=joint["upper"],
-        sources=joint["sources"],
+        sources=sources_of(joint),
     )
 
 

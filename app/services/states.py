@@ -116,7 +116,7 @@ def _by_default(context: Context, project: Project) -> list[str]:
     """Joints of the newest scene with default values not derived from the recording."""
     scene = scenes.fitted(context.files(project))
     joints = [joint for item in scene["objects"] for joint in item["joints"]] if scene else []
-    guessed = [joint["name"] for joint in joints if "default" in joint["sources"].values()]
+    guessed = [joint["name"] for joint in joints if "default" in scenes.sources_of(joint).values()]
     if not guessed:
         return []
     more = f" and {len(guessed) - NAMED} more" if len(guessed) > NAMED else ""

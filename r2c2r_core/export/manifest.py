@@ -139,7 +139,7 @@ def _joint_entry(item: SceneObject, body: Body, plan: Plan) -> dict[str, Any]:
         "lower": _plain(joint.lower),
         "upper": _plain(joint.upper),
         "uncut": _plain(joint.uncut),
-        "source": {key: joint.sources.get(key, "default") for key in ("axis", "origin", "lower", "limits")},
+        "source": {"axis": "default", "origin": "default", "lower": None, "limits": "default"} | joint.sources,
         "confidence": _plain(joint.confidence),
         "motion": None if joint.motion is None else _motion_entry(joint.motion),
         "randomize": _ranges_entry(randomize.of_joint(joint)),

@@ -228,7 +228,7 @@ def _joints(objects: list[dict[str, Any]], results: list[dict[str, Any]]) -> str
             result = by_name.get(joint["name"], {})
             turning = joint["type"] == "revolute"
             reach = f"{joint['upper'] * 57.29578:.0f}°" if turning else f"{1000 * joint['upper']:.0f} mm"
-            source = ", ".join(f"{key} {_text(value)}" for key, value in joint["source"].items())
+            source = ", ".join(f"{key} {_text(value)}" for key, value in joint["source"].items() if value)
             travel, deepest = result.get("travel_reached"), result.get("deepest_penetration_m")
             rows.append(
                 [

@@ -80,7 +80,7 @@ class Joint:
     velocity: float
     damping: float
     friction: float
-    sources: dict[str, Source]  # axis, origin, lower (limit), limits (the upper one)
+    sources: dict[str, Source]  # axis, origin, limits (the upper one), and lower where a person set it
     uncut: float | None = None  # the upper limit before an obstacle reduced it; None without one
     confidence: float | None = None  # in its hinge side, 0..1; None where the category leaves no choice
     motion: JointMotion | None = None  # filmed motion; None if it was not observed to move

@@ -32,7 +32,7 @@ class ManifestJointSource(Document):
 
     axis: Source = Field(description="measured, inferred, default or person")
     origin: Source = Field(description="measured, inferred, default or person")
-    lower: Source = Field(default="default", description="of the lower limit: default (the closed state) or person")
+    lower: Source | None = Field(default=None, description="of the lower limit: person; null where it is 0, the closed state")
     limits: Source = Field(
         description="of the upper limit: at_least (as far as it was seen to open), inferred, default or person"
     )

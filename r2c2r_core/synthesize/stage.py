@@ -374,7 +374,7 @@ def _limits(
     lower = 0.0 if said.lower is None else said.lower
     upper = max(lower, found if said.upper is None else said.upper)
     of_upper: Source = source if said.upper is None and upper == found else "person"
-    return lower, upper, {"lower": "default" if said.lower is None else "person", "limits": of_upper}
+    return lower, upper, {"limits": of_upper, **({} if said.lower is None else {"lower": "person"})}
 
 
 def _open_ended(joint: Joint) -> str | None:

@@ -1,5 +1,6 @@
 """Review states, enforced by the server, and comments pinned to a place."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,7 +11,10 @@ from app.db import keys, queries
 from app.db.engine import writing
 from app.db.tables import Bundle
 from app.services import jobs
+from r2c2r_core.model.motion import Source
+from r2c2r_core.workspace import Workspace
 from tests.app.conftest import Running
+from tests.app.nouns import scene
 from tests.app.test_jobs import run
 from tests.app.test_reviews import Reviewed, reviewed
 
@@ -91,6 +95,21 @@ def test_approval_needs_a_passed_certificate_or_a_reason(under_review: Reviewed)
     (approve,) = [m for m in web.get(f"/api/projects/{project}/review")["moves"] if m["to"] == "approved"]
     assert approve["unmet"] == []
     assert approve["notes"] == ["1 of 1 joints hold a default: drawer_1_slide"]
+    work = Workspace(web.settings.data_dir / "projects" / project / "work")
+    drawn = scene("drawer_1")
+    (item,) = drawn.objects
+    measured: dict[str, Source] = {
+        "axis": "inferred",
+        "origin": "inferred",
+        "lower": "default",
+        "limits": "measured",
+    }  # of an older run
+    (joint,) = item.joints
+    shown = replace(item, joints=(replace(joint, sources=measured),))
+    work.save("warp", "scene", replace(drawn, objects=(shown,)), {"key": "other", "seconds": 1.0})
+    (approve,) = [m for m in web.get(f"/api/projects/{project}/review")["moves"] if m["to"] == "approved"]
+    assert approve["notes"] == []  # closed at 0 is no default to check
+    assert "lower" not in web.get(f"/api/projects/{project}/scene")["items"][0]["joints"][0]["sources"]
     assert step(web, project, "approved")["state"] == "approved"
 
 

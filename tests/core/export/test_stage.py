@@ -120,7 +120,7 @@ def test_the_manifest_follows_its_schema(kitchen_bundle: tuple[Path, Certificate
     assert set(door["joint"]) == set(joint_keys.split())
     assert door["joint"]["blocked_by"] == []
     assert [b["name"] for b in document["objects"][1]["joint"]["blocked_by"]] == ["double_1_left_hinge"]
-    assert door["joint"]["source"] == {"axis": "inferred", "origin": "inferred", "lower": "default", "limits": "default"}
+    assert door["joint"]["source"] == {"axis": "inferred", "origin": "inferred", "lower": None, "limits": "default"}
     np.testing.assert_allclose(door["joint"]["axis"], [0, 0, -1], atol=1e-9)
     np.testing.assert_allclose(door["joint"]["origin"], [-0.6 - 0.597 / 2, -0.28, 0.1 + 0.36], atol=1e-9)
     assert door["mask"] == {"frames": 2, "mean_area_px": 2400.0, "prompts": [{"frame": 0, "x": 160.5, "y": 120.5, "label": 1}]}

@@ -173,6 +173,7 @@ def test_limits_apply_to_the_named_joint_and_unknown_names_are_reported() -> Non
     usual = {joint.name: joint.upper for joint in built(pair).objects[0].joints}
     left, right = sorted(item.joints, key=lambda joint: joint.name)
     assert (left.lower, left.upper, left.sources["limits"]) == (0.0, 1.0, "person")
+    assert "lower" not in left.sources  # closed at 0 by definition: no default to check
     assert (right.lower, right.sources["lower"]) == (0.1, "person")
     assert (right.lower, right.upper, right.sources["limits"]) == (0.1, usual[right.name], "default")
     assert any("corrections of a joint lid were not used: its joints are left_door, right_door" in w for w in item.warnings)
