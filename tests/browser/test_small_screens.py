@@ -1,4 +1,4 @@
-"""Access on a phone, at 200 % zoom, and by keyboard alone; toasts do not cover the lanes."""
+"""Access on a phone, at 200 % zoom, and by keyboard alone; toasts do not cover the lanes, nor each other."""
 
 from playwright.sync_api import expect
 
@@ -50,7 +50,7 @@ def test_the_skip_link_moves_the_focus_to_the_picture(new_context: NewContext, s
     expect(skip).to_have_count(0)  # there is no picture on this page
 
 
-def test_toasts_do_not_cover_the_lanes(new_context: NewContext, server: Server) -> None:
+def test_toasts_do_not_cover_the_lanes_and_equal_ones_merge(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
     project = sample(page)
@@ -66,3 +66,7 @@ def test_toasts_do_not_cover_the_lanes(new_context: NewContext, server: Server) 
     expect(page.locator(".toast")).to_have_count(4)
     lowest = box_of(page.locator(".toast").last)
     assert lowest["y"] + lowest["height"] <= box_of(page.locator("r2c2r-film-strip"))["y"]
+    for _ in range(3):
+        page.keyboard.press("g")
+    expect(page.locator(".toast", has_text="Choose an object first.")).to_have_text("Choose an object first.3 ×")
+    expect(page.locator(".toast", has_text="Deleted")).to_have_count(3)  # equal ones take the place of one

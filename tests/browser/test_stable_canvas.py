@@ -1,6 +1,6 @@
 """Layout of Annotate: a large picture that does not move, and panels resized by the person."""
 
-from playwright.sync_api import Page, expect
+from playwright.sync_api import FloatRect, Page, expect
 
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of
@@ -15,9 +15,20 @@ def share_of_window(page: Page) -> float:
     return scale**2 * FRAME[0] * FRAME[1] / page.evaluate("innerWidth * innerHeight")
 
 
+def layout(page: Page) -> list[FloatRect]:
+    """Boxes of the header and of the page below it."""
+    return [box_of(page.locator(part)) for part in (".topbar", "main")]
+
+
 def test_appearing_elements_do_not_move_the_picture(new_context: NewContext, server: Server) -> None:
-    page = signed_in(new_context(viewport={"width": 1280, "height": 720}), server, "ann")
-    page.goto(f"{sample(page)}/annotate?frame=3")
+    context = new_context(viewport={"width": 1280, "height": 720})
+    page = signed_in(context, server, "ann")
+    project = sample(page)
+    others = {path: context.new_page() for path in ("run", "review")}
+    for path, other in others.items():
+        other.goto(f"{project}/{path}")
+        expect(other.locator(".tabs a[aria-current]")).to_have_text(path.capitalize())
+    page.goto(f"{project}/annotate?frame=3")
     canvas = page.locator("r2c2r-frame-canvas canvas")
     expect(page.locator("r2c2r-film-strip output")).to_contain_text("frame 3 ")
     first = box_of(canvas)
@@ -32,9 +43,19 @@ def test_appearing_elements_do_not_move_the_picture(new_context: NewContext, ser
     page.keyboard.press("b")  # a tool of the selected object
     assert box_of(canvas) == first
     picture(page, "canvas-1280")
+    pages = [page, *others.values()]
+    before = [layout(each) for each in pages]
     server.kill()
-    expect(page.get_by_text("The server does not answer")).to_be_visible()
+    for each, (header, main) in zip(pages, before, strict=True):
+        expect(each.get_by_text("The server does not answer")).to_be_visible()
+        assert layout(each) == [header, main]
+        assert (main["x"], main["width"]) == (0, 1280)
+        banner = box_of(each.locator(".banner"))
+        assert banner["y"] == main["y"]  # over the top of the page, on one line
+        assert banner["height"] < header["height"]
+        assert abs(banner["x"] + banner["width"] / 2 - 640) <= 1  # px
     assert box_of(canvas) == first
+    picture(page, "offline")
 
 
 def test_a_moved_panel_separator_keeps_its_position_after_a_reload(new_context: NewContext, server: Server) -> None:

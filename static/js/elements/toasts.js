@@ -1,4 +1,7 @@
-/** Toasts in the corner, announced to assistive technology; errors stay until closed or another page is opened. */
+/**
+ * Toasts in the corner, announced to assistive technology; errors stay until closed or another page is opened. Equal ones are
+ * shown once, with their number, unless each offers something of its own.
+ */
 
 import { ApiError } from "../api.js";
 import { h, icon } from "../dom.js";
@@ -21,15 +24,21 @@ export class Toasts extends HTMLElement {
    */
   add(text, { kind = "", hint = "", offer = null } = {}) {
     const close = h("button", { class: "quiet", type: "button", "aria-label": "Close this message" }, icon("cross"));
+    const said = offer ? "" : JSON.stringify([kind, text, hint]);
+    const shown = /** @type {NodeListOf<HTMLElement>} */ (this.querySelectorAll("[data-said]"));
+    const same = [...shown].find((one) => one.dataset.said === said);
+    const times = 1 + Number(same?.dataset.times ?? 0);
     const toast = h(
       "div",
-      { class: `toast ${kind}` },
+      { class: `toast ${kind}`, "data-said": said || null, "data-times": times },
       h("div", {}, h("div", {}, text), hint ? h("div", { class: "muted" }, hint) : null),
+      times > 1 ? h("span", { class: "muted", title: `said ${times} times` }, `${times} ×`) : null,
       offer ? h("button", { type: "button", onClick: () => (toast.remove(), offer.run()) }, offer.text) : null,
       close,
     );
     close.addEventListener("click", () => toast.remove());
     if (kind !== "bad") leaveAfter(toast, offer ? 2 * SHOWN_MS : SHOWN_MS);
+    same?.remove();
     this.append(toast);
     while (this.childElementCount > 4) this.firstElementChild?.remove();
   }
