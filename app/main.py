@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 import anyio
-from fastapi import APIRouter, FastAPI, Request
+from fastapi import APIRouter, FastAPI, Request, WebSocket
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from opentelemetry.trace import TracerProvider
@@ -355,7 +355,9 @@ def _add_error_handlers(app: FastAPI) -> None:
         return JSONResponse(errors.body(kind, str(error.detail)), error.status_code, headers=error.headers)
 
     @app.exception_handler(OSError)
-    async def files(request: Request, error: OSError) -> JSONResponse:
+    async def files(request: Request | WebSocket, error: OSError) -> JSONResponse:
+        if isinstance(request, WebSocket):
+            raise error  # a connection takes no response; one whose browser has gone is the server's to end
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             return _full_disk()
         return await unexpected(request, error)

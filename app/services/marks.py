@@ -1,4 +1,4 @@
-"""Marks in the 3D view: joint axes, certificate findings, open comments."""
+"""Marks in the 3D view: joint axes, and where certificate findings and open comments are; the panels have their texts."""
 
 from typing import Any
 
@@ -11,12 +11,10 @@ from app.files import ProjectFiles
 from app.services import views
 from r2c2r_core.model.scene import SceneObject
 
-_REACH_M = 0.08  # length by which an axis extends beyond its box
+_REACH_M = 0.08  # by which an axis extends beyond its box, and a label stands off what it is about
 _AXIS, _FINDING, _COMMENT = (86, 180, 233), (230, 90, 60), (255, 225, 77)
 _CHOSEN = (255, 225, 77)
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-_LONGEST_TEXT = 44
-_LINE_M = 0.07  # distance between two findings of one object
 
 
 def marks(
@@ -27,19 +25,42 @@ def marks(
     bundle = queries.newest_bundle(session, project_id)
     findings = (bundle.certificate or {}).get("findings", []) if bundle else []
     found = [mark for item in items for mark in (*_axes(item), _box(item))] if name is not None else []
-    places = [(finding, where) for finding in findings for where in finding["where"].split(", ")]
-    for finding, where in places:
-        item = next((i for i in items if where == i.name or where.startswith(f"{i.name}_")), None)
-        if item is not None and (name is not None or finding["severity"] == "error"):
-            above = _LINE_M * sum(mark["colour"] == list(_FINDING) for mark in found)  # one object may have several
-            found.append(_word(item.world_from_object.translation + np.array([0, 0, above]), finding["message"], _FINDING))
+    told = [finding for finding in findings if name is not None or finding["severity"] == "error"]
+    for item in items:
+        count = sum(_is_about(finding, item.name) for finding in told)
+        if count:
+            found.append(_word(_above(item), f"{count} finding{'s' if count > 1 else ''}", _FINDING))
     said = select(Comment).where(Comment.project_id == project_id, col(Comment.resolved_at).is_(None))
-    found += [
-        {**_word(np.asarray(c.point_world), f"{c.who}: {c.text}", _COMMENT), "pin": True}
-        for c in session.exec(said)
-        if c.point_world
-    ]
+    found += _pins([comment for comment in session.exec(said) if comment.point_world])
     return found, items[0].world_from_object.translation.tolist() if name is not None and items else None
+
+
+def _is_about(finding: dict[str, Any], name: str) -> bool:
+    return any(where == name or where.startswith(f"{name}_") for where in finding["where"].split(", "))
+
+
+def _above(item: SceneObject) -> np.ndarray:
+    """Just above the object's box, where a label hides nothing of it."""
+    top = item.world_from_object.apply(_CORNERS * item.dimensions_m / 2)[:, 2].max()
+    place: np.ndarray = item.world_from_object.translation.copy()
+    place[2] = top + _REACH_M
+    return place
+
+
+def _pins(comments: list[Comment]) -> list[dict[str, Any]]:
+    """A pin for each comment, those of one place under one label; the list of comments has the texts."""
+    places: list[list[tuple[np.ndarray, str]]] = []
+    for at, who in ((np.asarray(comment.point_world), comment.who) for comment in comments):
+        near = next((place for place in places if np.linalg.norm(place[0][0] - at) < _REACH_M), None)
+        if near is None:
+            places.append([(at, who)])
+        else:
+            near.append((at, who))
+    found = []
+    for place in places:
+        label = place[0][1] if len(place) == 1 else f"{len(place)} comments"
+        found += [{**_word(at, label if k == 0 else "", _COMMENT), "pin": True} for k, (at, _) in enumerate(place)]
+    return found
 
 
 def _axes(item: SceneObject) -> list[dict[str, Any]]:
@@ -52,8 +73,7 @@ def _axes(item: SceneObject) -> list[dict[str, Any]]:
         start, end = (
             (origin - half * axis, origin + half * axis) if joint.type == "revolute" else (origin, origin + joint.upper * axis)
         )
-        source = joint.sources.get("axis", "")
-        found.append({**_word(end, f"{joint.type}, axis {source}", _AXIS), "lines": [[start.tolist(), end.tolist()]]})
+        found.append({"lines": [[start.tolist(), end.tolist()]], "colour": list(_AXIS)})
     return found
 
 
@@ -65,8 +85,7 @@ def _box(item: SceneObject) -> dict[str, Any]:
 
 
 def _word(at: np.ndarray, text: str, colour: tuple[int, int, int]) -> dict[str, Any]:
-    short = text if len(text) <= _LONGEST_TEXT else f"{text[: _LONGEST_TEXT - 1]}…"
-    return {"text": short, "at": [float(value) for value in at], "colour": list(colour)}
+    return {"text": text, "at": [float(value) for value in at], "colour": list(colour)}
 
 
 def _scene_objects(files: ProjectFiles) -> tuple[SceneObject, ...]:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.errors import Forbidden, TooMany, Unavailable
+from app.errors import Forbidden, NotReady, TooMany, Unavailable
 from app.process import Line, Worker, python_module
 from app.settings import Settings
 from r2c2r_core.errors import InputError, R2C2RError
@@ -31,7 +31,11 @@ class _Closed(InputError):
     """The view is not open."""
 
 
-_FAILURES: dict[str, type[R2C2RError]] = {"internal": Unavailable, "NotOpen": _Closed}  # otherwise the command is invalid
+_FAILURES: dict[str, type[R2C2RError]] = {  # otherwise the command is invalid
+    "internal": Unavailable,
+    "NotOpen": _Closed,
+    "NotReady": NotReady,
+}
 
 
 @dataclass(slots=True)
@@ -248,7 +252,7 @@ class Viewer:
         try:
             self._ask({"cmd": "show", "view": view.name, **wish})
             view.shown = wish
-        except InputError:
+        except (InputError, NotReady):
             return
 
     def _make_room(self) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from app.errors import NotReady
 from app.viewer import gizmo as handles
 from app.viewer import heat
 from app.viewer.assembly import Assembly, Draw, JointValue, Style, assemble, undressed
@@ -217,7 +218,7 @@ class View:
             placement = self.work.load_latest("align", name)
             if placement is None:
                 if wish.get("name"):
-                    raise InputError(f"{name} has no placement yet", hint="run the project first")
+                    raise NotReady(f"{name} has no placement yet", hint="run the project first")
                 continue
             asset = self._asset({"name": name, "candidate": placement.candidate_id})
             vertices = placement.world_from_mesh.apply(asset.mesh.vertices)
@@ -230,7 +231,7 @@ class View:
             self.placed.append((name, vertices, asset.mesh.faces))
             centres.append((vertices.min(axis=0) + vertices.max(axis=0)) / 2)
         if not centres:
-            raise InputError("nothing is placed yet", hint="run the project first")
+            raise NotReady("nothing is placed yet", hint="run the project first")
         self._look_from_path(np.mean(centres, axis=0), distance=0.6 if self.gizmo is not None else 1.15)
         return f"{len(centres)} placed mesh{'es' if len(centres) > 1 else ''} over the scan"
 
@@ -280,7 +281,7 @@ class View:
             found: ArticulatedScene | None = self.work.load_latest(stage, "scene")
             if found is not None:
                 return stage, found
-        raise InputError("there is no finished scene yet", hint="run the project first")
+        raise NotReady("there is no finished scene yet", hint="run the project first")
 
     def _add_fitted(self, node: str, mesh: TexturedMesh) -> None:
         self._add_mesh(node, mesh, mesh.vertices, 1.0)
@@ -316,7 +317,7 @@ class View:
         for asset in found.candidates if found else ():
             if asset.candidate_id == wanted:
                 return asset
-        raise InputError(f"{wish['name']} has no candidate {wanted}", hint="run the project first")
+        raise NotReady(f"{wish['name']} has no candidate {wanted}", hint="run the project first")
 
     def _add_mesh(self, node: str, mesh: TexturedMesh, vertices: np.ndarray, opacity: float) -> Any:
         import trimesh
@@ -404,7 +405,7 @@ class View:
         if self.known_capture is None:
             self.known_capture = self.work.load_latest("ingest", "scene")
             if self.known_capture is None:
-                raise InputError("the recording has not been read yet", hint="wait for the import")
+                raise NotReady("the recording has not been read yet", hint="wait for the import")
         return self.known_capture
 
 

@@ -10,10 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
+from starlette.types import Message, Receive, Scope, Send
 from starlette.websockets import WebSocketDisconnect
+from uvicorn.protocols.utils import ClientDisconnected
 from websockets.sync.client import connect
 
+from app.db.engine import reading, writing
+from app.db.queries import newest_bundle, project_row
 from app.errors import Unavailable
+from app.services import marks
 from app.settings import Settings
 from app.viewer import contract, worker
 from app.viewer.client import Viewer
@@ -72,6 +77,50 @@ def test_the_number_of_3d_view_connections_of_a_person_is_limited(seen: Running,
     with connecting() as again:
         again.send_text("hello")
         assert again.receive_text() == "hello"
+
+
+def test_a_connection_that_is_gone_before_its_answer_leaves_no_traceback(seen: Running) -> None:
+    ended: list[BaseException] = []
+
+    async def cut(scope: Scope, receive: Receive, send: Send) -> None:
+        async def gone(_: Message) -> None:
+            raise ClientDisconnected
+
+        try:
+            await seen.app(scope, receive, gone)
+        except Exception as error:
+            ended.append(error)
+        await send({"type": "websocket.close"})
+
+    client = TestClient(cut, base_url=ORIGIN, cookies=seen.client.cookies)
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect(f"{SOCKETS}/viewer/none", headers={"origin": ORIGIN}):
+        pass
+    assert [type(error) for error in ended] == [ClientDisconnected]  # which the server ends silently
+
+
+def test_findings_and_comments_of_one_place_share_a_label_off_what_they_are_about(seen: Running) -> None:
+    project = seen.sample()
+    seen.job(run(seen, project), "done")
+    finish(seen.settings.data_dir / "projects" / project / "work")
+    points = ([0.0, 0.0, 1.0], [0.02, 0.0, 1.0], [2.0, 0.0, 1.0])
+    for point in points:
+        seen.post(f"/api/projects/{project}/comments", {"text": "too wide", "point_world": point}, 201)
+    findings = [
+        {"severity": "warning", "where": "drawer_1_slide", "message": f"collides with its neighbour when {k} cm open"}
+        for k in range(3)
+    ]
+    with writing(seen.context.engine) as session:
+        bundle = newest_bundle(session, project)
+        assert bundle is not None
+        bundle.certificate = {"passed": True, "findings": findings}
+        session.add(bundle)
+    with reading(seen.context.engine) as session:
+        files = seen.context.files(project_row(session, project))
+        found, _ = marks.marks(session, files, project, "drawer_1")
+    labels = [mark for mark in found if mark.get("text")]
+    assert [mark["text"] for mark in labels] == ["3 findings", "2 comments", "tester"]
+    assert labels[0]["at"][2] > 0.1  # m, half the drawer's height: above its front
+    assert [mark["at"] for mark in found if mark.get("pin")] == [list(point) for point in points]
 
 
 def test_signing_out_closes_the_3d_view(seen: Running) -> None:
