@@ -101,12 +101,15 @@ _STEPS_AND_SAVED = sqlalchemy.select(
 ).where(col(Event.project_id) == bindparam("project"), col(Event.object_id) == bindparam("object"))
 
 
-def last_change(session: Session, project_id: str, scope: Scope, direction: Literal["undo", "redo"]) -> int | None:
-    """The object affected by an undo (or redo) of the whole project."""
-    mine = (Event.project_id == project_id, Event.scope == scope)
+def last_change(session: Session, project_id: str, scope: Scope, direction: Literal["undo", "redo"], who: str) -> int | None:
+    """The object of this person's newest change (or undo) in the project, without objects that others changed since."""
+    mine = (Event.project_id == project_id, Event.scope == scope, Event.who == who)
     query = select(Event.object_id).order_by(col(Event.id).desc())
     if direction == "undo":
-        return session.exec(query.where(*mine, Event.standing == "done")).first()
+        later = aliased(Event)
+        same = (later.object_id == Event.object_id, later.scope == scope, later.standing == "done")
+        newest = ~select(later.id).where(*same, col(later.id) > col(Event.id)).exists()
+        return session.exec(query.where(*mine, Event.standing == "done", newest)).first()
     undone = aliased(Event)  # the target of an undo that was not redone since
     query = query.join(undone, col(undone.id) == Event.target).where(*mine, Event.action == "undo")
     return session.exec(query.where(undone.standing == "undone")).first()

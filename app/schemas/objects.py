@@ -108,7 +108,7 @@ class SceneObject(Shape):
 
 
 class UndoRequest(Shape):
-    """Target of an undo or redo: the last change of this object, or of any object when None."""
+    """Target of an undo or redo: the last change of this object, or this person's last one of any object when None."""
 
     object: int | None = Field(default=None, ge=0, lt=2**63)
     scope: Literal["prompts", "review"] = "prompts"

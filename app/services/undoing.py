@@ -14,7 +14,7 @@ from app.services.context import Context
 
 
 def undo(context: Context, project_id: str, body: schemas.UndoRequest) -> schemas.Undone:
-    """Undo the last change of one object, or of the project."""
+    """Undo the last change of one object, or this person's last one in the project."""
     return _step(context, project_id, body, "undo")
 
 
@@ -28,9 +28,11 @@ def _step(context: Context, project_id: str, body: schemas.UndoRequest, directio
         context.require("reviewer")
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        number = body.object if body.object is not None else history.last_change(session, project_id, body.scope, direction)
+        number = body.object
         if number is None:
-            raise Conflict(f"nothing to {direction}")
+            number = history.last_change(session, project_id, body.scope, direction, context.who)
+        if number is None:
+            raise Conflict(f"you have nothing to {direction} here")
         item = queries.object_row(session, project_id, number, deleted=True)
         _refuse_overtaken(context, session, project, item, body)
         step = history.undo if direction == "undo" else history.redo

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -6,6 +7,7 @@ import pytest
 from app.db import queries
 from app.db.engine import writing
 from tests.app.conftest import Running
+from tests.app.people import signed_in, with_accounts
 
 pytestmark = pytest.mark.both_databases
 
@@ -58,6 +60,20 @@ def test_undo_without_an_object_reverts_the_last_change_of_any_object(web: Runni
     assert web.post(f"/api/projects/{project}/undo", {})["object"]["id"] == second
     assert web.post(f"/api/projects/{project}/redo", {})["object"]["id"] == second
     assert web.post(f"/api/projects/{project}/redo", {})["object"]["category"] == "oven"
+
+
+def test_undo_without_an_object_reverts_ones_own_last_change(tmp_path: Path) -> None:
+    with with_accounts(tmp_path / "data") as web, signed_in(web, "the-annotator") as ann, signed_in(web, "the-reviewer") as bea:
+        project = ann.post("/api/projects/sample", json={}).json()["id"]
+        at = f"/api/projects/{project}"
+        for name in ("mine", "ours"):
+            assert ann.post(f"{at}/objects", json={"name": name, "category": "mug"}).status_code == 201
+        assert bea.post(f"{at}/objects", json={"name": "hers", "category": "mug"}).status_code == 201
+        ours = next(item["id"] for item in ann.get(f"{at}/objects").json() if item["name"] == "ours")
+        assert bea.patch(f"{at}/objects/{ours}", json={"category": "bottle"}).status_code == 200
+        assert ann.post(f"{at}/undo", json={}).json()["text"] == "added mine"  # hers are newer, and ours is hers since
+        assert bea.post(f"{at}/undo", json={}).json()["object"]["name"] == "ours"
+        assert ann.post(f"{at}/redo", json={}).json()["text"] == "added mine"
 
 
 def test_a_new_change_clears_the_redo_stack(web: Running) -> None:
