@@ -97,6 +97,11 @@ class ProjectFiles:
         """The clicks that the masks in the workspace were made from."""
         return self.root / "finished-prompts.json"
 
+    @property
+    def finished_inputs(self) -> Path:
+        """Key of each object's inputs in the last run (db/keys.py), by name."""
+        return self.root / "finished-inputs.json"
+
     def request(self, job_id: int) -> Path:
         """A job's request.json, with a copy of its clicks and corrections beside it."""
         return self.requests / str(job_id) / "request.json"

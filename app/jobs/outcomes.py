@@ -17,7 +17,7 @@ from app.db import history
 from app.db.queries import READS_RECORDING, live_objects, newest_bundle
 from app.db.tables import Bundle, Job, Point, Project, SceneObject
 from app.files import ProjectFiles, delete_folder
-from app.jobs.plans import NAMES
+from app.jobs.plans import INPUTS, NAMES
 from app.jobs.rows import Finisher
 from r2c2r_core.errors import ExportFailed
 from r2c2r_core.schema.prompts import PromptsFile, PromptsFileObject
@@ -92,8 +92,11 @@ def _delete_what_was_read(files: ProjectFiles) -> None:
 
 
 def run_files(session: Session, job: Job, project: Project, files: ProjectFiles) -> KeptBundle:
-    """Store the bundle as a version, and the prompts of the workspace's masks."""
-    write_atomically(files.finished_prompts, files.request(job.id or 0).with_name("prompts.json").read_bytes())
+    """Store the bundle as a version, and the prompts of the workspace's masks and the inputs of its objects."""
+    request = files.request(job.id or 0)
+    write_atomically(files.finished_prompts, request.with_name("prompts.json").read_bytes())
+    if (inputs := request.with_name(INPUTS)).is_file():  # missing beside requests of older versions
+        write_atomically(files.finished_inputs, inputs.read_bytes())
     return keep_bundle(session, project, files)
 
 

@@ -59,6 +59,7 @@ def commands_of(settings: Settings) -> Commands:
 
 
 NAMES = "names.json"  # beside a request: names of the objects in the run, by number
+INPUTS = "inputs.json"  # beside a request: key of the inputs of each object in the run, by name
 
 Planner = Callable[[Job, Project, ProjectFiles, Commands], list[Step]]
 
@@ -106,6 +107,7 @@ def request_of(session: Session, job: Job, project: Project, files: ProjectFiles
     write_json(path.with_name("prompts.json"), prompts)
     write_json(path.with_name("overrides.json"), _placed_overrides(overrides, files))
     write_json(path.with_name(NAMES), named)
+    write_json(path.with_name(INPUTS), _inputs_of(session, job.project_id, prompts, now))
     write_json(path, request)
     return request
 
@@ -116,6 +118,13 @@ def _prompts_of(session: Session, job: Job, files: ProjectFiles) -> dict[str, An
     if not about or not files.finished_prompts.is_file():
         return None
     return corrected_prompts(session, job.project_id, json.loads(files.finished_prompts.read_text()), about)
+
+
+def _inputs_of(session: Session, project_id: str, used: dict[str, Any], now: dict[str, Any]) -> dict[str, str]:
+    """Key of each object's inputs, by name; empty where the run uses older prompts of it."""
+    older, newer = ({entry["name"]: entry for entry in document["objects"]} for document in (used, now))
+    same = {item.name: older.get(item.name) == newer.get(item.name) for item in live_objects(session, project_id)}
+    return {item.name: item.inputs if same[item.name] else "" for item in live_objects(session, project_id)}
 
 
 def _names(document: dict[str, Any]) -> set[str]:

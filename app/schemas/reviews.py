@@ -136,6 +136,7 @@ class CandidateGroup(Shape):
     candidates: list[Candidate]
     placement: Placement | None
     override: "OverrideData"
+    changed: bool  # since the last run: placement and scene are older
     version: int  # increased by every verdict, correction and undo of them
     can_undo: bool
     can_redo: bool

@@ -37,6 +37,7 @@ class SceneItem(Shape):
     warnings: list[str]
     colour: list[float]  # RGB 0..1, of parts without a mesh
     override: OverrideData  # current corrections, including those since the last run
+    changed: bool  # since the last run: all but `override` is older
 
 
 class LeftOut(Shape):

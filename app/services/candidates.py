@@ -1,5 +1,6 @@
 """Candidates of each object with evidence, choice and user verdicts."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,6 +11,7 @@ from app import schemas
 from app.db import history, queries
 from app.db.tables import Project, SceneObject, Verdict
 from app.errors import NotFound
+from app.file_cache import FileCache
 from app.files import ProjectFiles
 from app.jobs.plain import plain
 from app.services import views
@@ -84,6 +86,7 @@ def _group(
         candidates=[_candidate(entry, verdicts.get(entry["candidate_id"]), address, version) for entry in facts["candidates"]],
         placement=_placement(placement) if placement else None,
         override=override_shape(override),
+        changed=changed_since(files, item),
         version=said.versions.get(item.id, 0),
         can_undo=steps.undo,
         can_redo=steps.redo,
@@ -138,6 +141,16 @@ def override_shape(data: dict[str, Any]) -> schemas.OverrideData:
     """The corrections for display, with an uploaded mesh's name instead of its path."""
     shown = {"candidate": Path(data["candidate"]).name} if data.get("candidate") else {}
     return schemas.OverrideData.model_validate({**data, **shown})
+
+
+def changed_since(files: ProjectFiles, item: SceneObject) -> bool:
+    """Whether the object was changed since the last run; False where no run recorded its inputs."""
+    path = files.finished_inputs
+    known = _INPUTS.get(path, lambda: json.loads(path.read_text()), lambda found, _: 100 * len(found))
+    return known is not None and known.get(item.result_name, "") != item.inputs
+
+
+_INPUTS: FileCache[dict[str, str]] = FileCache(4 << 20)
 
 
 def facts_of(files: ProjectFiles, name: str) -> dict[str, Any] | None:

@@ -17,7 +17,7 @@ from app.file_cache import FileCache
 from app.files import ProjectFiles
 from app.jobs.plain import plain
 from app.services import views
-from app.services.candidates import override_shape
+from app.services.candidates import changed_since, override_shape
 from app.services.context import Context
 from r2c2r_core.model.scene import ArticulatedScene
 from r2c2r_core.model.track import MaskTrack
@@ -119,6 +119,7 @@ def _item(entry: dict[str, Any], item: SceneObject | None, files: ProjectFiles, 
         warnings=entry["warnings"],
         colour=entry["colour"],
         override=override_shape(override),
+        changed=item is not None and changed_since(files, item),
     )
 
 

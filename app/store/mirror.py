@@ -36,7 +36,7 @@ UNNAMED = timedelta(hours=1)  # minimum age of an unreferenced object to be dele
 _MADE_ANEW = ("previews", "logs")  # not stored: recreated on demand; published while written: keep_log
 _RECORDING = "source/"
 _CLICKS_BESIDE_IT = "source/prompts.json"  # of a sample: read when it becomes a project
-_MADE_BY_JOBS = ("work/", "bundles/", "variants/", "requests/", "finished-prompts.json")
+_MADE_BY_JOBS = ("work/", "bundles/", "variants/", "requests/", "finished-prompts.json", "finished-inputs.json")
 _HALF_MADE = "half-made"
 
 

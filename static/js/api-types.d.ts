@@ -182,6 +182,7 @@ export interface CandidateGroup {
   candidates: Candidate[];
   placement: Placement | null;
   override: OverrideData;
+  changed: boolean;
   version: number;
   can_undo: boolean;
   can_redo: boolean;
@@ -1235,6 +1236,7 @@ export interface SceneItem {
   warnings: string[];
   colour: number[];
   override: OverrideData;
+  changed: boolean;
 }
 
 /** One joint; 0 is closed, positive opens. Angles in radians, lengths in metres. */
@@ -1453,7 +1455,7 @@ export interface TrueObject {
   same_category: boolean | null;
 }
 
-/** Target of an undo or redo: the last change of this object, or of any object when None. */
+/** Target of an undo or redo: the last change of this object, or this person's last one of any object when None. */
 export interface UndoRequest {
   object?: number | null;
   scope?: "prompts" | "review";

@@ -68,6 +68,23 @@ def test_the_mesh_and_thumbnail_of_a_candidate_are_served_as_immutable(reviewed:
     assert web.client.get(f"/media/{project}/candidates/{number}/c9.glb").status_code == 404
 
 
+def test_results_older_than_a_correction_are_marked_until_the_next_run(reviewed: Reviewed) -> None:
+    web, project, number = reviewed
+    base = f"/api/projects/{project}"
+
+    def changed() -> tuple[bool, bool]:
+        return web.get(f"{base}/candidates")[0]["changed"], web.get(f"{base}/scene")["items"][0]["changed"]
+
+    assert changed() == (False, False)
+    web.patch(f"{base}/objects/{number}/override", {"hinge": "left", "rerun": False})
+    assert changed() == (True, True)
+    web.post(f"{base}/undo", {"object": number, "scope": "review"})
+    assert changed() == (False, False)
+    web.patch(f"{base}/objects/{number}/override", {"hinge": "left", "rerun": False})
+    web.job(run(web, project), "done")
+    assert changed() == (False, False)
+
+
 def test_accepting_the_chosen_candidate_needs_no_run(reviewed: Reviewed) -> None:
     web, project, number = reviewed
     said = web.post(
