@@ -84,6 +84,15 @@ def test_sixty_objects_are_grouped_locked_and_edited_together(new_context: NewCo
     expect(page.get_by_label("Name of jar_1")).to_be_visible()
     page.get_by_role("button", name="Delete jar_1").click()
     wait_for_toast(page, "Deleted jar_1")
+    page.get_by_label("Which objects").select_option("all")
+    page.get_by_role("button", name="mug_1", exact=True).click()
+    page.get_by_role("button", name="Delete mug_2", exact=True).click()
+    wait_for_toast(page, "Deleted mug_2; undo brings it back")
+    page.keyboard.press("Control+z")
+    wait_for_toast(page, "Undone: deleted mug_2")  # not the chosen object's own last change
+    page.get_by_role("button", name=re.compile(", mug_3$")).click()
+    expect(page.get_by_role("button", name="mug_3", exact=True)).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_label("Name of mug_3")).to_be_visible()  # one object ticked by its circle is the chosen one
 
 
 def test_projects_are_searched_and_sorted(new_context: NewContext, server: Server) -> None:

@@ -4,6 +4,7 @@ from playwright.sync_api import FloatRect, Page, expect
 
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of
+from tests.browser.test_scene_tools import ask
 from tests.browser.test_together import FRAME, click_frame, ready, rows, sample
 from tests.browser.together import Server, signed_in
 
@@ -56,6 +57,21 @@ def test_appearing_elements_do_not_move_the_picture(new_context: NewContext, ser
         assert abs(banner["x"] + banner["width"] / 2 - 640) <= 1  # px
     assert box_of(canvas) == first
     picture(page, "offline")
+
+
+def test_pages_opened_during_the_import_wake_when_it_ends(new_context: NewContext, server: Server) -> None:
+    page = signed_in(new_context(), server, "ann")
+    project = sample(page)
+    early = {"kind": "not-ready", "message": "the recording has not been read yet", "hint": "wait for the import"}
+    for path, asked in (("annotate", "**/frames"), ("elevation", "**/live/open")):
+        page.route(asked, lambda route: route.fulfill(status=409, json=early))
+        page.goto(f"{project}/{path}")
+        expect(page.locator(".tip")).to_contain_text("has not been read yet")
+        page.unroute(asked)
+        ask(page, "PATCH", f"/api/projects/{project.split('/p/')[1]}", {"tags": [path]})  # the end of an import is told so
+        expect(page.locator(".tip")).not_to_contain_text("has not been read yet")
+        ready(page)
+        expect(page.locator(".toast.bad")).to_have_count(0)
 
 
 def test_a_moved_panel_separator_keeps_its_position_after_a_reload(new_context: NewContext, server: Server) -> None:

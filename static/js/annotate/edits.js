@@ -126,9 +126,9 @@ export class Edits extends EventTarget {
   /**
    * @param {number} id
    * @param {{ name?: string, category?: string, assignee?: string | null, crop?: import("../api-types").PromptsFileCrop | null }} wanted
+   * @param {SceneObject | null} seen the object as the user saw it when changing it
    */
-  patch(id, wanted) {
-    const seen = this.#objects.get(id);
+  patch(id, wanted, seen = this.#objects.get(id)) {
     return seen ? this.#tell(changes.changeObject(this.project, seen, wanted)) : Promise.resolve(false);
   }
 
@@ -194,15 +194,12 @@ export class Edits extends EventTarget {
   }
 
   /**
-   * Undo or redo the latest change of the chosen object, or else of the project.
+   * Undo or redo the user's newest change of the project, whichever object is chosen.
    * @param {"undo" | "redo"} which
    * @param {number | undefined} frame shown
    */
   undoRedo(which, frame) {
-    const { chosen } = this.#objects;
-    const mine = which === "undo" ? chosen?.can_undo : chosen?.can_redo;
-    const wanted = { object: mine ? (chosen?.id ?? null) : null };
-    this.save(changes.undoRedo(this.project, which, wanted)).then(
+    this.save(changes.undoRedo(this.project, which, { object: null })).then(
       ({ object, text, frame: at }) => {
         this.#say("object", { object });
         const where = at !== null && at !== frame ? ` (frame ${at})` : "";

@@ -108,10 +108,12 @@ export class SceneObjects extends EventTarget {
     return this.#selected.has(id);
   }
 
-  /** Select exactly these objects. @param {number[]} ids */
+  /** Select exactly these objects; a single one is also chosen, as it is the one that tools are meant for. @param {number[]} ids */
   select(ids) {
     this.#selected = new Set(ids);
-    this.#say("change");
+    const [only] = ids;
+    if (ids.length === 1 && only !== undefined && only !== this.#current) this.choose(only);
+    else this.#say("change");
   }
 
   /** Store the response to a change, unless the live connection has delivered a newer version. @param {SceneObject} object */
@@ -130,6 +132,7 @@ export class SceneObjects extends EventTarget {
   /** @param {number | null} id */
   choose(id) {
     this.#current = id !== null && this.#all.has(id) ? id : null;
+    if (this.#selected.size === 1 && !this.#selected.has(this.#current ?? NaN)) this.#selected.clear();
     this.#say("choose");
     this.#say("change");
   }

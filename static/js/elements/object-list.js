@@ -1,6 +1,6 @@
 /**
  * List of a project's objects. Emits "pick-object" id|null (null: a new one), "choose-several" ids, "find-alike" id,
- * "rename" {id, name, version}, "categorise" {id, category, version}, "rename-all" {ids, name},
+ * "rename" {seen, name}, "categorise" {seen, category} with the object as the user saw it, "rename-all" {ids, name},
  * "categorise-all" {ids, category}, "assign" {ids, name}, "hide" ids, "lock" ids, "delete" ids, "stop" id,
  * "merge" {id, other}. A row is rebuilt only when its content changes, and painted once it is visible.
  */
@@ -256,20 +256,27 @@ export class ObjectList extends LiveElement {
 
   /** @param {SceneObject} object */
   #fields(object) {
-    /** @type {(field: string, label: string, value: string, props?: Record<string, string>) => HTMLElement} */
-    const field = (name, label, value, props = {}) => {
-      const input = h("input", { type: "text", value, "aria-label": `${label} of ${object.name}`, ...props });
+    let seen = object; // as of this row, which is not redrawn while somebody types in it
+    /** @type {(field: "name" | "category", label: string, props?: Record<string, string>) => HTMLElement} */
+    const field = (name, label, props = {}) => {
+      const input = h("input", {
+        type: "text",
+        value: seen[name],
+        "aria-label": `${label} of ${object.name}`,
+        ...props,
+      });
       input.dataset.at = `${name}:${object.id}`;
       input.addEventListener("change", () => {
         input.value = name === "name" ? usableName(input.value) : input.value.trim();
-        input.value ||= value; // nothing typed can be part of a name
-        if (input.value === value) return;
+        input.value ||= seen[name]; // nothing typed can be part of a name
+        if (input.value === seen[name]) return;
         const type = name === "name" ? "rename" : "categorise";
-        this.emit(type, { id: object.id, [name]: input.value, version: object.version });
+        this.emit(type, { seen, [name]: input.value });
+        seen = { ...seen, [name]: input.value };
       });
       input.addEventListener("keydown", (event) => {
         if (event.key === "Enter") input.blur();
-        if (event.key === "Escape") input.value = value;
+        if (event.key === "Escape") input.value = seen[name];
       });
       return h("label", {}, h("span", { class: "muted" }, label), input);
     };
@@ -279,8 +286,8 @@ export class ObjectList extends LiveElement {
     return h(
       "div",
       { class: "fields" },
-      field("category", "Category", object.category, { list: "categories" }),
-      field("name", "Name", object.name),
+      field("category", "Category", { list: "categories" }),
+      field("name", "Name"),
       this.#assigning(object),
       find,
     );

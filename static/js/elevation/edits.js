@@ -137,15 +137,19 @@ export class FrontEdits {
     return this.pick(made?.key ?? null, null, false);
   }
 
-  /** Rename the chosen fronts; several are numbered from left to right and top to bottom. @param {string} name */
-  async name(name) {
+  /**
+   * Rename the chosen fronts; several are numbered from left to right and top to bottom.
+   * @param {string} name
+   * @param {Front | null} seen the leading front as it was when typing began
+   */
+  async name(name, seen) {
     const chosen = new Set(this.#fronts.chosen.map(({ key }) => key));
     await outbox.settled; // new fronts get their names from the server
     const mine = rows.inOrder(this.#view.here.filter(({ key }) => chosen.has(key)));
     const taken = this.#fronts.all.filter(({ key }) => !chosen.has(key)).map((front) => front.name);
     const change = rows.renamed(mine, name, taken).flatMap(({ key, name }) => {
       const front = this.#fronts.get(key);
-      return front ? [{ front, wanted: { name } }] : [];
+      return front ? [{ front, wanted: { name }, ...(seen?.key === key && seen.id !== null ? { seen } : {}) }] : [];
     });
     this.#fronts.do({ change });
   }

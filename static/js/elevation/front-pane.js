@@ -1,6 +1,7 @@
 /**
  * Pane with the properties of the leading front and the list of fronts on the plane. Emits "choose" key, "size" {side, metres},
- * "category", "name", "hinge" and "handle" with the new value, "divide" {way, text}, "next", "copy" and "adopt".
+ * "category", "hinge" and "handle" with the new value, "name" {name, seen} with the front as it was when typing began, "divide"
+ * {way, text}, "next", "copy" and "adopt".
  */
 
 import { h, renew } from "../dom.js";
@@ -51,6 +52,8 @@ export class FrontPane extends EventTarget {
   element = h("aside", { class: "fronts", "aria-label": "Fronts" }, this.#fields, this.#copy, this.#adopt, this.#list);
   /** @type {Placed | null} */
   #shown = null;
+  /** The front as it was when typing of its name began. @type {Placed | null} */
+  #named = null;
 
   constructor() {
     super();
@@ -58,8 +61,9 @@ export class FrontPane extends EventTarget {
     this.#field(this.#height, () => this.#size(this.#height, "height"));
     this.#field(this.#name, () => {
       this.#name.value = usableName(this.#name.value);
-      if (this.#name.value) this.#say("name", this.#name.value);
+      if (this.#name.value) this.#say("name", { name: this.#name.value, seen: this.#named });
     });
+    this.#name.addEventListener("focus", () => (this.#named = this.#shown && { ...this.#shown }));
     this.#field(this.#across, () => this.#divide(this.#across, "upright"));
     this.#field(this.#down, () => this.#divide(this.#down, "level"));
     this.#category.addEventListener("change", () => this.#say("category", this.#category.value));

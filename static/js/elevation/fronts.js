@@ -118,14 +118,15 @@ export class Fronts extends EventTarget {
 
   /**
    * Create, change and remove fronts as one gesture; a gesture without effect is not recorded for undo.
-   * @param {{ make?: Making[], change?: { front: Front, wanted: Wanted }[], remove?: Front[] }} gesture
+   * @param {{ make?: Making[], change?: { front: Front, wanted: Wanted, seen?: Front }[], remove?: Front[] }} gesture `seen`:
+   *   a front as the user saw it, where another person may have changed it since
    * @returns {Front[]} the new fronts
    */
   do({ make = [], change = [], remove = [] }) {
     const changed = change.filter(({ front, wanted }) => isNews(front, wanted));
     if (!make.length && !changed.length && !remove.length) return [];
     const made = make.map((one) => this.#make(one));
-    for (const { front, wanted } of changed) this.#change(front, wanted);
+    for (const { front, wanted, seen } of changed) this.#change(front, wanted, seen);
     for (const front of remove) this.#remove(front);
     this.#done.push([
       ...changed.map(({ front }) => front.key),
@@ -207,9 +208,9 @@ export class Fronts extends EventTarget {
   /** References used in addresses for objects not stored yet, by front key. @type {Map<string, string>} */
   #refs = new Map();
 
-  /** @param {Front} front @param {Wanted} wanted */
-  #change(front, wanted) {
-    const seen = { name: front.name, category: front.category, front: front.drawn ? drawnOf(front) : null };
+  /** @param {Front} front @param {Wanted} wanted @param {Front} [known] the front as the user saw it */
+  #change(front, wanted, known = front) {
+    const seen = { name: known.name, category: front.category, front: front.drawn ? drawnOf(front) : null };
     Object.assign(front, wanted.category === undefined ? {} : { category: wanted.category });
     if (wanted.name !== undefined) front.name = wanted.name;
     if (wanted.front) {
@@ -219,7 +220,7 @@ export class Fronts extends EventTarget {
       front.drawn = true;
     }
     const ref = front.id ?? this.#refs.get(front.key) ?? "";
-    const version = front.id === null ? undefined : front.version + front.pending;
+    const version = front.id === null ? undefined : known.version + front.pending;
     front.pending += 1;
     this.#follow(front, this.#send(changes.changeFront(this.project, ref, wanted, version, seen)));
   }

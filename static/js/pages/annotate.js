@@ -29,6 +29,7 @@ import { live } from "../live.js";
 import { outbox } from "../outbox.js";
 import { remember } from "../router.js";
 import { offerToSkip } from "../skip.js";
+import { Waking } from "../waking.js";
 
 /** @typedef {import("../api-types").Comment} Comment */
 /** @typedef {import("../api-types").SceneObject} SceneObject */
@@ -40,6 +41,10 @@ export class AnnotatePage extends LiveElement {
   #objects = new SceneObjects();
   #masks = new LiveMasks();
   #meanwhile = new Meanwhile();
+  #waking = new Waking(
+    () => this.#load(),
+    (why) => this.#tip.say(why),
+  );
   #contradictions = new Contradictions(this.#objects, this.#masks);
   #edits = new Edits(this.#objects);
   /** @type {string[]} */
@@ -114,7 +119,7 @@ export class AnnotatePage extends LiveElement {
     offerToSkip("Skip to the picture", this.#canvas, this.signal);
     this.#listen();
     this.#player.showFirst(this.project);
-    this.#load();
+    this.#waking.begin(this.signal);
   }
 
   /** @param {string} action */
@@ -192,11 +197,11 @@ export class AnnotatePage extends LiveElement {
     this.#on(list, "merge", ({ id, other }) => this.#edits.merge(id, other));
     this.#on(list, "find-alike", () => this.act("alike"));
     this.#on(list, "stop", (id) => this.#edits.stopSegmenting(id));
-    this.#on(list, "rename", ({ id, name }) => this.#edits.patch(id, { name }));
-    this.#on(list, "categorise", ({ id, category }) => this.#categorise(category, id));
+    this.#on(list, "rename", ({ seen, name }) => this.#edits.patch(seen.id, { name }, seen));
+    this.#on(list, "categorise", ({ seen, category }) => this.#edits.patch(seen.id, { category }, seen));
     this.#on(proposals, "proposals-changed", () => (this.#picture.drawProposals(), this.#drawTip()));
     this.#on(proposals, "show-frame", (index) => this.#player.seekFrame(index));
-    this.#on(proposals, "confirming", () => this.#objects.choose(null)); // at once, so that undo applies to the new objects
+    this.#on(proposals, "confirming", () => this.#objects.choose(null)); // the next click is not for the object chosen before
     this.#on(proposals, "objects-made", (objects) => this.#adopt(objects));
     this.#on(comments, "comments", () => this.#picture.drawPins());
     this.#on(comments, "show-comment", (comment) => this.#showComment(comment));
@@ -220,11 +225,11 @@ export class AnnotatePage extends LiveElement {
     this.#on(live, "object", ({ object }) => {
       if (object.project === this.project) this.#meanwhile.take(() => this.#objects.store(object));
     });
-    this.#on(live, "project", () => this.#player.frame && this.#relist().catch(sayError));
+    this.#on(live, "project", () => this.#waking.loaded && this.#relist().catch(sayError));
     this.#on(live, "parted", ({ name, others }) => say(partedText(name, others)));
     this.#on(live, "live", ({ status }) => this.#tools.segmenter.show(status));
-    this.#on(live, "hello", ({ reset }) => reset && this.#player.frame && this.#begunAnew());
-    this.#on(outbox, "caught-up", () => this.#player.frame && this.#reload().catch(sayError));
+    this.#on(live, "hello", ({ reset }) => reset && this.#waking.loaded && this.#begunAnew());
+    this.#on(outbox, "caught-up", () => this.#waking.loaded && this.#reload().catch(sayError));
   }
 
   /**
@@ -243,29 +248,24 @@ export class AnnotatePage extends LiveElement {
 
   async #load() {
     this.#tip.say("Loading the frames…");
-    try {
-      const [project, frames, system, names] = await Promise.all([
-        api.getProject(this.project, this.signal),
-        api.listFrames(this.project),
-        api.getSystem(),
-        api.listNames(this.project),
-      ]);
-      if (system.account) this.#pane.me = system.user;
-      this.#pane.checklist.listed = project.checklist;
-      this.#names = names;
-      this.#pane.list.setNames(names);
-      this.#objects.palette = system.palette;
-      this.#categories = system.categories.map((category) => category.name);
-      this.#pane.list.setCategories(system.categories);
-      this.#player.fill(this.project, project.media_version, frames);
-      this.#player.seekFrame(Number(this.query.get("frame") ?? -1));
-      await this.#reload();
-      this.#objects.choose(this.query.has("object") ? Number(this.query.get("object")) : null);
-      await this.#tools.segmenter.open(api.openLive(this.project));
-    } catch (error) {
-      this.#tip.say(error instanceof Error ? error.message : String(error));
-      sayError(error);
-    }
+    const [project, frames, system, names] = await Promise.all([
+      api.getProject(this.project, this.signal),
+      api.listFrames(this.project),
+      api.getSystem(),
+      api.listNames(this.project),
+    ]);
+    if (system.account) this.#pane.me = system.user;
+    this.#pane.checklist.listed = project.checklist;
+    this.#names = names;
+    this.#pane.list.setNames(names);
+    this.#objects.palette = system.palette;
+    this.#categories = system.categories.map((category) => category.name);
+    this.#pane.list.setCategories(system.categories);
+    this.#player.fill(this.project, project.media_version, frames);
+    this.#player.seekFrame(Number(this.query.get("frame") ?? -1));
+    await this.#reload();
+    this.#objects.choose(this.query.has("object") ? Number(this.query.get("object")) : null);
+    await this.#tools.segmenter.open(api.openLive(this.project));
   }
 
   async #reload() {

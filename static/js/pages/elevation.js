@@ -18,6 +18,7 @@ import * as plane from "../lib/elevation.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
 import { remember } from "../router.js";
+import { Waking } from "../waking.js";
 
 /** @typedef {import("../elevation/fronts.js").Front} Front */
 
@@ -38,6 +39,10 @@ export class ElevationPage extends LiveElement {
   #segmenter = new SegmenterChip();
   #saved = h("span", { class: "chip", role: "status" });
   #tip = h("p", { class: "tip" });
+  #waking = new Waking(
+    () => this.#load(),
+    (why) => this.#tell(why),
+  );
   /** @type {string[]} */
   #palette = ["#e69f00"];
   #commands = new Commands(
@@ -75,7 +80,7 @@ export class ElevationPage extends LiveElement {
     this.replaceChildren(h("div", { class: "elevation" }, this.#planes.element, stage, this.#pane.element));
     this.#canvas.snap = (side, at, rect, key, reach) => this.#view.snap(side, at, rect, key, reach);
     this.#listen();
-    this.#load();
+    this.#waking.begin(this.signal);
   }
 
   /** @param {string} action */
@@ -106,7 +111,7 @@ export class ElevationPage extends LiveElement {
     on(this.#pane, "category", (category) =>
       this.#edits.change((front) => front.category !== category && { category }),
     );
-    on(this.#pane, "name", (name) => this.#edits.name(name));
+    on(this.#pane, "name", ({ name, seen }) => this.#edits.name(name, seen));
     on(this.#pane, "divide", ({ way, text }) => this.#edits.divide(way, text));
     on(this.#pane, "next", () => this.#edits.next(1));
     on(this.#pane, "hinge", (hinge) =>
@@ -119,7 +124,7 @@ export class ElevationPage extends LiveElement {
     on(this.#pane, "adopt", () => this.act("adopt-cut"));
     on(live, "live", ({ status }) => {
       this.#segmenter.show(status);
-      if (status.state === "ready") this.#reload(true).catch(sayError); // the planes may have changed
+      if (status.state === "ready" && this.#waking.loaded) this.#reload(true).catch(sayError); // the planes may have changed
     });
     on(live, "object", ({ object }) => object.project === this.project && (this.#fronts.take(object), this.#draw()));
     on(live, "segment", ({ state }) => state === "done" && this.#reload().catch(sayError));
@@ -129,15 +134,10 @@ export class ElevationPage extends LiveElement {
 
   async #load() {
     this.#tell("Loading the planes…");
-    try {
-      const [system] = await Promise.all([api.getSystem(), this.#segmenter.open(api.openLive(this.project))]);
-      this.#palette = system.palette;
-      this.#pane.setCategories(system.categories);
-      await this.#reload();
-    } catch (error) {
-      this.#tell(error instanceof Error ? error.message : String(error));
-      sayError(error);
-    }
+    const [system] = await Promise.all([api.getSystem(), this.#segmenter.open(api.openLive(this.project))]);
+    this.#palette = system.palette;
+    this.#pane.setCategories(system.categories);
+    await this.#reload();
   }
 
   #loading = Promise.resolve();
