@@ -7,6 +7,7 @@
  */
 
 import { ApiError, perform } from "./api.js";
+import { rebased } from "./changes.js";
 import { forget, isChange, keep, keptBy, named } from "./lib/kept.js";
 import { Tabs } from "./lib/tabs.js";
 import { live } from "./live.js";
@@ -178,9 +179,8 @@ export class Outbox extends EventTarget {
     forget(localStorage, change);
     this.#waiting = this.#waiting.filter((one) => one.key !== change.key);
     const id = /** @type {{ id?: unknown } | null} */ (answer)?.id;
-    if (typeof id !== "number") return;
     this.#waiting = this.#waiting.map((one) => {
-      const known = named(one, change.key, id);
+      const known = rebased(typeof id === "number" ? named(one, change.key, id) : one, change, answer);
       if (known !== one) keep(localStorage, known);
       return known;
     });

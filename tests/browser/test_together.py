@@ -113,6 +113,19 @@ def test_clicks_survive_undo_conflicts_lost_connections_and_server_crashes(peopl
     for page in people:
         expect(page.get_by_role("button", name="cup_of_ann", exact=True)).to_be_visible()
 
+    # a name typed while somebody else renames the object
+    pick(bea, "cup_of_ann")
+    field = bea.get_by_label("Name of cup_of_ann")
+    field.fill("glass_of_bea")
+    rename(ann, "cup_of_ann", "glass_of_ann")
+    expect(bea.get_by_role("img", name=re.compile("^glass_of_ann: seen"))).to_be_visible()  # her tab knows it
+    field.press("Enter")
+    merge = bea.get_by_role("dialog", name=re.compile("changed twice"))
+    expect(merge).to_contain_text("glass_of_ann")
+    merge.get_by_role("button", name="Leave theirs").click()
+    for page in people:
+        expect(page.get_by_role("button", name="glass_of_ann", exact=True)).to_be_visible()
+
     # the server dies; later clicks are sent once it is back, even from a page that was closed
     stored(ann)
     server.kill()
@@ -171,7 +184,9 @@ def test_two_people_take_a_project_from_draft_to_approval(people: tuple[Page, Pa
     bea.goto(f"{project}/review")
     viewed(bea)
     move(bea, "Start the review")
-    move(bea, "Request changes", "answer the comment")
+    asks = "button => (button.click(), document.querySelector('dialog[open]') !== null)"
+    assert bea.get_by_role("button", name="Request changes", exact=True).evaluate(asks)  # what is typed next is the reason
+    say(bea, "Request changes", "answer the comment")
     expect(ann.locator("r2c2r-review-state")).to_contain_text("answer the comment")
     ann.get_by_role("button", name=re.compile("^Resolve")).click()
     expect(ann.locator("r2c2r-comments")).to_contain_text("No open comments.")  # rebuilt together with the steps
@@ -197,6 +212,7 @@ def test_two_people_take_a_project_from_draft_to_approval(people: tuple[Page, Pa
     ann.get_by_role("button", name="Reject", exact=True).first.click()
     say(ann, "Reject", "looks too small")
     expect(reject_c0(ann)).to_have_attribute("aria-pressed", "true")
+    expect(ann.locator(".review > aside")).to_contain_text("of c0, which is no longer used")  # the figures below it
     bea.context.set_offline(False)
     merge = bea.get_by_role("dialog", name="drawer_1 was changed twice")
     expect(merge.get_by_role("row", name=re.compile("^Verdict"))).to_contain_text("rejected c0")

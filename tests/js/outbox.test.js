@@ -144,6 +144,29 @@ test("a change in conflict with another user's is merged and sent with a new key
   assert.notEqual(asked[0].key, asked[1].key);
 });
 
+test("a second verdict given before the first is stored is based on the first, and is no conflict with oneself", async () => {
+  const { giveVerdict } = await import("../../static/js/changes.js");
+  const candidates = [{ id: "c0", verdict: null }];
+  const seen = { object: 4, version: 7, candidates };
+  const group = {
+    version: 8,
+    override: {},
+    candidates: [{ id: "c0", verdict: "accepted" }],
+  };
+  const asked = serve(
+    { body: { text: "", group } },
+    { body: { text: "", group: { ...group, version: 9 } } },
+  );
+  const give = (verdict) =>
+    outbox.send(giveVerdict("p", seen, { candidate: "c0", verdict }));
+  const waiting = Promise.all([give("accepted"), give("rejected")]);
+  await waiting;
+  assert.deepEqual(
+    asked.map(({ body }) => body.version),
+    [7, 8],
+  );
+});
+
 test("a correction merges with another user's correction of a different field and takes over its version", async () => {
   globalThis.HTMLElement ??= class {};
   const { merged } = await import("../../static/js/conflict.js");

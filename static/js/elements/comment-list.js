@@ -17,6 +17,8 @@ export class CommentList extends LiveElement {
   project = "";
   /** @type {Comment[]} */
   #all = [];
+  /** People who can be mentioned. @type {string[]} */
+  #names = [];
   #answers = new Answers();
   #settled = h("input", { type: "checkbox" });
   #heading = h("h2", {}, "Comments");
@@ -28,6 +30,7 @@ export class CommentList extends LiveElement {
     this.#settled.addEventListener("change", () => this.#draw(), { signal: this.signal });
     live.addEventListener("comments", () => this.load(), { signal: this.signal });
     this.load();
+    if (this.project) this.#learnNames();
   }
 
   async load() {
@@ -47,18 +50,25 @@ export class CommentList extends LiveElement {
     return this.#all.filter((comment) => comment.resolved_at === null);
   }
 
+  async #learnNames() {
+    this.#names = await listNames(this.project).catch(() => this.#names); // comments work without mentions
+  }
+
   /**
-   * Ask for a comment's text, then store it at a pin.
+   * Ask for a comment's text, then store it at a pin. The box opens before the key or click returns: what is typed next must
+   * not run as shortcuts.
    * @param {Partial<CommentIn>} pin
    * @param {string} about
+   * @param {Promise<CommentIn["view"] | null> | null} view of the 3D view, if it is shown
    */
-  async ask(pin, about) {
-    const names = await listNames(this.project).catch(() => []); // comments work without mentions
+  async ask(pin, about, view = null) {
+    const names = this.#names;
+    this.#learnNames();
     const label = names.length ? "What should change? @ mentions somebody" : "What should change?";
     const text = await askForText(`Comment on ${about}`, label, { button: "Comment", names });
     if (!text) return;
     try {
-      await outbox.send(addComment(this.project, { ...pin, text }));
+      await outbox.send(addComment(this.project, { ...pin, view: await view, text }));
       say("Comment stored", { kind: "good" });
       this.load();
     } catch (error) {

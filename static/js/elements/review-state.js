@@ -1,6 +1,6 @@
 /** Review state of a project: who set it, and the possible transitions with their unmet conditions. */
 
-import { ApiError, getFigures, getReview, stepReview } from "../api.js";
+import { ApiError, getFigures, getReview, getSystem, stepReview } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
 import { Answers } from "../lib/answers.js";
 import { ago, duration } from "../lib/format.js";
@@ -25,15 +25,16 @@ export class ReviewState extends LiveElement {
   connected() {
     this.replaceChildren(this.#body);
     const { signal } = this;
-    for (const type of ["project", "review", "comments"]) live.addEventListener(type, () => this.load(), { signal });
+    for (const type of ["project", "review", "comments", "you"])
+      live.addEventListener(type, () => this.load(), { signal });
     this.load();
   }
 
   async load() {
     if (!this.project) return;
     try {
-      const both = Promise.all([getReview(this.project), getFigures(this.project)]);
-      await this.#answers.take(both, ([status, figures]) => this.#draw(status, figures));
+      const all = Promise.all([getReview(this.project), getFigures(this.project), getSystem()]);
+      await this.#answers.take(all, ([status, figures, { role }]) => this.#draw(status, figures, role));
     } catch (error) {
       sayError(error);
     }
@@ -42,14 +43,15 @@ export class ReviewState extends LiveElement {
   /**
    * @param {ReviewStatus} status
    * @param {Figures} figures
+   * @param {string} role of the user
    */
-  #draw(status, figures) {
+  #draw(status, figures, role) {
     const by = status.at ? `${status.who}, ${ago(status.at, Date.now() / 1000)}` : "";
     renew(
       this.#body,
       h("div", { class: "row" }, stateChip(status.state), h("span", { class: "muted" }, by)),
       status.reason ? h("p", { class: "said" }, status.reason) : "",
-      ...status.moves.map((move) => this.#move(status, move)),
+      ...status.moves.map((move) => this.#move(status, move, role)),
       h("p", { class: "muted" }, cost(figures)),
     );
   }
@@ -57,35 +59,40 @@ export class ReviewState extends LiveElement {
   /**
    * @param {ReviewStatus} status
    * @param {ReviewMove} move
+   * @param {string} role of the user
    */
-  #move(status, move) {
-    const onward = PLACES[move.to] > PLACES[status.state] && !move.unmet.length;
-    const button = h("button", { type: "button", class: onward ? "primary" : "" }, move.text);
+  #move(status, move, role) {
+    const refused = move.role === "reviewer" && role === "annotator" ? "A reviewer does this." : "";
+    const onward = PLACES[move.to] > PLACES[status.state] && !move.unmet.length && !refused;
+    const disabled = refused !== "";
+    const button = h("button", { type: "button", class: onward ? "primary" : "", disabled, title: refused }, move.text);
     button.dataset.at = `move:${move.to}`;
     button.addEventListener("click", () => this.#step(status, move));
-    const lines = [...move.unmet, ...move.notes];
+    const lines = [...(refused ? [refused] : []), ...move.unmet, ...move.notes];
     const unmet = lines.length ? h("ul", { class: "muted unmet" }, ...lines.map((line) => h("li", {}, line))) : null;
     return h("div", {}, button, unmet);
   }
 
   /**
-   * Make a transition once all pending edits are stored; unmet conditions are checked again then.
+   * Make a transition once all pending edits are stored; unmet conditions are checked again then. Where a reason is needed, its
+   * box opens before the click returns: what is typed next must not run as shortcuts.
    * @param {ReviewStatus} seen
    * @param {ReviewMove} wanted
    */
   async #step(seen, wanted) {
-    await outbox.settled;
-    const status = await getReview(this.project).catch(() => seen); // a connection error is reported below
-    const move = (status.state === seen.state && status.moves.find(({ to }) => to === wanted.to)) || wanted;
+    const checked = this.#checked(seen, wanted);
+    const move = asksWhy(wanted) ? wanted : await checked;
     let reason = "";
-    if (move.unmet.length || move.needs_reason) {
-      const label = move.unmet.length
-        ? "Reason for going on with open points (kept in the history)"
-        : "What has to change?";
-      const given = await askForText(move.text, label, { button: move.text, notes: move.unmet });
-      if (!given) return;
+    if (asksWhy(move)) {
+      const label = move.needs_reason
+        ? "What has to change?"
+        : "Reason for going on with open points (kept in the history)";
+      const later = checked.then((now) => ({ notes: now.unmet, required: asksWhy(now) }));
+      const given = await askForText(move.text, label, { button: move.text, notes: move.unmet, later });
+      if (given === null) return;
       reason = given;
     }
+    await outbox.settled;
     try {
       await stepReview(this.project, { from_state: seen.state, to: move.to, reason });
       say(`The project is ${move.to} now`, { kind: "good" });
@@ -95,6 +102,23 @@ export class ReviewState extends LiveElement {
     }
     this.load();
   }
+
+  /**
+   * The wanted step with its conditions as they are once all edits are stored.
+   * @param {ReviewStatus} seen
+   * @param {ReviewMove} wanted
+   * @returns {Promise<ReviewMove>}
+   */
+  async #checked(seen, wanted) {
+    await outbox.settled;
+    const status = await getReview(this.project).catch(() => seen); // a connection error is reported by the step itself
+    return (status.state === seen.state && status.moves.find(({ to }) => to === wanted.to)) || wanted;
+  }
+}
+
+/** Whether a step needs a written reason. @param {ReviewMove} move */
+function asksWhy({ unmet, needs_reason }) {
+  return unmet.length > 0 || needs_reason;
 }
 
 /** @param {Figures} figures */

@@ -1,9 +1,10 @@
 /** Review page: candidates with their evidence, the mesh over photos and scan, the scene with its joints, and verdicts. */
 
-import { detailOf, h, LiveElement, renew } from "../dom.js";
+import { listJobs } from "../api.js";
+import { detailOf, h, LiveElement, renew, spinner } from "../dom.js";
 import { CommentList } from "../elements/comment-list.js";
 import { ReviewState } from "../elements/review-state.js";
-import { say } from "../elements/toasts.js";
+import { say, sayError } from "../elements/toasts.js";
 import { Commands, isForPage } from "../keyboard.js";
 import { stageWord } from "../lib/words.js";
 import { live } from "../live.js";
@@ -47,9 +48,14 @@ export class ReviewPage extends LiveElement {
     const { photos, compare } = this.#centre;
     for (const part of [this.#objects, this.#state, this.#comments, photos, compare]) part.project = this.project;
     const left = h("div", { class: "objects" }, this.#state, this.#nav, this.#comments);
+    this.#nav.replaceChildren(spinner("Loading the objects…"));
+    if (this.query.has("object")) this.#centre.bar.set("photo");
     this.replaceChildren(h("div", { class: "review" }, left, this.#centre.element, this.#panel));
     this.#listen();
-    if (this.query.has("object")) this.#centre.bar.mode = "photo";
+    listJobs(this.project).then((jobs) => {
+      const newest = jobs.find(({ kind }) => kind === "run");
+      if (newest && !this.signal.aborted) this.#tell(newest);
+    }, sayError);
     this.#objects.load(Number(this.query.get("object") ?? -1)).then(() => !this.signal.aborted && this.#centre.open());
   }
 
@@ -85,7 +91,9 @@ export class ReviewPage extends LiveElement {
     on(this.#comments, "comments", (open) => this.#centre.photos.setComments(open));
     on(this.#comments, "show-comment", (comment) => this.#showComment(comment));
     on(live, "review", again);
-    on(live, "hello", ({ reset }) => (reset ? again() : this.#centre.photos.isEmpty && this.#centre.show()));
+    on(live, "hello", ({ reset }) =>
+      reset || !this.#objects.loaded ? again() : this.#centre.photos.isEmpty && this.#centre.show(),
+    );
     on(live, "job", ({ job }) => this.#hear(job));
     on(
       live,
@@ -144,10 +152,10 @@ export class ReviewPage extends LiveElement {
   }
 
   /** @param {Partial<CommentIn>} pin */
-  async #comment(pin = {}) {
+  #comment(pin = {}) {
     const { number, group } = this.#objects;
-    const view = pin.frame === undefined ? await this.#centre.kept().catch(() => null) : null; // none if the viewer is down
-    this.#comments.ask({ ...pin, object: number, view }, group?.name ?? "the project");
+    const view = pin.frame === undefined ? this.#centre.kept().catch(() => null) : null; // none if the viewer is down
+    this.#comments.ask({ ...pin, object: number }, group?.name ?? "the project", view);
   }
 
   /** @param {Comment} comment */
@@ -157,12 +165,18 @@ export class ReviewPage extends LiveElement {
     else if (point) this.#centre.bar.set("scene");
   }
 
+  /** Say how far a run is. @param {Job} job */
+  #tell(job) {
+    const { bar } = this.#centre;
+    this.#centre.running = ["queued", "running"].includes(job.state);
+    bar.job.hidden = !["queued", "running"].includes(job.state);
+    bar.job.textContent = `${stageWord(job.stage) || "waiting"}… ${Math.round(100 * job.progress)} %`;
+  }
+
   /** @param {Job} job */
   #hear(job) {
     if (job.project !== this.project || job.kind !== "run") return;
-    const { bar } = this.#centre;
-    bar.job.hidden = !["queued", "running"].includes(job.state);
-    bar.job.textContent = `${stageWord(job.stage)}… ${Math.round(100 * job.progress)} %`;
+    this.#tell(job);
     if (job.state === "done") this.#objects.load().then(() => this.#centre.show());
     if (job.state === "failed" && job.error) say(job.error.message, { kind: "bad", hint: job.error.hint });
   }
