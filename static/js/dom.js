@@ -56,6 +56,11 @@ export function shape(tag, attributes = {}, ...children) {
   return made;
 }
 
+/** A turning wheel with what is being waited for. @param {string} text */
+export function spinner(text) {
+  return h("div", { class: "spinner", role: "status" }, h("span", { class: "wheel", "aria-hidden": "true" }), text);
+}
+
 /**
  * A labelled field for a number.
  * @param {string} text

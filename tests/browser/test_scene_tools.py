@@ -16,7 +16,7 @@ from tests.app.finished import keep_results
 from tests.app.nouns import finish
 from tests.browser.looks import picture, scroll_to
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.test_together import sample, say, viewed
+from tests.browser.test_together import sample, viewed
 from tests.browser.together import Server, signed_in
 from tests.core.export.kitchen import kitchen
 from tests.core.export.test_report import certificate
@@ -129,6 +129,9 @@ def test_a_hinge_correction_is_previewed_and_marks_results_stale(new_context: Ne
     page.get_by_label("Hinge of cabinet_1").select_option("right")
     expect(page.get_by_text("Preview: cabinet_1; certified by the next run")).to_be_visible()
     expect(page.get_by_text("before the last change")).to_be_visible()
+    aside = page.locator(".review > aside")
+    expect(aside).to_contain_text("Below: of the last run, before its last change")
+    expect(aside.locator(".old").first).to_contain_text(re.compile("Placed by.*Hinged"))
     picture(page, "preview")
     page.goto(f"{project}/run")
     expect(page.get_by_role("heading", name="Certificate")).to_contain_text("stale")
@@ -226,7 +229,8 @@ def test_sections_heat_maps_and_comment_views_work_in_the_scene(new_context: New
 
     share = left.input_value()
     page.keyboard.press("c")
-    say(page, "Comment", "this side was never filmed")
+    page.keyboard.type("this side was never filmed")  # the box is open before the key returns
+    page.keyboard.press("Control+Enter")
     note = page.get_by_role("button", name="this side was never filmed", exact=True)
     expect(page.locator("r2c2r-comments")).to_contain_text("with a view")
     section.get_by_role("button", name="Show all").click()

@@ -5,7 +5,7 @@
  */
 
 import { getPhotos } from "../api.js";
-import { detailOf, h, LiveElement, renew, segments, shape, slider } from "../dom.js";
+import { detailOf, h, LiveElement, renew, segments, shape, slider, spinner } from "../dom.js";
 import { Answers } from "../lib/answers.js";
 import { boxEdges } from "../lib/box-view.js";
 import { sheetOf } from "../lib/crop-view.js";
@@ -61,7 +61,8 @@ export class PhotoCheck extends LiveElement {
   #split = h("input", { type: "range", min: "0", max: "100", value: "100", "aria-label": "Before and after the fit" });
   #tools = h("div", { class: "bar" });
   #sheet = h("div", { class: "sheet" }, this.#photo, this.#under, this.#over);
-  #pictures = h("div", { class: "pictures" }, this.#sheet);
+  #waiting = spinner("Loading the photos…");
+  #pictures = h("div", { class: "pictures" }, this.#sheet, this.#waiting);
   #strip = h("div", { class: "thumbs" });
   #legend = h("p", { class: "muted legend" });
 
@@ -80,6 +81,8 @@ export class PhotoCheck extends LiveElement {
     onMarks("mark", (mark) => this.emit("mark", { ...mark, frame: this.frame }));
     for (const slider of [this.#opacity, this.#split])
       slider.addEventListener("input", () => this.#fade(), { signal: this.signal });
+    for (const type of ["load", "error"])
+      this.#photo.addEventListener(type, () => this.#wait(false), { signal: this.signal });
     this.#pictures.addEventListener("dblclick", (event) => this.#pin(event), { signal: this.signal });
   }
 
@@ -90,6 +93,7 @@ export class PhotoCheck extends LiveElement {
     if (!same) {
       this.#at = 0;
       this.#all = null;
+      this.#wait(true);
     }
     try {
       await this.#answers.take(getPhotos(this.project, object), (found) => {
@@ -102,7 +106,23 @@ export class PhotoCheck extends LiveElement {
       });
     } catch (error) {
       sayError(error);
+      this.#wait(false);
     }
+  }
+
+  /** Show that there is no object whose photos could be shown. @param {string} why */
+  none(why) {
+    this.#object = -1;
+    this.#all = null;
+    this.#draw();
+    this.#wait(false);
+    this.#legend.textContent = why;
+  }
+
+  /** @param {boolean} waiting for the list of photos, or for the photo */
+  #wait(waiting) {
+    this.#waiting.hidden = !waiting;
+    this.#sheet.hidden = waiting;
   }
 
   /**
@@ -175,7 +195,7 @@ export class PhotoCheck extends LiveElement {
   #draw() {
     const all = this.#all;
     const photo = this.#current;
-    this.#pictures.hidden = !photo;
+    this.#pictures.hidden = all !== null && !photo;
     if (!all || !photo || !all.of.length) {
       this.#tools.replaceChildren();
       this.marks.element.hidden = true;
@@ -183,6 +203,7 @@ export class PhotoCheck extends LiveElement {
       return this.#strip.replaceChildren();
     }
     this.#photo.src = this.#frameUrl(photo, this.#near ? photo.width : 960);
+    if (!this.#photo.naturalWidth) this.#wait(!this.#photo.complete); // a photo before it stays until the next is there
     this.#photo.alt = `Frame ${photo.frame}`;
     this.#over.src = this.#overlayUrl(photo, this.#of, this.#look);
     this.#over.alt = `${MODELS[this.#of]}, ${LOOKS[this.#look].toLowerCase()}`;

@@ -130,7 +130,7 @@ export function certificateCard(certificate) {
       {},
       "Certificate ",
       h("span", { class: `chip ${!certificate.current ? "" : certificate.passed ? "good" : "bad"}` }, state),
-      certificate.current ? "" : h("span", { class: "chip warn" }, "stale"),
+      ...(certificate.current ? [] : [" ", h("span", { class: "chip warn" }, "stale")]),
     ),
     certificate.likeness ? likenessLine(certificate.likeness) : null,
     certificate.current

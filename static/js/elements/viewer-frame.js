@@ -1,10 +1,10 @@
 /**
- * 3D view: viser in a same-origin iframe; when viser is down, the bundle's own 3D page or a picture, and a retry button.
- * Emits "shown" ViewerShown, "not-ready" message, "dragging" during a drag in the view, "clicked".
+ * 3D view: viser in a same-origin iframe, under a veil that says what is waited for or not there yet; when viser is down, the
+ * bundle's own 3D page or a picture, and a retry button. Emits "shown" ViewerShown, "dragging" during a drag, "clicked".
  */
 
 import { ApiError, openViewer, showInViewer } from "../api.js";
-import { detailOf, h, LiveElement } from "../dom.js";
+import { detailOf, h, LiveElement, spinner } from "../dom.js";
 import { live } from "../live.js";
 import { sayError } from "./toasts.js";
 
@@ -21,6 +21,12 @@ export class ViewerFrame extends LiveElement {
   /** @type {Partial<ViewerShow>} */
   #wanted = {};
   #url = "";
+  #early = false; // opened before the recording was read
+  #veil = h("div", { class: "veil" });
+  #hint = h("p", { class: "muted" });
+  #running = false;
+  #drawing = false; // whether viser's canvas is there
+  #answered = false; // whether the server has shown what was requested last
   /** @type {Promise<void>} serialises requests, so that the last one wins */
   #queue = Promise.resolve();
 
@@ -28,6 +34,21 @@ export class ViewerFrame extends LiveElement {
     const again = (/** @type {Event} */ event) =>
       detailOf(event).reset && this.#url && this.open(this.#project, this.#wanted);
     live.addEventListener("hello", again, { signal: this.signal }); // the server restarted and lost our view
+    const ready = () => this.#early && this.open(this.#project, this.#wanted);
+    live.addEventListener("project", ready, { signal: this.signal });
+    this.#wait();
+    if (!this.childElementCount) this.replaceChildren(this.#veil);
+  }
+
+  /** Show a spinner until the view has what was requested. */
+  #wait() {
+    this.#answered = false;
+    this.#veil.replaceChildren(spinner("Loading the 3D view…"));
+    this.#veil.hidden = false;
+  }
+
+  #lift() {
+    this.#veil.hidden = this.#drawing && this.#answered;
   }
 
   /**
@@ -37,7 +58,11 @@ export class ViewerFrame extends LiveElement {
   async open(project, what) {
     this.#project = project;
     this.#want(what);
-    if (!this.#url) this.replaceChildren(h("div", { class: "fallback muted" }, "Opening the 3D view…"));
+    this.#early = false;
+    if (!this.#url) {
+      this.#wait();
+      this.replaceChildren(this.#veil);
+    }
     try {
       const session = await openViewer(project);
       if (!this.isConnected) return; // the user left the page
@@ -45,8 +70,23 @@ export class ViewerFrame extends LiveElement {
       if (session.url !== this.#url) this.#embed(session.url);
       this.show(this.#wanted); // the request may have changed while the view opened
     } catch (error) {
-      if (this.isConnected) this.#down(error instanceof Error ? error.message : String(error), null);
+      if (!this.isConnected) return;
+      this.#early = error instanceof ApiError && error.kind === "not-ready";
+      if (this.#early) this.#say(/** @type {ApiError} */ (error));
+      else this.#down(error instanceof Error ? error.message : String(error), null);
     }
+  }
+
+  /** Say over the view what is not there yet. @param {ApiError} error */
+  #say({ message, hint }) {
+    this.#hint.textContent = this.#running ? "The run is at work on it." : hint;
+    this.#veil.replaceChildren(h("p", {}, message), this.#hint);
+    this.#veil.hidden = false;
+  }
+
+  /** Whether a run is at work on what is not there yet. @param {boolean} running */
+  set running(running) {
+    this.#running = running;
   }
 
   /**
@@ -74,11 +114,14 @@ export class ViewerFrame extends LiveElement {
   async #ask(what, again) {
     if (!this.isConnected) return;
     try {
-      this.emit("shown", await showInViewer(this.#project, what));
+      const shown = await showInViewer(this.#project, what);
+      this.#answered = true;
+      this.#lift();
+      this.emit("shown", shown);
     } catch (error) {
       if (!this.isConnected) return;
       if (!(error instanceof ApiError)) return sayError(error);
-      if (error.kind === "not-ready") this.emit("not-ready", error.message);
+      if (error.kind === "not-ready") this.#say(error);
       else if (error.status !== 503) sayError(error);
       else if (again) return this.#ask(what, false);
       else this.#down(error.message, await openViewer(this.#project).catch(() => null));
@@ -88,14 +131,31 @@ export class ViewerFrame extends LiveElement {
   /** @param {string} url */
   #embed(url) {
     this.#url = url;
+    this.#drawing = false;
+    this.#wait();
     const frame = h("iframe", { src: url + (isDark() ? "?darkMode" : ""), title: "3D view of the project" });
     frame.addEventListener("load", () => this.#listen(frame));
-    this.replaceChildren(frame);
+    this.replaceChildren(frame, this.#veil);
+  }
+
+  /** Lift the veil once viser has its canvas. @param {Document | null} inside */
+  #seen(inside) {
+    if (!inside) return;
+    const look = () => {
+      if (!inside.querySelector("canvas")) return;
+      looking.disconnect();
+      this.#drawing = true;
+      this.#lift();
+    };
+    const looking = new MutationObserver(look);
+    looking.observe(inside, { childList: true, subtree: true });
+    look();
   }
 
   /** Listen to drags, clicks and keys inside the same-origin frame. @param {HTMLIFrameElement} frame */
   #listen(frame) {
     const inside = frame.contentWindow;
+    this.#seen(frame.contentDocument);
     const dragging = (/** @type {PointerEvent} */ event) => event.buttons && this.emit("dragging");
     inside?.addEventListener("pointermove", dragging, { signal: this.signal });
     const ended = () => setTimeout(() => this.emit("dragging"), LAST_MS);

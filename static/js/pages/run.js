@@ -14,9 +14,9 @@ import { live } from "../live.js";
 const SOON_MS = 500;
 /** Text about a run's work, by the state of the result. */
 const WORK = {
-  none: "Everything is computed.",
+  none: "Everything will be computed.",
   current: "The result is up to date: running again does no work.",
-  stale: "Only what changed is computed.",
+  stale: "Only what changed will be computed.",
 };
 
 export class RunPage extends LiveElement {
@@ -26,6 +26,7 @@ export class RunPage extends LiveElement {
   #lead = h("p", { class: "muted" });
   #before = new BeforeRun();
   #soon = 0;
+  #ready = false; // whether there is something to run
   #result = h("div", { class: "stack" });
 
   connected() {
@@ -44,6 +45,7 @@ export class RunPage extends LiveElement {
     this.#start.addEventListener("click", () => this.#run(), { signal });
     live.addEventListener("job", (event) => this.#hear(/** @type {{ job: Job }} */ (detailOf(event)).job), { signal });
     live.addEventListener("online", () => this.#load(), { signal });
+    live.addEventListener("project", () => !this.#ready && this.#load(), { signal });
     live.addEventListener("segment", (event) => this.#found(detailOf(event)), { signal });
     this.#load();
   }
@@ -55,6 +57,7 @@ export class RunPage extends LiveElement {
       this.#show(job);
       this.#job.closest("section")?.toggleAttribute("hidden", job === null);
       const objects = counted(project.counts.objects, "object");
+      this.#ready = project.status === "ready" && project.counts.objects > 0;
       this.#start.disabled = project.counts.objects === 0;
       this.#lead.textContent = project.counts.objects
         ? `${objects}. ${WORK[project.result]}`

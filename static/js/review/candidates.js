@@ -2,6 +2,7 @@
 
 import { h, icon } from "../dom.js";
 import { counted } from "../lib/format.js";
+import { REVIEWERS } from "./decisions.js";
 
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
 /** @typedef {import("../api-types").Candidate} Candidate */
@@ -124,7 +125,13 @@ export function verdict(candidate, said, told) {
   const [name, text] = said === "accepted" ? ["check", "Accept"] : ["cross", "Reject"];
   const button = h(
     "button",
-    { type: "button", disabled: !told.judges, value: said, "aria-pressed": String(candidate.verdict === said) },
+    {
+      type: "button",
+      disabled: !told.judges,
+      title: told.judges ? "" : REVIEWERS,
+      value: said,
+      "aria-pressed": String(candidate.verdict === said),
+    },
     icon(name ?? ""),
     text,
   );

@@ -61,6 +61,7 @@ export class Centre extends EventTarget {
 
   /** @param {AbortSignal} signal */
   listen(signal) {
+    this.#arrange();
     /** @type {(target: EventTarget, type: string, act: (detail: any) => void) => void} */
     const on = (target, type, act) => target.addEventListener(type, (event) => act(detailOf(event)), { signal });
     on(this.bar, "change", () => this.show());
@@ -77,7 +78,6 @@ export class Centre extends EventTarget {
     on(this.photos, "pin-point", (pin) => this.dispatchEvent(new CustomEvent("pin", { detail: pin })));
     on(this.#viewer, "dragging", () => this.#handles && this.#place.add({}));
     on(this.#viewer, "shown", (shown) => this.#shown(shown));
-    on(this.#viewer, "not-ready", (message) => say(String(message), { hint: "run the pipeline first" }));
     signal.addEventListener("abort", () => [this.joints, this.#turn, this.#place].forEach((part) => part.stop()));
   }
 
@@ -96,19 +96,30 @@ export class Centre extends EventTarget {
   }
 
   async show() {
+    this.#arrange();
     if (!this.#open) return;
     const { mode, isSolid } = this.bar;
-    this.#viewer.hidden = !isSolid;
-    this.photos.hidden = mode !== "photo";
-    this.compare.hidden = mode !== "compare";
     if (this.bar.mode !== "scene") this.joints.element.hidden = true;
     this.#handles = false;
     this.#drawMover();
     if (isSolid) this.#viewer.show(this.#wanted);
     if (mode === "compare") this.#compare();
-    if (this.#objects.number === null) return;
+    if (this.#objects.number === null) return this.photos.none("Choose an object to see its photos.");
     await this.photos.show(this.#objects.number);
     this.aboutObject();
+  }
+
+  /** Show the view of the mode, and no other. */
+  #arrange() {
+    const { mode, isSolid } = this.bar;
+    this.#viewer.hidden = !isSolid;
+    this.photos.hidden = mode !== "photo";
+    this.compare.hidden = mode !== "compare";
+  }
+
+  /** Whether a run is at work. @param {boolean} running */
+  set running(running) {
+    this.#viewer.running = running;
   }
 
   #compare() {
@@ -122,7 +133,7 @@ export class Centre extends EventTarget {
     if (this.#open && this.bar.mode === "compare") this.#compare();
     this.photos.about(object, group?.override.states ?? {}, this.#objects.judges ? "" : REVIEWERS);
     this.mover.about(group, this.photos.boxOf(object));
-    this.bar.offer(this.mover.box !== null);
+    this.bar.offer(this.mover.box !== null && this.#objects.judges);
     this.#drawMover();
     this.dispatchEvent(new Event("about"));
   }

@@ -4,7 +4,7 @@
  */
 
 import { getDifferences } from "../api.js";
-import { h, LiveElement, renew, slider } from "../dom.js";
+import { h, LiveElement, renew, slider, spinner } from "../dom.js";
 import { sayError } from "../elements/toasts.js";
 import { Answers } from "../lib/answers.js";
 import { sheetOf } from "../lib/crop-view.js";
@@ -39,9 +39,10 @@ export class CandidateCompare extends LiveElement {
   #spinning = h("button", { type: "button", "aria-pressed": "false", onClick: () => this.spin() }, "Spin");
   #marked = h("input", { type: "checkbox", checked: true });
   #other = h("select", { "aria-label": "Compare with" });
+  #tools = h("div", { class: "bar", hidden: true });
   #why = h("p", { class: "why" });
   #legend = h("p", { class: "muted legend" });
-  #cards = h("div", { class: "cards" });
+  #cards = h("div", { class: "cards" }, spinner("Loading the candidates…"));
   #crops = h("div", { class: "crops" });
 
   connected() {
@@ -51,16 +52,14 @@ export class CandidateCompare extends LiveElement {
     this.#other.addEventListener("change", () => this.#compareWith(this.#other.value), { signal });
     this.#cards.addEventListener("pointerdown", (event) => this.#drag(event), { signal });
     signal.addEventListener("abort", () => this.#stop());
-    const tools = h(
-      "div",
-      { class: "bar" },
+    this.#tools.replaceChildren(
       slider("Turn", this.#turn),
       this.#spinning,
       h("span", { class: "spring" }),
       h("label", {}, this.#marked, "Mark what differs from"),
       this.#other,
     );
-    this.replaceChildren(tools, this.#why, this.#legend, this.#cards, this.#crops);
+    this.replaceChildren(this.#tools, this.#why, this.#legend, this.#cards, this.#crops);
   }
 
   /** @param {CandidateGroup | undefined} group */
@@ -114,7 +113,7 @@ export class CandidateCompare extends LiveElement {
       ),
     );
     this.#why.textContent = group?.reason ?? "";
-    this.#legend.hidden = !group;
+    this.#legend.hidden = this.#tools.hidden = !group;
     this.#legend.textContent = `Drag a picture, or use the slider: all turn together. ${this.#explained()}`;
     renew(this.#cards, ...(group ? ranked(group).map((one) => this.#card(group, one)) : [nothing()]));
     renew(this.#crops, ...this.#cropped());

@@ -3,6 +3,7 @@
 import { h } from "../dom.js";
 import { copied, copiedWords } from "../lib/copied.js";
 import { counted } from "../lib/format.js";
+import { REVIEWERS } from "./decisions.js";
 
 /**
  * @param {import("./objects.js").ReviewObjects} objects
@@ -16,7 +17,11 @@ export function copyBar(objects, copy) {
   const words = copiedWords(patch);
   const button = h(
     "button",
-    { type: "button", disabled: !others.length || !words || !objects.judges },
+    {
+      type: "button",
+      disabled: !others.length || !words || !objects.judges,
+      title: objects.judges ? "" : REVIEWERS,
+    },
     label(group, words),
   );
   button.dataset.at = "copy:";

@@ -88,7 +88,7 @@ function kind(group, { categories, categorise, buildAs }) {
 }
 
 /**
- * Menu for the side of the hinge, or the side it slides to.
+ * Menu for the side of the hinge, or the side it slides to; none for drawers, which slide out.
  * @param {CandidateGroup} group
  * @param {SceneItem | undefined} item
  * @param {(patch: Partial<OverridePatch>) => void} change
@@ -97,6 +97,8 @@ function side(group, item, change) {
   const sideways = item?.joints.some(slidesSideways) ?? false;
   const what = sideways ? "Slides to" : "Hinge";
   const said = group.override.hinge ?? "automatic";
+  const slides = Boolean(item?.joints.length) && item?.joints.every(({ type }) => type === "prismatic");
+  if (slides && !sideways && said === "automatic") return "";
   const select = h("select", { "aria-label": sideways ? `Where ${group.name} slides to` : `Hinge of ${group.name}` });
   for (const one of SIDES) {
     if (sideways && one !== said && (one === "top" || one === "bottom")) continue;

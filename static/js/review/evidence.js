@@ -15,8 +15,9 @@ import { sourceChip } from "../source-chip.js";
 /**
  * @param {Placement} placement
  * @param {SceneItem | undefined} item
+ * @param {boolean} old whether the object was changed since
  */
-export function placement(placement, item) {
+export function placement(placement, item, old) {
   /** @type {[string, string][]} */
   const rows = [
     ["Placed by", placement.method],
@@ -31,7 +32,7 @@ export function placement(placement, item) {
     rows.push(["Front corners", `${(1000 * item.warp_residual_m).toFixed(1)} mm from the scan after the fit`]);
   return h(
     "div",
-    { class: "stack" },
+    { class: old ? "stack old" : "stack" },
     placement.unsure ? h("span", { class: "chip warn" }, "unsure: check it against the photos") : "",
     h("dl", { class: "facts" }, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
     ...joints(item),
@@ -66,8 +67,9 @@ function joints(item) {
  * @param {Certificate | null} certificate
  * @param {string} name
  * @param {string[]} names of all objects
+ * @param {boolean} old whether the object was changed since
  */
-export function findingsOf(certificate, name, names) {
+export function findingsOf(certificate, name, names, old) {
   const mine = findingsAbout(certificate, name, names);
-  return mine.length ? findingList(mine) : "";
+  return mine.length ? h("div", { class: old ? "old" : "" }, findingList(mine)) : "";
 }

@@ -112,7 +112,10 @@ export class JointPanel {
       value.textContent = jointValue(type, at);
     };
     const worst = check ? "default" : (sources.find(([, s]) => s === "inferred")?.[1] ?? sources[0]?.[1] ?? "");
-    const badge = sourceChip(worst, { title: sources.map(([what, s]) => `${what} ${sourceWord(s)}`).join(", ") });
+    const old = known?.item.changed ?? false;
+    const said = sources.map(([what, s]) => `${what} ${sourceWord(s)}`).join(", ");
+    const badge = sourceChip(worst, { title: old ? `of the last run, before the last change: ${said}` : said });
+    badge.classList.toggle("old", old);
     const alone = known?.item.joints.length === 1; // then the object's name is enough
     const title = known ? `${joint.name}: ${motionOf(known.joint).toLowerCase()}` : joint.name;
     const name = h("span", { class: "name", title }, alone ? known.item.name : joint.name);

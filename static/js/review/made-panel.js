@@ -20,12 +20,15 @@ export function madePanel(item, judges, change) {
   return [
     h("div", { class: "row name" }, h("h2", {}, item.name), h("span", { class: "chip" }, item.category)),
     h("p", { class: "muted" }, "Made from the scan: nobody clicked it."),
+    item.changed
+      ? h("p", { class: "chip warn", role: "status" }, "Below: of the last run, before its last change")
+      : "",
     h(
       "div",
-      { class: "chips" },
+      { class: item.changed ? "chips old" : "chips" },
       ...item.dimension_sources.map((source, k) => sourceChip(source, { of: (SIDES[k] ?? "").toLowerCase() })),
     ),
-    ...item.warnings.slice(1).map((warning) => h("p", { class: "muted" }, warning)),
+    ...item.warnings.slice(1).map((warning) => h("p", { class: item.changed ? "muted old" : "muted" }, warning)),
     h("fieldset", { class: "stack plain", disabled: !judges }, size(item, change), colour(item, change), leave(change)),
   ];
 }

@@ -25,7 +25,8 @@ export function objectNav(objects, bringBack, copy) {
     button.append(h("span", { class: "name" }, group.name), text ? h("span", { class: `chip ${tone}` }, text) : "");
     if (group.assignee) button.append(h("span", { class: "chip", title: "assigned to" }, `@${group.assignee}`));
     const why = objects.byRisk ? objects.risks.get(group.object)?.why : "";
-    if (why) button.append(h("span", { class: "risk muted" }, why));
+    const when = group.changed ? "before its last change: " : "";
+    if (why) button.append(h("span", { class: "risk muted" }, `${when}${why}`));
     button.addEventListener("click", (event) => press(objects, group.object, event));
     button.addEventListener("keydown", (event) => {
       if (event.key !== "Enter" || !(event.ctrlKey || event.metaKey)) return;

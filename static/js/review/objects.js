@@ -17,6 +17,8 @@ const NONE = -1;
 
 export class ReviewObjects extends EventTarget {
   project = "";
+  /** Whether the objects have been loaded. */
+  loaded = false;
   /** The chosen object, and the candidate shown. */
   object = NONE;
   candidate = "";
@@ -59,6 +61,7 @@ export class ReviewObjects extends EventTarget {
         getSystem(),
       ]);
       await this.#answers.take(all, ([groups, scene, certificate, { role, categories }]) => {
+        this.loaded = true;
         this.judges = role !== "annotator";
         this.categories = categories;
         this.groups = groups.map((group) => this.#asSaid(group));

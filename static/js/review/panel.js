@@ -29,19 +29,21 @@ import { madePanel } from "./made-panel.js";
 export function panel(objects, decisions, asked, correcting) {
   const { group, item, groups, certificate, candidate, madeName } = objects;
   if (madeName && item) return madePanel(item, objects.judges, (patch) => decisions.correctMade(item, patch));
-  if (!group) return [h("p", { class: "muted" }, "Choose an object.")];
+  if (!group) return [h("p", { class: "muted" }, groups.length ? "Choose an object." : "")];
   const names = groups.map(({ run_name }) => run_name);
   const { judges } = objects;
   const told = { show: asked.show, verdict: decisions.judge.bind(decisions), judges };
+  const old = older(group);
   const [used, ...rest] = cards(group, candidate, told);
   return [
     heading(group, decisions, judges),
     judges ? "" : h("p", { class: "muted" }, REVIEWERS),
     used ?? "",
     choice(group),
-    group.placement ? placement(group.placement, item) : h("p", { class: "chip warn" }, "not placed"),
+    old && h("p", { class: "chip warn", role: "status" }, `Below: ${old}`),
+    group.placement ? placement(group.placement, item, old !== "") : h("p", { class: "chip warn" }, "not placed"),
     certificate && !certificate.current ? stale(certificate) : "",
-    findingsOf(certificate, group.run_name, names),
+    findingsOf(certificate, group.run_name, names, old !== ""),
     corrections(
       group,
       item,
@@ -59,6 +61,12 @@ export function panel(objects, decisions, asked, correcting) {
     ...rest,
     others(group, decisions, asked, judges),
   ];
+}
+
+/** What makes the figures below older than what was said since; empty if nothing does. @param {CandidateGroup} group */
+function older({ changed, chosen, placement }) {
+  const other = placement && placement.candidate !== chosen ? `of ${placement.candidate}, which is no longer used` : "";
+  return [changed ? "of the last run, before its last change" : "", other].filter(Boolean).join(", and ");
 }
 
 /** @param {import("../api-types").Certificate} certificate */
@@ -103,7 +111,7 @@ function others(group, decisions, { comment }, judges) {
       "more",
       "More candidates",
       () => decisions.more(),
-      judges && group.can_regenerate ? "" : "no further ones are made",
+      !judges ? REVIEWERS : group.can_regenerate ? "" : "no further ones are made",
     ],
     ["upload", "Upload a mesh…", () => mesh.click(), judges ? "" : REVIEWERS],
     ["comment", "Comment", comment, ""],

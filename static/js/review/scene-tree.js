@@ -1,6 +1,7 @@
 /** Scene objects without clicks: visibility buttons, and those left out. */
 
 import { h, icon } from "../dom.js";
+import { REVIEWERS } from "./decisions.js";
 
 /** @typedef {import("../api-types").SceneItem} SceneItem */
 /** @typedef {import("./objects.js").ReviewObjects} ReviewObjects */
@@ -37,7 +38,8 @@ export function madeList(objects, bringBack) {
     return h("li", { class: "with-eye" }, button, eye(objects, item));
   });
   const gone = leftOut.map((item) => {
-    const back = h("button", { type: "button", class: "quiet" }, "Bring back");
+    const not = { disabled: !objects.judges, title: objects.judges ? "" : REVIEWERS };
+    const back = h("button", { type: "button", class: "quiet", ...not }, "Bring back");
     back.setAttribute("aria-label", `Bring back ${item.name}`);
     back.addEventListener("click", () => bringBack({ name: item.name, run_name: item.name }));
     return h("li", { class: "with-eye" }, h("span", { class: "name left-out" }, item.name), back);
