@@ -68,5 +68,5 @@ def test_toasts_do_not_cover_the_lanes_and_equal_ones_merge(new_context: NewCont
     assert lowest["y"] + lowest["height"] <= box_of(page.locator("r2c2r-film-strip"))["y"]
     for _ in range(3):
         page.keyboard.press("g")
-    expect(page.locator(".toast", has_text="Choose an object first.")).to_have_text("Choose an object first.3 ×")
+    expect(page.locator(".toast", has_text="Choose an object first.")).to_have_text("Choose an object first.3 times")
     expect(page.locator(".toast", has_text="Deleted")).to_have_count(3)  # equal ones take the place of one

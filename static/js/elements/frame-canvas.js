@@ -8,6 +8,7 @@
 
 import { h, LiveElement, wire } from "../dom.js";
 import {
+  clearOf,
   drawBox,
   drawClick,
   drawPath,
@@ -245,7 +246,13 @@ export class FrameCanvas extends LiveElement {
     const step = this.#size.width / box.width;
     const middle = { x: (box.left + box.box_width / 2) * step, y: (box.top + box.box_height / 2) * step };
     const named = current || object === this.#hovered;
-    drawTag(context, toScreen(this.#view, middle), named ? `${number} ${name}` : String(number), colour);
+    const clicks = this.#markers.map((marker) => toScreen(this.#view, marker));
+    drawTag(
+      context,
+      clearOf(toScreen(this.#view, middle), clicks),
+      named ? `${number} ${name}` : String(number),
+      colour,
+    );
   }
 
   // Pointer events

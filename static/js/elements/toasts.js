@@ -32,7 +32,7 @@ export class Toasts extends HTMLElement {
       "div",
       { class: `toast ${kind}`, "data-said": said || null, "data-times": times },
       h("div", {}, h("div", {}, text), hint ? h("div", { class: "muted" }, hint) : null),
-      times > 1 ? h("span", { class: "muted", title: `said ${times} times` }, `${times} ×`) : null,
+      times > 1 ? h("span", { class: "muted" }, `${times} times`) : null,
       offer ? h("button", { type: "button", onClick: () => (toast.remove(), offer.run()) }, offer.text) : null,
       close,
     );

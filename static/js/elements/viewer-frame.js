@@ -21,7 +21,7 @@ export class ViewerFrame extends LiveElement {
   /** @type {Partial<ViewerShow>} */
   #wanted = {};
   #url = "";
-  #early = false; // opened before the recording was read
+  #early = false; // opened before the recording was read, or while the server was away
   #veil = h("div", { class: "veil" });
   #hint = h("p", { class: "muted" });
   #running = false;
@@ -32,11 +32,11 @@ export class ViewerFrame extends LiveElement {
 
   connected() {
     const again = (/** @type {Event} */ event) =>
-      detailOf(event).reset && this.#url && this.open(this.#project, this.#wanted);
+      ((detailOf(event).reset && this.#url) || this.#early) && this.open(this.#project, this.#wanted);
     live.addEventListener("hello", again, { signal: this.signal }); // the server restarted and lost our view
     const ready = () => this.#early && this.open(this.#project, this.#wanted);
     live.addEventListener("project", ready, { signal: this.signal });
-    this.#wait();
+    if (!this.#url) this.#wait();
     if (!this.childElementCount) this.replaceChildren(this.#veil);
   }
 
@@ -47,8 +47,10 @@ export class ViewerFrame extends LiveElement {
     this.#veil.hidden = false;
   }
 
+  /** Take the veil off once the server has answered and viser draws. */
   #lift() {
-    this.#veil.hidden = this.#drawing && this.#answered;
+    this.#answered = true;
+    this.#veil.hidden = this.#drawing;
   }
 
   /**
@@ -71,14 +73,15 @@ export class ViewerFrame extends LiveElement {
       this.show(this.#wanted); // the request may have changed while the view opened
     } catch (error) {
       if (!this.isConnected) return;
-      this.#early = error instanceof ApiError && error.kind === "not-ready";
-      if (this.#early) this.#say(/** @type {ApiError} */ (error));
+      this.#early = error instanceof ApiError && (error.unreachable || error.kind === "not-ready");
+      if (error instanceof ApiError && error.kind === "not-ready") this.#say(error);
       else this.#down(error instanceof Error ? error.message : String(error), null);
     }
   }
 
   /** Say over the view what is not there yet. @param {ApiError} error */
   #say({ message, hint }) {
+    this.#answered = false;
     this.#hint.textContent = this.#running ? "The run is at work on it." : hint;
     this.#veil.replaceChildren(h("p", {}, message), this.#hint);
     this.#veil.hidden = false;
@@ -115,14 +118,13 @@ export class ViewerFrame extends LiveElement {
     if (!this.isConnected) return;
     try {
       const shown = await showInViewer(this.#project, what);
-      this.#answered = true;
       this.#lift();
       this.emit("shown", shown);
     } catch (error) {
       if (!this.isConnected) return;
       if (!(error instanceof ApiError)) return sayError(error);
       if (error.kind === "not-ready") this.#say(error);
-      else if (error.status !== 503) sayError(error);
+      else if (error.status !== 503) (this.#lift(), sayError(error));
       else if (again) return this.#ask(what, false);
       else this.#down(error.message, await openViewer(this.#project).catch(() => null));
     }
@@ -145,7 +147,7 @@ export class ViewerFrame extends LiveElement {
       if (!inside.querySelector("canvas")) return;
       looking.disconnect();
       this.#drawing = true;
-      this.#lift();
+      if (this.#answered) this.#lift();
     };
     const looking = new MutationObserver(look);
     looking.observe(inside, { childList: true, subtree: true });

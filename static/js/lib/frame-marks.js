@@ -54,6 +54,17 @@ export function drawTag(context, { x, y }, text, [red, green, blue]) {
 }
 
 /**
+ * Place of a label on the screen: above a click that it would cover.
+ * @param {At} at
+ * @param {At[]} clicks
+ * @returns {At}
+ */
+export function clearOf(at, clicks) {
+  const covered = clicks.find(({ x, y }) => Math.abs(x - at.x) < 2 * RADIUS && Math.abs(y - at.y) < 2 * RADIUS);
+  return covered ? { x: at.x, y: covered.y - 2 * RADIUS - 3 } : at;
+}
+
+/**
  * A comment: a speech bubble whose tip is the spot.
  * @param {CanvasRenderingContext2D} context
  * @param {At} at

@@ -1,7 +1,16 @@
 /** Download page: formats of the bundle, certificate, versions with checksums. */
 
-import { ApiError, bundleInside, checkBundle, compareBundles, getCertificate, getSystem, listBundles } from "../api.js";
-import { h, icon, LiveElement } from "../dom.js";
+import {
+  ApiError,
+  bundleInside,
+  checkBundle,
+  compareBundles,
+  getCertificate,
+  getSystem,
+  listBundles,
+  listJobs,
+} from "../api.js";
+import { detailOf, h, icon, LiveElement } from "../dom.js";
 import { assetCard, robotCard, simulatorCard } from "../elements/bundle-inside.js";
 import { certificateCard } from "../elements/results.js";
 import { say, sayError } from "../elements/toasts.js";
@@ -23,12 +32,21 @@ export class DownloadPage extends LiveElement {
   project = "";
   #answers = new Answers();
   #variants = new VariantSets();
+  #run = ""; // state of the newest run that was heard of
 
   connected() {
     this.#variants.project = this.project;
     this.#variants.hidden = true;
     this.replaceChildren(h("div", { class: "page stack" }, this.#variants));
     live.addEventListener("project", () => this.#load(), { signal: this.signal });
+    live.addEventListener("job", (event) => this.#hear(detailOf(event).job), { signal: this.signal });
+    this.#load();
+  }
+
+  /** Load again when a run begins or ends. @param {import("../api-types").Job} job */
+  #hear({ project, kind, state }) {
+    if (project !== this.project || kind !== "run" || state === this.#run) return;
+    this.#run = state;
     this.#load();
   }
 
@@ -41,7 +59,7 @@ export class DownloadPage extends LiveElement {
   }
 
   /** @param {Awaited<ReturnType<typeof everything>>} all */
-  #draw({ bundles, formats, certificate, inside }) {
+  #draw({ bundles, formats, certificate, inside, running }) {
     const newest = bundles[0];
     if (!newest) return this.#empty();
     this.#variants.hidden = false;
@@ -54,7 +72,11 @@ export class DownloadPage extends LiveElement {
       ),
       newest.current
         ? ""
-        : h("p", { class: "chip warn" }, "Something was changed since this bundle was made: run again."),
+        : h(
+            "p",
+            { class: "chip warn" },
+            `Something was changed since this bundle was made: ${running ? "the next one is being computed" : "run again"}.`,
+          ),
       h("div", { class: "split" }, this.#choice(newest, formats), certificate ? certificateCard(certificate) : ""),
       inside ? h("div", { class: "split" }, simulatorCard(inside, certificate), assetCard(inside, newest)) : "",
     );
@@ -223,9 +245,10 @@ export class DownloadPage extends LiveElement {
 
 /** Data of the page; there is no certificate before the first run is done. @param {string} project */
 async function everything(project) {
-  const [bundles, { formats }] = await Promise.all([listBundles(project), getSystem()]);
+  const [bundles, { formats }, jobs] = await Promise.all([listBundles(project), getSystem(), listJobs(project)]);
+  const running = jobs.some(({ kind, state }) => kind === "run" && ["queued", "running"].includes(state));
   const newest = bundles[0];
-  if (!newest) return { bundles, formats, certificate: null, inside: null };
+  if (!newest) return { bundles, formats, running, certificate: null, inside: null };
   const [certificate, inside] = await Promise.all([
     getCertificate(project).catch((error) => {
       if (error instanceof ApiError && error.status === 409) return null;
@@ -233,7 +256,7 @@ async function everything(project) {
     }),
     bundleInside(project, newest.version),
   ]);
-  return { bundles, formats, certificate, inside };
+  return { bundles, formats, running, certificate, inside };
 }
 
 /** @param {string} project */

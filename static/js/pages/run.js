@@ -28,6 +28,7 @@ export class RunPage extends LiveElement {
   #soon = 0;
   #ready = false; // whether there is something to run
   #result = h("div", { class: "stack" });
+  #stale = h("span", { class: "chip warn" });
 
   connected() {
     this.replaceChildren(
@@ -98,6 +99,7 @@ export class RunPage extends LiveElement {
     this.#job.closest("section")?.toggleAttribute("hidden", job === null);
     const running = job !== null && ["queued", "running", "cancelling"].includes(job.state);
     this.#start.textContent = running ? "Running…" : job?.state === "done" ? "Run again" : "Run";
+    this.#stale.textContent = `older than the last change: ${running ? "the next one is being computed" : "run again"}`;
     if (running) this.#start.disabled = true;
     else if (job) this.#start.disabled = false;
   }
@@ -116,7 +118,7 @@ export class RunPage extends LiveElement {
           "div",
           { class: "row" },
           h("h2", { class: "grow" }, "Result"),
-          result === "stale" ? h("span", { class: "chip warn" }, "older than the last change: run again") : null,
+          result === "stale" ? this.#stale : null,
           h("a", { class: "button", href: `/p/${this.project}/review` }, "Review"),
           h("a", { class: "button", href: `/p/${this.project}/download` }, "Download"),
         ),
