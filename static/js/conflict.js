@@ -1,8 +1,8 @@
 /** Resolution of conflicting changes by two users: asks only about fields that disagree, and returns the change to store. */
 
-import { verdictOf } from "./changes.js";
 import { askToMerge } from "./elements/merge-dialog.js";
 import { disagreements } from "./lib/merge.js";
+import { verdictOf } from "./lib/rebased.js";
 
 /** @typedef {import("./changes.js").Change} Change */
 /** @typedef {import("./api-types").CandidateGroup} CandidateGroup */

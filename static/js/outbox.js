@@ -7,8 +7,8 @@
  */
 
 import { ApiError, perform } from "./api.js";
-import { rebased } from "./changes.js";
 import { forget, isChange, keep, keptBy, named } from "./lib/kept.js";
+import { rebased } from "./lib/rebased.js";
 import { Tabs } from "./lib/tabs.js";
 import { live } from "./live.js";
 
