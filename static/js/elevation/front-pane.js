@@ -34,8 +34,8 @@ export class FrontPane extends EventTarget {
   #sideways = new Set();
   #hinge = h("select", {}, ...options({ "": "inferred", left: "left", right: "right", top: "top", bottom: "bottom" }));
   #handle = h("select", {}, ...options({ "": "detected", none: "none", drawn: "drawn" }));
-  #adopt = h("button", { type: "button", onClick: () => this.#say("adopt") });
-  #copy = h("button", { type: "button", onClick: () => this.#say("copy") }, "Copy handle and hinge (C)");
+  #adopt = h("button", { type: "button", hidden: true, onClick: () => this.#say("adopt") });
+  #copy = h("button", { type: "button", hidden: true, onClick: () => this.#say("copy") }, "Copy handle and hinge (C)");
   #fields = h(
     "fieldset",
     { class: "front-fields", disabled: true },

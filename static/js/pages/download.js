@@ -10,7 +10,7 @@ import {
   listBundles,
   listJobs,
 } from "../api.js";
-import { detailOf, h, icon, LiveElement } from "../dom.js";
+import { detailOf, h, icon, LiveElement, spinner } from "../dom.js";
 import { assetCard, robotCard, simulatorCard } from "../elements/bundle-inside.js";
 import { certificateCard } from "../elements/results.js";
 import { say, sayError } from "../elements/toasts.js";
@@ -37,7 +37,7 @@ export class DownloadPage extends LiveElement {
   connected() {
     this.#variants.project = this.project;
     this.#variants.hidden = true;
-    this.replaceChildren(h("div", { class: "page stack" }, this.#variants));
+    this.replaceChildren(h("div", { class: "page stack" }, spinner("Loading the bundle…"), this.#variants));
     live.addEventListener("project", () => this.#load(), { signal: this.signal });
     live.addEventListener("job", (event) => this.#hear(detailOf(event).job), { signal: this.signal });
     this.#load();

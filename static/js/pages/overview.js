@@ -1,7 +1,7 @@
 /** Overview page: facts of the recording, and the state of the project. */
 
 import { changeProject, getHistory, getProject, getSystem, readAgain } from "../api.js";
-import { detailOf, h, LiveElement, renew } from "../dom.js";
+import { detailOf, h, LiveElement, renew, spinner } from "../dom.js";
 import { allFigures, momentStrips, scanPictures, verdictCard } from "../elements/capture-report.js";
 import { Assignee } from "../elements/assignee.js";
 import { BackendChoice } from "../elements/backend-choice.js";
@@ -30,6 +30,7 @@ export class OverviewPage extends LiveElement {
   #assignee = new Assignee();
   #title = h("h1");
   #next = h("span");
+  #loading = spinner("Loading the project…");
   #head = h("header", {}, this.#title, this.#assignee, this.#next);
   #importing = h("section", { class: "card stack", hidden: true });
   #arriving = h("div", { class: "arriving" }); // reserves space for the next picture
@@ -63,6 +64,7 @@ export class OverviewPage extends LiveElement {
         "div",
         { class: "page" },
         this.#head,
+        this.#loading,
         this.#news,
         this.#importing,
         this.#upload,
@@ -76,6 +78,7 @@ export class OverviewPage extends LiveElement {
       ),
       this.#picker,
     );
+    for (const part of [this.#head, this.#checklist, this.#lengths, this.#opinions]) part.hidden = true;
     const { signal } = this;
     this.#picker.addEventListener("change", () => this.#give(), { signal });
     for (const choice of this.#choices) {
@@ -88,6 +91,7 @@ export class OverviewPage extends LiveElement {
     }, sayError);
     live.addEventListener("project", () => this.#load(), { signal });
     live.addEventListener("job", () => this.#load(), { signal });
+    live.addEventListener("online", () => !this.#loading.hidden && this.#load(), { signal }); // else the first load failed
     this.#load();
   }
 
@@ -130,6 +134,8 @@ export class OverviewPage extends LiveElement {
   /** @param {Project} project */
   #draw(project) {
     if (project.id !== this.project) return;
+    this.#loading.hidden = true;
+    this.#head.hidden = this.#checklist.hidden = false;
     for (const choice of this.#choices) choice.chosen = project[choice.seam];
     this.#methods.textContent = `Methods: ${SEAMS.map((seam) => project[seam])
       .filter((name) => name !== "none")

@@ -1,7 +1,7 @@
 /** Run page: start the pipeline, progress of each stage, cancel, log of a failed one, then the results and the certificate. */
 
 import { getCertificate, getProject, getScene, listJobs, startRun } from "../api.js";
-import { detailOf, h, LiveElement } from "../dom.js";
+import { detailOf, h, LiveElement, spinner } from "../dom.js";
 import { BeforeRun } from "../elements/before-run.js";
 import { JobPanel } from "../elements/job-panel.js";
 import { certificateCard, sceneTable } from "../elements/results.js";
@@ -22,8 +22,8 @@ const WORK = {
 export class RunPage extends LiveElement {
   project = "";
   #job = new JobPanel();
-  #start = h("button", { type: "button", class: "primary" }, "Run");
-  #lead = h("p", { class: "muted" });
+  #start = h("button", { type: "button", class: "primary", disabled: true }, "Run");
+  #lead = h("p", { class: "muted" }, spinner("Loading…"));
   #before = new BeforeRun();
   #soon = 0;
   #ready = false; // whether there is something to run
@@ -38,7 +38,7 @@ export class RunPage extends LiveElement {
         h("header", {}, h("h1", {}, "Run"), this.#start),
         this.#lead,
         this.#before.element,
-        h("section", { class: "card" }, this.#job),
+        h("section", { class: "card", hidden: true }, this.#job),
         this.#result,
       ),
     );
