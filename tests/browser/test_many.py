@@ -5,8 +5,8 @@ import re
 from playwright.sync_api import expect
 
 from tests.browser.looks import picture
-from tests.browser.serving import NewContext, wait_for_toast
-from tests.browser.test_together import rows, sample
+from tests.browser.serving import NewContext, box_of, wait_for_toast
+from tests.browser.test_together import rename, rows, sample
 from tests.browser.together import Server, post, signed_in
 
 
@@ -29,6 +29,13 @@ def test_a_long_object_list_is_searchable_and_new_object_stays_visible(new_conte
     picture(page, "many-objects")
     page.get_by_label("Find objects").fill("")
     expect(rows(page)).to_have_count(16)
+    long = "double_sink_cabinet_by_the_window_on_the_left"
+    rename(page, "drawer_1", long)
+    pane = box_of(page.locator(".objects-pane"))
+    for part in (page.get_by_role("button", name=f"Delete {long}"), page.get_by_label(f"Name of {long}")):
+        part.scroll_into_view_if_needed()
+        box = box_of(part)
+        assert box["x"] + box["width"] <= pane["x"] + pane["width"]
 
 
 def test_sixty_objects_are_grouped_locked_and_edited_together(new_context: NewContext, server: Server) -> None:

@@ -18,7 +18,7 @@ export class ObjectsPane extends EventTarget {
   list = new ObjectList();
   proposals = new ProposalList();
   checklist = new Checklist();
-  #run = h("a", { class: "button primary" }, "Run…");
+  #run = h("a", { class: "button" }, "Run…");
   element = h(
     "aside",
     { class: "objects-pane", "aria-label": "Objects" },
@@ -41,6 +41,7 @@ export class ObjectsPane extends EventTarget {
    */
   draw(objects, masks, contradicted) {
     const { current } = objects;
+    this.#run.classList.toggle("primary", objects.size > 0); // without objects, New object is what comes next
     this.checklist.objects = objects.sorted;
     this.list.setObjects(
       objects.sorted.map((object, k) => ({
