@@ -16,13 +16,13 @@ _FITTED = "fitted on 354 faces in 21 kitchens of four makers: benchmarks/front_c
 class Params:
     """Tuned parameters (weights) of the logistic model."""
 
-    faintest: float = param(0.449, "ratio", "Weight of the log-odds of the faintest edge", source=_FITTED)
-    change: float = param(0.291, "ratio", "Weight of the logarithm of the least colour change along an edge", source=_FITTED)
+    faintest: float = param(0.497, "ratio", "Weight of the log-odds of the faintest edge", source=_FITTED)
+    change: float = param(0.25, "ratio", "Weight of the logarithm of the least colour change along an edge", source=_FITTED)
     seam: float = param(
-        -0.432, "ratio", "Weight of the log-odds of a seam that was not cut and is not expected", source=_FITTED
+        3.921, "ratio", "Weight of the logarithm of the probability that no unexpected seam is inside", source=_FITTED
     )
-    size: float = param(-0.248, "ratio", "Weight of the squared deviation from the category's usual size", source=_FITTED)
-    offset: float = param(-3.487, "log", "Constant term of the log-odds", source=_FITTED)
+    size: float = param(-0.331, "ratio", "Weight of the squared deviation from the category's usual size", source=_FITTED)
+    offset: float = param(-0.544, "log", "Constant term of the log-odds", source=_FITTED)
     unlikeliest: float = param(
         30.0, "ratio", "Maximum squared deviation from the usual size that counts", source="5.5 standard deviations"
     )
@@ -45,7 +45,7 @@ def evidence(front: FrontPanel, category: Category) -> np.ndarray:
         [
             log_odds(min(front.edges[:shown])),
             np.log(max(min(front.changes[:shown]), 1.0)),
-            log_odds(unexpected_seam(front, category)),
+            np.log(1 - min(unexpected_seam(front, category), 0.999)),
             min(wide**2 + high**2, tuned(Params).unlikeliest),
             1.0,
         ]
