@@ -27,7 +27,7 @@ def add(parsers: Parsers) -> None:
             _listed("styles", STYLES),
             _listed("palettes", PALETTES),
             _listed("layouts", LAYOUTS),
-            "Without these options the seed also chooses the style: slab fronts, or frames round a sunk panel.",
+            "Without a style and a layout the seed also chooses the style: slab fronts, or frames round a sunk panel.",
         )
     )
 

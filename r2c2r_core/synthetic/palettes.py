@@ -25,9 +25,9 @@ _WOODS = (
 )
 
 
-def repaint(style: Style, palette: str, rng: np.random.Generator) -> Style:
-    """The style in the colours of a palette of choices.py."""
-    return _PAINTERS[palette](style, rng)
+def repaint(style: Style, palette: str | None, seed: int) -> Style:
+    """The style in the colours of a palette of choices.py; None keeps its own."""
+    return style if palette is None else _PAINTERS[palette](style, np.random.default_rng([seed, 13]))
 
 
 def _painted(style: Style, rng: np.random.Generator) -> Style:

@@ -19,7 +19,6 @@ from r2c2r_core.synthetic.build import build_kitchen
 from r2c2r_core.synthetic.choices import SEEDS_OWN, Choice
 from r2c2r_core.synthetic.hands import grip_of, hand_mover, hand_patches, hand_pose
 from r2c2r_core.synthetic.kitchen import Kitchen
-from r2c2r_core.synthetic.layout import plan_kitchen
 from r2c2r_core.synthetic.mesh import join_patches
 from r2c2r_core.synthetic.motions import Sight, motion_entries, sights
 from r2c2r_core.synthetic.opened_path import walk_and_open
@@ -77,7 +76,7 @@ def write_sample(
     out.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(paths.masks, ignore_errors=True)
     progress.at(0.0, "building the kitchen")
-    kitchen = plan_kitchen(seed) if choice == SEEDS_OWN else plan_styled_kitchen(seed, choice)
+    kitchen = plan_styled_kitchen(seed, choice)
     film = plan_film(kitchen, frames, np.random.default_rng([seed, 12])) if opened else None
     kitchen = kitchen if film is None else film.kitchen
     scenes = _still(kitchen, seed) if film is None else _moving(film, seed)

@@ -6,7 +6,7 @@ import numpy as np
 
 from r2c2r_core.synthetic.choices import DEFAULT_LAYOUT, DEFAULT_STYLE, Choice
 from r2c2r_core.synthetic.kitchen import Appliance, Furniture, Kitchen, Run
-from r2c2r_core.synthetic.layout import fill_worktop, hang_on_wall, place_fridge, place_microwave
+from r2c2r_core.synthetic.layout import fill_worktop, hang_on_wall, place_fridge, place_microwave, plan_kitchen
 from r2c2r_core.synthetic.looks import pick_look
 from r2c2r_core.synthetic.palettes import repaint
 from r2c2r_core.synthetic.style import pick_style
@@ -39,11 +39,12 @@ class _Rest:
 
 
 def plan_styled_kitchen(seed: int, choice: Choice) -> Kitchen:
-    """The kitchen of a seed with these choices; by default the seed's own paints, slabs, and one straight run."""
+    """The kitchen of a seed with these choices, of which a palette changes the paints only."""
+    if choice.style is None and choice.layout is None:
+        own = plan_kitchen(seed)
+        return replace(own, style=repaint(own.style, choice.palette, seed))
     rng, layout = np.random.default_rng([seed, 9]), choice.layout or DEFAULT_LAYOUT
-    paints, _ = pick_style(rng)
-    if choice.palette is not None:
-        paints = repaint(paints, choice.palette, rng)
+    paints = repaint(pick_style(rng)[0], choice.palette, seed)
     look, measures = pick_look(choice.style or DEFAULT_STYLE, rng), _pick_measures(rng)
     kit = Kit(measures=measures, style=paints, look=look)
     base = plan_row(_base_kinds(rng), kit, rng)

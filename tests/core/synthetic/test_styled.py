@@ -149,14 +149,23 @@ def test_object_surfaces_match_their_box(style: str) -> None:
         assert reach == pytest.approx(thing.dimensions_m / 2, abs=0.004), thing.name
 
 
+def shape(kitchen: Kitchen) -> list[tuple[bytes, int, bool]]:
+    """Every surface of a kitchen without its paint."""
+    return [(patch.grid.tobytes(), patch.object_id, patch.is_handle) for patch in build_kitchen(kitchen)]
+
+
 @pytest.mark.parametrize("palette", PALETTES)
-def test_a_palette_changes_the_front_paints_but_not_their_gaps_or_thickness(palette: str) -> None:
-    plain, painted = (plan_styled_kitchen(3, Choice(style="shaker", palette=p)) for p in (None, palette))
-    assert painted.style.base_front != plain.style.base_front
-    assert painted.style.gap_m == plain.style.gap_m
-    assert painted.style.front_thickness_m == plain.style.front_thickness_m
-    assert (painted.style.base_front == painted.style.wall_front) == (palette != "two-tone")
-    mean = float(np.mean(painted.style.base_front.colour))
+@pytest.mark.parametrize("others", [{}, {"style": "framed"}, {"layout": "island"}], ids=str)
+def test_a_palette_changes_paints_and_nothing_else(palette: str, others: dict[str, str]) -> None:
+    plain, painted = (plan_styled_kitchen(3, Choice(palette=p, **others)) for p in (None, palette))
+    assert shape(painted) == shape(plain)
+    assert (painted.room, painted.yaw_rad, painted.style.daylight) == (plain.room, plain.yaw_rad, plain.style.daylight)
+    style = painted.style
+    assert style.base_front != plain.style.base_front
+    assert (style.base_front == style.wall_front) == (palette != "two-tone")
+    ends = {board.paint for run in painted.runs for board in run.boards}
+    assert ends <= {style.base_front, style.wall_front, style.plinth, style.handle}
+    mean = float(np.mean(style.base_front.colour))
     assert {"dark": mean < 0.05, "white": mean > 0.7}.get(palette, True)
 
 
