@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sqlalchemy import Engine, text
+from sqlalchemy import Engine, bindparam, text
 from sqlmodel import Session, col, delete, or_, select, update
 
 from app.db.engine import is_shared, now, reading, writing
@@ -63,7 +63,9 @@ class JobRows:
         self.shared = is_shared(engine)
         locked = " FOR UPDATE SKIP LOCKED" if self.shared else ""
         self._claim = text(_CLAIM.format(kinds="", locked=locked))
-        self._claim_import = text(_CLAIM.format(kinds=f" AND kind IN {READS_RECORDING}", locked=locked))
+        self._claim_import = text(_CLAIM.format(kinds=" AND kind IN :kinds", locked=locked)).bindparams(
+            bindparam("kinds", READS_RECORDING, expanding=True)
+        )
         self._finishers, self._ended = finishers, ended
 
     def recover(self) -> None:
