@@ -46,6 +46,7 @@ class Params:
         "share",
         "Minimum fraction of a hole's rim in a level surface, such as a glass hob's worktop, for the hole to lie in it",
     )
+    below_m: float = param(0.08, "m", "Minimum depth below a level surface that is seen through: sinks have 0.12 m", gt=0)
     asked_frames: int = param(
         24, "count", "Maximum number of frames, spread over the recording, tested for seeing through a hole", ge=1
     )
@@ -207,14 +208,13 @@ class Scene:
 
     def _seen_through(self, point_world: Vector3) -> bool:
         """Whether most frames that measured depth at or behind a world point measured it behind."""
-        margin_m, before = tuned(Params).step_m, self.seen_from_all(point_world)[:, 2] > 0
-        ahead = [frame for frame, is_before in zip(self.frames, before, strict=True) if is_before]
-        chosen = np.linspace(0, len(ahead) - 1, min(len(ahead), tuned(Params).asked_frames)).round().astype(int)
-        votes = 0
-        for frame in (ahead[i] for i in chosen):
+        params, votes = tuned(Params), 0
+        ahead = [self.frames[i] for i in np.flatnonzero(self.seen_from_all(point_world)[:, 2] > 0)]
+        for i in np.linspace(0, len(ahead) - 1, min(len(ahead), params.asked_frames)).round().astype(int):
+            frame = ahead[i]
             sight = look_up(point_world[None], frame.world_from_camera, frame.depth_camera, self.depth(frame.index))
-            votes += int(self.noise.seen_through(sight.seen_m, sight.z_m, margin_m)[0])
-            votes -= int(self.noise.agrees(sight.seen_m, sight.z_m, margin_m)[0])
+            votes += int(self.noise.seen_through(sight.seen_m, sight.z_m, params.below_m)[0])
+            votes -= int(self.noise.agrees(sight.seen_m, sight.z_m, params.below_m)[0])
         return votes > 0
 
 
