@@ -71,3 +71,23 @@ def test_confirming_all_skips_doubtful_proposals(new_context: NewContext, server
     page.keyboard.press("Shift+Y")
     expect(rows(page)).to_have_count(4)
     expect(proposals.get_by_role("listitem")).to_have_count(2)
+
+
+def test_an_object_takes_the_category_of_the_proposal_clicked_unless_one_is_typed(
+    new_context: NewContext, server: Server
+) -> None:
+    page = signed_in(new_context(viewport={"width": 1280, "height": 1000}), server, "ann")
+    page.goto(f"{sample(page)}/annotate?frame=3")
+    proposals = page.get_by_label("Proposals", exact=True)
+    expect(proposals.get_by_role("listitem")).to_have_count(3)
+    page.get_by_role("button", name="New object").click()
+    click_frame(page, 98, 62)
+    expect(rows(page)).to_have_count(3)
+    expect(rows(page).last).to_contain_text("bottle")
+    expect(proposals.get_by_role("listitem")).to_have_count(2)  # it is this object now
+    picture(page, "proposal-clicked")
+    page.get_by_label("Category of the next object").fill("oven")
+    page.get_by_role("button", name="New object").click()
+    click_frame(page, 62, 58)
+    expect(rows(page)).to_have_count(4)
+    expect(rows(page).last).to_contain_text("oven")

@@ -9,13 +9,15 @@ import { usableName } from "../lib/format.js";
 
 /** @typedef {import("../lib/checklist.js").Listed} Listed */
 
+const UNSAID = "drawer"; // category where neither the user nor a proposal says one
+
 export class Checklist {
   #category = h("input", {
     type: "text",
-    value: "drawer",
+    placeholder: "as proposed",
     list: "categories",
     "aria-label": "Category of the next object",
-    title: "Category of the next object",
+    title: `Category of the next object; empty: that of the proposal it is clicked in, else ${UNSAID}`,
   });
   #name = h("input", {
     type: "text",
@@ -40,15 +42,13 @@ export class Checklist {
   fields = [this.#category, this.#named];
   element = h("details", { class: "checklist", open: true, hidden: true }, this.#count, this.#lines);
 
-  /** Category and name of the object that the next click creates. */
-  get next() {
-    return { category: this.category, name: usableName(this.#name.value) || undefined };
+  /** Category and name of the next object. @param {string | undefined} proposed category of a proposal where it is clicked */
+  next(proposed) {
+    const category = this.#category.value.trim() || proposed || UNSAID;
+    return { category, name: usableName(this.#name.value) || undefined };
   }
 
-  get category() {
-    return this.#category.value.trim() || "object";
-  }
-
+  /** @param {string} category */
   set category(category) {
     this.#category.value = category;
   }
@@ -88,8 +88,8 @@ export class Checklist {
   /** @param {string | null} name null: none of the list */
   choose(name) {
     this.#free = name === null;
-    this.#chosen = name;
     this.#fill(this.left.find((entry) => entry.name === name) ?? null);
+    this.#chosen = name;
     this.#draw();
   }
 
@@ -116,7 +116,7 @@ export class Checklist {
   /** @param {Listed | null} entry */
   #fill(entry) {
     this.#name.value = entry?.name ?? "";
-    if (entry) this.category = entry.category;
+    if (entry || this.#chosen) this.category = entry?.category ?? "";
   }
 
   /** @param {Listed} entry */

@@ -34,6 +34,11 @@ export class ObjectsPane extends EventTarget {
     this.#run.href = `/p/${id}/run`;
   }
 
+  /** Category and name of the object that these clicks create. @param {import("../api-types").PointIn[]} points */
+  next(points) {
+    return this.checklist.next(this.proposals.at(points)?.category);
+  }
+
   /**
    * @param {SceneObjects} objects
    * @param {import("./masks.js").Masks} masks

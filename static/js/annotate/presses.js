@@ -24,7 +24,7 @@ export class Presses extends EventTarget {
    * @param {import("./scene-objects.js").SceneObjects} objects
    * @param {import("./edits.js").Edits} edits
    * @param {import("./player.js").Player} player
-   * @param {() => { category: string, name?: string }} next category and name of the next object
+   * @param {(points: PointIn[]) => { category: string, name?: string }} next category and name of the object that clicks create
    * @param {(spot: Spot) => number[]} under ids of the objects whose masks cover a spot, topmost first
    */
   constructor(objects, edits, player, next, under) {
@@ -104,7 +104,7 @@ export class Presses extends EventTarget {
   #place(points, hold) {
     this.#batching = hold;
     this.#forced = false;
-    this.#edits.place(points, { ...this.#next(), infer: !hold });
+    this.#edits.place(points, { ...this.#next(points), infer: !hold });
   }
 
   /** @param {Spot & { frame: number }} pin */

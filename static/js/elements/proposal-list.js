@@ -10,7 +10,7 @@ import { detailOf, h, icon, LiveElement, renew, reveal } from "../dom.js";
 import { Answers } from "../lib/answers.js";
 import { counted } from "../lib/format.js";
 import { alike, kindOf } from "../lib/likeness.js";
-import { neighbour, surest } from "../lib/proposals.js";
+import { neighbour, proposedAt, surest } from "../lib/proposals.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
 import { say, sayError } from "./toasts.js";
@@ -105,6 +105,12 @@ export class ProposalList extends LiveElement {
         label: `${item.category} ${percent(item)}`,
         current: item.id === this.#current,
       }));
+  }
+
+  /** The proposal that clicks of a new object are on. @param {import("../api-types").PointIn[]} points */
+  at(points) {
+    const on = points.find(({ label }) => label === 1);
+    return on && proposedAt(this.#all.items, on);
   }
 
   /** One-line hint of the available actions; null when nothing is highlighted. */

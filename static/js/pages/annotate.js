@@ -66,7 +66,7 @@ export class AnnotatePage extends LiveElement {
     this.#objects,
     this.#edits,
     this.#player,
-    () => this.#pane.checklist.next,
+    (points) => this.#pane.next(points),
     (spot) => this.#canvas.objectsAt(spot),
   );
   #parts = {
