@@ -14,7 +14,7 @@ const UNSAID = "drawer"; // category where neither the user nor a proposal says 
 export class Checklist {
   #category = h("input", {
     type: "text",
-    placeholder: "as proposed",
+    placeholder: "auto",
     list: "categories",
     "aria-label": "Category of the next object",
     title: `Category of the next object; empty: that of the proposal it is clicked in, else ${UNSAID}`,
