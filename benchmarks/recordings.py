@@ -105,7 +105,7 @@ def _click(
     mask, pose = masks(thing.name, frame), recorded.poses[frame]
     if mask is None or pose is None:
         return None
-    face = mask & _front_pixels(thing, recorded.camera(frame), pose) if thing.joints else mask
+    face = mask & _front_pixels(thing, recorded.cameras[frame], pose) if thing.joints else mask
     inside = cv2.distanceTransform(np.pad(face.astype(np.uint8), 1), cv2.DIST_L2, 5)[1:-1, 1:-1] > CLICK_MARGIN_PX
     if not inside.any():
         return None

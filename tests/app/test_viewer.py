@@ -340,6 +340,6 @@ def test_the_real_viewer_shows_cloud_candidate_placement_and_scene(web: Running)
     assert web.post(place, {"pose": None})["pose"] == STANDING
     assert np.allclose(web.post(place, {"pose": MOVED})["pose"], MOVED, atol=1e-6)  # single precision in transit
     web.post(place, {"pose": [[0.0] * 4] * 3}, 422)
-    web.post(show, {"mode": "aligned", "object": drawer + 1}, 422)
+    web.post(show, {"mode": "aligned", "object": drawer + 1}, 409)
     with web.client.websocket_connect(SOCKETS + url, subprotocols=[PROTOCOL], headers={"origin": ORIGIN}) as socket:
         assert len(socket.receive_bytes()) > 0
