@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import trimesh
-from worlds import Surface, World, box_of, joint_of, record, room
+from worlds import Surface, World, box_of, film, joint_of, room
 
 from r2c2r_core.synthetic.truth import TrueObject
 
@@ -48,16 +48,13 @@ def main() -> None:
     """Draw the recording."""
     parser = argparse.ArgumentParser(description="The Franka kitchen as a recording.")
     parser.add_argument("source", type=Path)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--frames", type=int, default=120)
-    parser.add_argument("--size", default="640x480")
-    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--scale", type=float, default=0.575)
-    options = parser.parse_args()
-    width, height = (int(side) for side in options.size.split("x"))
+    film(parser, _read)
+
+
+def _read(options: argparse.Namespace) -> World:
     with tempfile.TemporaryDirectory() as scratch:
-        world = franka_kitchen(_unpacked(options.source, Path(scratch)) / _MODEL, options.scale)
-    record(world, options.out, frames=options.frames, size=(width, height), seed=options.seed)
+        return franka_kitchen(_unpacked(options.source, Path(scratch)) / _MODEL, options.scale)
 
 
 def _unpacked(source: Path, scratch: Path) -> Path:

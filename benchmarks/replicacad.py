@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
-from worlds import Surface, World, box_of, joint_of, record, room
+from worlds import Surface, World, box_of, film, joint_of, room
 
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.transforms import Rigid3
@@ -58,13 +58,7 @@ def main() -> None:
     """Draw the recording."""
     parser = argparse.ArgumentParser(description="ReplicaCAD's articulated pieces as a recording.")
     parser.add_argument("folder", type=Path)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--frames", type=int, default=120)
-    parser.add_argument("--size", default="640x480")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    width, height = (int(side) for side in options.size.split("x"))
-    record(replica_room(options.folder), options.out, frames=options.frames, size=(width, height), seed=options.seed)
+    film(parser, lambda options: replica_room(options.folder))
 
 
 def replica_room(folder: Path) -> World:

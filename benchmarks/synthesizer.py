@@ -9,13 +9,12 @@ colours are drawn here. Doors and drawers are objects of their own, appliances a
 import argparse
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 import trimesh
-from worlds import Surface, World, box_of, joint_of, record, room
+from worlds import Surface, World, box_of, film, joint_of, room
 
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.synthetic.truth import TrueJoint, TrueObject
@@ -40,13 +39,7 @@ class Piece(NamedTuple):
 def main() -> None:
     """Draw the recording."""
     parser = argparse.ArgumentParser(description="A kitchen of scene_synthesizer as a recording.")
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--frames", type=int, default=120)
-    parser.add_argument("--size", default="640x480")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    width, height = (int(side) for side in options.size.split("x"))
-    record(kitchen(options.seed), options.out, frames=options.frames, size=(width, height), seed=options.seed)
+    film(parser, lambda options: kitchen(options.seed))
 
 
 def kitchen(seed: int) -> World:

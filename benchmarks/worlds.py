@@ -5,8 +5,9 @@ clicks) and masks/NNNNNN.png (number of the object + 1, 0 = none). Renderer, lig
 or with the second generator.
 """
 
+import argparse
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -65,6 +66,17 @@ class Shot(NamedTuple):
     depth_m: np.ndarray  # (h, w); 0 without a hit
     cosine: np.ndarray  # (h, w) between ray and surface
     thing: np.ndarray  # (h, w) index, -1 for none
+
+
+def film(parser: argparse.ArgumentParser, world_of: Callable[[argparse.Namespace], World]) -> None:
+    """Record the world that a command's options describe; adds the options of the film to those of the world."""
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--frames", type=int, default=120)
+    parser.add_argument("--size", default="640x480")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    width, height = (int(side) for side in options.size.split("x"))
+    record(world_of(options), options.out, frames=options.frames, size=(width, height), seed=options.seed)
 
 
 def record(world: World, out: Path, *, frames: int, size: tuple[int, int], seed: int) -> None:
