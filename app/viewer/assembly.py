@@ -104,16 +104,15 @@ class Assembly:
                 )
 
     @property
-    def bounds(self) -> tuple[Vector3, Vector3]:
-        """Lowest and highest corner of all visible bodies, closed."""
-        return self.bounds_of({body.object_name for body in self.plan.bodies})
+    def points(self) -> Points:
+        """Vertices (N, 3) of all visible bodies, closed."""
+        return self.points_of({body.object_name for body in self.plan.bodies})
 
-    def bounds_of(self, names: Collection[str]) -> tuple[Vector3, Vector3]:
-        """Lowest and highest corner of the visible ones of these objects, closed."""
+    def points_of(self, names: Collection[str]) -> Points:
+        """Vertices (N, 3) of the visible ones of these objects, closed; the origin if none is visible."""
         shown = [(body, shape) for body, shape in self._shown() if body.object_name in names]
-        corners = [body.world_from_body.apply(shape.vertices) for body, shape in shown if len(shape.vertices)]
-        stacked = np.vstack(corners) if corners else np.zeros((1, 3))
-        return stacked.min(axis=0), stacked.max(axis=0)
+        found = [body.world_from_body.apply(shape.vertices) for body, shape in shown if len(shape.vertices)]
+        return np.vstack(found) if found else np.zeros((1, 3))
 
     def move(self, values: Mapping[str, float]) -> None:
         """Set joints to these positions, clamped to their limits, and move the bodies."""

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from r2c2r_core.arrays import Vector3
+from r2c2r_core.arrays import Points, Vector3
 
 Axis = Literal["front", "back", "left", "right", "top", "bottom"]
 AXES: tuple[Axis, ...] = get_args(Axis)
@@ -90,12 +90,25 @@ def _turn(camera: Any, position: tuple[float, ...], target: tuple[float, ...], f
     camera.position, camera.look_at = position, target
 
 
-def from_axis(axis: Axis, facing: Vector3, low: Vector3, high: Vector3) -> tuple[Vector3, Vector3]:
-    """Position and target that show all of a box from one side; `facing` is the horizontal direction of its fronts."""
-    target, half = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+def from_axis(axis: Axis, facing: Vector3, points: Points) -> tuple[Vector3, Vector3]:
+    """Position and target that show all points from one side; `facing` is the horizontal direction of the fronts."""
     ahead = np.array([facing[0], facing[1], 0.0]) / max(float(np.hypot(facing[0], facing[1])), 1e-9)
     right = np.array([-ahead[1], ahead[0], 0.0])  # to the right when facing the fronts
     up = np.array([0.0, 0.0, 1.0])
     tilt = 1e-3 * ahead  # straight down there is no up
     ways = {"front": ahead, "back": -ahead, "left": -right, "right": right, "top": up + tilt, "bottom": tilt - up}
-    return target + ways[axis] * half / np.sin(USUAL_FOV / 2), target
+    return from_direction(ways[axis], points)
+
+
+def from_direction(towards_camera: Vector3, points: Points) -> tuple[Vector3, Vector3]:
+    """Position and target whose square picture, with the usual lens, just contains all points (N, 3)."""
+    back = towards_camera / np.linalg.norm(towards_camera)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= max(float(np.linalg.norm(right)), 1e-9)
+    axes = np.array([right, np.cross(back, right), back])
+    seen = points @ axes.T
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    beside, above, nearer = (seen - middle).T
+    distance = (nearer + np.maximum(abs(beside), abs(above)) / np.tan(USUAL_FOV / 2)).max()
+    target = middle @ axes
+    return target + distance * back, target

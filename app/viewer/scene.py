@@ -1,5 +1,6 @@
 """Content of a project's 3D view, read from its workspace. Runs in the viewer's process."""
 
+import itertools
 import json
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -12,10 +13,11 @@ from app.errors import NotReady
 from app.viewer import gizmo as handles
 from app.viewer import heat
 from app.viewer.assembly import Assembly, Draw, JointValue, Style, assemble, undressed
-from app.viewer.camera import AXES, USUAL_FOV, Lens, from_axis
+from app.viewer.camera import AXES, Lens, from_axis, from_direction
 from app.viewer.clip import Span, clip_of, span_of
 from app.viewer.picking import Picked, first_of, nearest_point
 from app.viewer.reduced import MAX_FACES, reduced
+from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.errors import InputError
 from r2c2r_core.export.plan import facing
 from r2c2r_core.geometry.transforms import Rigid3
@@ -88,7 +90,7 @@ class View:
         if wish.get("focus") and wish.get("look") == "object":
             self._look_from_path(np.asarray(wish["focus"], dtype=np.float64), distance=0.6)
         if wish.get("look") in AXES:
-            self._look(*from_axis(wish["look"], self._facing(), *self._bounds()))
+            self._look(*from_axis(wish["look"], self._facing(), self._points()))
         if wish.get("look") == "run":
             self._look(*from_axis("front", *self._run()))
         if wish.get("look") == "photo" and wish.get("frame") is not None:
@@ -174,8 +176,7 @@ class View:
         """Extent to which a clip box refers: the shown scene, else most of the scan."""
         if self.assembly is not None:
             return self.assembly.span
-        low, high = self._bounds()
-        return span_of(self._facing(), [np.array([low, high, [low[0], high[1], low[2]], [high[0], low[1], high[2]]])])
+        return span_of(self._facing(), [self._points()])
 
     @property
     def span_m(self) -> list[float] | None:
@@ -254,7 +255,9 @@ class View:
         assert self.assembly is not None
         self.assembly.hide(wish.get("hidden") or ())
         self.assembly.choose(self.chosen)
-        self._look_at_all(*self.assembly.bounds)
+        positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
+        points = self.assembly.points
+        self._look(*from_direction(positions.mean(axis=0) - points.mean(axis=0), points))
         return f"{len(self.joints)} joints" + (", colliders" if wish.get("draw") in ("colliders", "both") else "")
 
     def _corrected(self, item: SceneObject, said: Overrides) -> SceneObject:
@@ -338,14 +341,6 @@ class View:
         _ = shown.vertex_normals  # without them every face is shaded flat
         return self.server.scene.add_mesh_trimesh(node, shown, cast_shadow=False)
 
-    def _look_at_all(self, low: np.ndarray, high: np.ndarray) -> None:
-        """Look from the filming position, far enough back to show all."""
-        positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
-        back = positions.mean(axis=0) - (low + high) / 2
-        away = max(float(np.linalg.norm(back)), 1e-6)
-        needed = float(np.linalg.norm(high - low)) / 2 / np.sin(USUAL_FOV / 2)
-        self._look_from_path((low + high) / 2, distance=max(needed / away, 1.0))
-
     def _look_from_path(self, target: np.ndarray, distance: float = 1.15) -> None:
         """Look at the target from the mean filming position; `distance` as a factor of its distance."""
         positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
@@ -356,28 +351,27 @@ class View:
         if not self.steady:
             self.lens.look(position, target)
 
-    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest corner of the content: all of the scene, else most of the scan."""
+    def _points(self) -> Points:
+        """Points (N, 3) of the content: all of the scene, else the corners of most of the scan."""
         if self.assembly is not None:
-            return self.assembly.bounds
+            return self.assembly.points
         low, high = np.percentile(self._capture().surface.vertices_world, (2, 98), axis=0)
-        return low, high
+        return np.array(list(itertools.product(*zip(low, high, strict=True))))
 
-    def _facing(self) -> np.ndarray:
+    def _facing(self) -> Vector3:
         """Direction of the fronts; without openable ones, towards the filming position."""
         found = facing(self.assembly.plan) if self.assembly is not None else None
-        low, high = self._bounds()
         positions = np.array([frame.world_from_camera.translation for frame in self._capture().frames])
-        return found if found is not None else positions.mean(axis=0) - (low + high) / 2
+        return found if found is not None else positions.mean(axis=0) - self._points().mean(axis=0)
 
-    def _run(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Direction of the chosen object's front, and bounds of all objects facing the same way; of everything without one."""
+    def _run(self) -> tuple[Vector3, Points]:
+        """Direction of the chosen object's front, and points of all objects facing the same way; of everything without one."""
         bodies = self.assembly.plan.bodies if self.assembly is not None else ()
         ahead = next((-b.world_from_body.rotation[:, 1] for b in bodies if b.object_name == self.chosen), None)
         if self.assembly is None or ahead is None:
-            return self._facing(), *self._bounds()
+            return self._facing(), self._points()
         facing_there = {b.object_name for b in bodies if -b.world_from_body.rotation[:, 1] @ ahead > _ONE_RUN}
-        return ahead, *self.assembly.bounds_of(facing_there)
+        return ahead, self.assembly.points_of(facing_there)
 
     def _stand_where_filmed(self, index: int) -> None:
         """Move the camera to a photo's pose with its lens, upright."""

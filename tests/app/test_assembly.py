@@ -1,5 +1,6 @@
 """The scene in the 3D view: joint motion, ray picking, visibility, and corrections shown before a run."""
 
+import itertools
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from app.viewer import heat
 from app.viewer.assembly import Style, assemble
-from app.viewer.camera import LONG_FOV, USUAL_FOV, from_axis
+from app.viewer.camera import LONG_FOV, USUAL_FOV, from_axis, from_direction
 from app.viewer.scene import View
 from r2c2r_core.workspace import Workspace
 from tests.app.finished import keep_results
@@ -121,8 +122,24 @@ def test_switching_to_the_long_lens_keeps_the_apparent_size_of_the_target(view: 
     ("axis", "way"), [("front", (0, -1, 0)), ("right", (1, 0, 0)), ("left", (-1, 0, 0)), ("top", (0, 0, 1))]
 )
 def test_side_views_are_named_from_a_viewer_facing_the_fronts(axis: Any, way: tuple[int, int, int]) -> None:
-    place, target = from_axis(axis, -AHEAD, -np.ones(3), np.ones(3))
+    place, target = from_axis(axis, -AHEAD, np.array(list(itertools.product((-1.0, 1.0), repeat=3))))
     assert np.allclose((place - target) / np.linalg.norm(place - target), way, atol=2e-3)
+
+
+@pytest.mark.parametrize("towards", [(0.0, -1.0, 0.0), (0.4, -0.8, 0.5), (1.0, 0.2, -0.3)])
+def test_a_whole_scene_just_fills_a_square_picture(towards: tuple[float, float, float]) -> None:
+    points = np.random.default_rng(0).uniform((-1.5, 0.0, 0.0), (1.5, 0.6, 2.0), (50, 3)) @ [
+        [0.6, 0.8, 0],
+        [-0.8, 0.6, 0],
+        [0, 0, 1],
+    ]
+    place, target = from_direction(np.array(towards), points)
+    back = (place - target) / np.linalg.norm(place - target)
+    assert np.allclose(back, np.array(towards) / np.linalg.norm(towards))
+    right = np.cross([0.0, 0.0, 1.0], back) / np.linalg.norm(np.cross([0.0, 0.0, 1.0], back))
+    rays = points - place
+    picture = np.abs(rays @ np.column_stack([right, np.cross(back, right)])) / -(rays @ back)[:, None]
+    assert picture.max() == pytest.approx(np.tan(USUAL_FOV / 2))
 
 
 def test_a_clip_box_clips_meshes_and_ray_hits_and_outlines_the_cut() -> None:

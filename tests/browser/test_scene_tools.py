@@ -64,7 +64,7 @@ def front_camera() -> tuple[np.ndarray, np.ndarray]:
     shown = Assembly(None, plan, {body.name: list(shapes_of(body.link, "meshes")) for body in plan.bodies})
     ahead = facing(plan)
     assert ahead is not None
-    return from_axis("front", ahead, *shown.bounds)
+    return from_axis("front", ahead, shown.points)
 
 
 def stands_in_front(page: Page) -> bool:
