@@ -1,6 +1,7 @@
 # make demo   the sample kitchen through every stage, its certified bundle, and the app opened on it
 # make test   everything CI runs
 # make slow   the tests that take long: before a release
+# make screens  the pictures of the documentation, from a real run
 # make env | check | docs | bench beside them
 SHELL := /bin/bash
 PYTHON ?= python3
@@ -11,7 +12,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 LEARNED := $(VENV)/.learned
 
-.PHONY: demo test slow env check docs bench libs clean
+.PHONY: demo test slow env check docs screens bench libs clean
 
 demo: env
 	"$(BIN)/python" -m r2c2r_core.cli demo --data "$(DATA)" --port $(PORT) $(DEMO)
@@ -49,6 +50,9 @@ check: env
 # in build/site, without the network
 docs: env
 	NO_MKDOCS_2_WARNING=1 "$(BIN)/mkdocs" build --strict --quiet
+
+screens: env
+	"$(BIN)/python" -m scripts.screens
 
 bench: env
 	"$(BIN)/python" benchmarks/guard.py $(BENCH)
