@@ -10,7 +10,6 @@ from r2c2r_core.ingest.doctor.report import VERDICTS, CaptureFigures, Remark, Ve
 from r2c2r_core.ingest.doctor.unit import Unit
 from r2c2r_core.tuning import param, tuned
 
-_FIRST = ("gravity_off",)  # heights, the floor and all upright directions depend on it
 _UNKNOWN = "the cause is unknown: check the poses (order, handedness), the calibration, the unit of the depth"
 _REGISTER = "read it with --register-depth, which registers the depth by this fit"
 
@@ -113,21 +112,21 @@ def judge(
     registration: Registration | None,
     unit: Unit | None = None,
 ) -> tuple[Remark, ...]:
-    """Remarks, worst first; among equals, causes before symptoms. A remark on wrong gravity comes first."""
+    """Remarks, worst first; among equals, causes before symptoms. Planes of wrongly read poses say nothing about gravity."""
     params = tuned(Params)
     depth, recording = _depth(figures, unit), _recording(figures)
     if figures.depth_coverage < params.depth[0]:  # all else follows from that
         return (*depth, *recording)
     found = (
         *depth,
-        *_gravity(figures),
+        *(_gravity(figures) if convention is None else ()),
         *_conventions(figures, convention, scale, registration),
         *recording,
         *_tracking(figures, explained=convention is not None or scale is not None),
         *_shares(figures, _PICTURES),
         *_room(figures),
     )
-    return tuple(sorted(found, key=lambda r: (r.cause not in _FIRST, -VERDICTS.index(r.verdict))))
+    return tuple(sorted(found, key=lambda r: -VERDICTS.index(r.verdict)))
 
 
 def plausible(median_m: float) -> bool:

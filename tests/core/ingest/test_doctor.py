@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.transforms import Rigid3, rotation_about_z
 from r2c2r_core.ingest.doctor import CaptureReport, draw_scan, examine, refusal_to_json
+from r2c2r_core.ingest.doctor.hypotheses import Finding
 from r2c2r_core.ingest.doctor.recorded import measure_timing
 from r2c2r_core.ingest.doctor.verdict import judge
 from r2c2r_core.ingest.readers.table import open_recording
@@ -244,17 +245,40 @@ def test_few_frames_missing_floor_and_assumed_up_are_reported(capture):
     assert examine(replace(capture, frames=capture.frames[:1])).verdict == "unusable"
 
 
-def test_a_gravity_error_is_reported_first_with_its_angle(capture):
-    def report(off, corrected):
-        room = replace(capture.room, up_file_off_deg=off, up_corrected=corrected, floor_found=False)
-        return examine(replace(capture, room=room, frames=capture.frames[:4]))  # too few: unusable for another reason
+@pytest.mark.parametrize(
+    ("off", "corrected", "verdict"), [(2.1, True, "good"), (5.0, True, "usable with care"), (5.0, False, "usable with care")]
+)
+def test_a_gravity_error_is_reported_with_its_angle_behind_worse_faults(off, corrected, verdict, capture):
+    room = replace(capture.room, up_file_off_deg=off, up_corrected=corrected, floor_found=False)
+    few = examine(replace(capture, room=room, frames=capture.frames[:4]))
+    assert (few.verdict, few.remarks[0].cause) == ("unusable", "few_frames")
+    gravity = next(r for r in few.remarks if r.cause == "gravity_off")
+    assert gravity.text.startswith(f"the recording's gravity is {off:.1f} deg off its level and upright planes")
+    assert gravity.verdict == verdict
+    alike = [r.cause for r in few.remarks if r.verdict == verdict]
+    assert alike[0] == "gravity_off"  # before the floor, which follows from it
 
-    assert "gravity_off" not in {r.cause for r in report(1.4, False).remarks}
-    for off, corrected, verdict in ((2.1, True, "good"), (5.0, True, "usable with care"), (5.0, False, "usable with care")):
-        found = report(off, corrected)
-        assert found.reasons[0].startswith(f"the recording's gravity is {off:.1f} deg off its level and upright planes")
-        assert found.remarks[0].verdict == verdict
-        assert found.verdict == "unusable"
+
+def test_a_small_gravity_error_is_not_reported(capture):
+    room = replace(capture.room, up_file_off_deg=1.4, up_corrected=False)
+    assert "gravity_off" not in {r.cause for r in examine(replace(capture, room=room)).remarks}
+
+
+def test_planes_of_wrongly_read_poses_say_nothing_about_gravity(report):
+    figures = replace(report.figures, up_file_off_deg=20.0, up_corrected=True)
+    inverted = Finding(
+        cause="poses_inverted",
+        text="the poses are world-to-camera",
+        factor=None,
+        agreement_given=0.1,
+        agreement_so=0.9,
+        error_given_mm=None,
+        error_so_mm=None,
+    )
+    causes = {r.cause for r in judge(figures, inverted, None, None)}
+    assert "poses_inverted" in causes
+    assert "gravity_off" not in causes
+    assert "gravity_off" in {r.cause for r in judge(figures, None, None, None)}
 
 
 def test_an_ambiguous_up_is_reported_with_the_alternative_direction(capture):
