@@ -68,6 +68,14 @@ def test_an_unusable_corrected_camera_gives_way_to_the_recorded_one(tmp_path):
     assert [round(f.rgb_camera.fx / SMALL.focal, 3) for f in recording.frames] == [1.0, 1.0, 1.2, 1.0]
 
 
+def test_an_empty_corrected_image_gives_way_to_the_recorded_one(tmp_path):
+    folder = write_polycam(tmp_path / "p", SMALL) / "keyframes"
+    sorted((folder / "corrected_images").iterdir())[1].write_bytes(b"")
+    recording = open_recording(tmp_path / "p")
+    assert ["corrected" in f.rgb_name for f in recording.frames] == [True, False, True, True]
+    assert [round(f.rgb_camera.fx / SMALL.focal, 3) for f in recording.frames] == [1.0, 1.2, 1.0, 1.0]
+
+
 @pytest.mark.parametrize("own", [[[200.0, 200.0, 24.0, 32.0]], [None, [200.0, 200.0, 24.0, 32.0]]])
 def test_record3d_cameras_of_some_frames_are_used_for_those(own, tmp_path):
     recording = open_recording(write_r3d(tmp_path / "a.r3d", SMALL, perFrameIntrinsicCoeffs=own))
