@@ -20,6 +20,7 @@ from app.jobs.far import ELEVATIONS, FarWorker
 from app.jobs.live_session import LiveSession
 from app.jobs.mask_store import MaskFile
 from app.jobs.plans import Commands
+from app.jobs.proposal_wire import read_proposals
 from app.process import Worker
 from app.settings import Settings
 from app.store.protocol import Store
@@ -175,7 +176,8 @@ class LiveSegmenters:
         worker = self.far(project, files, options) or Worker(command, files.root / "logs" / "live.log")
         told = self._tell_object, self._tell_again
         session = LiveSession(project, files, segmenter, worker, self._hub, self._lock, *told)
-        session.proposals_path = None if files.proposals.is_file() else files.proposals
+        done, session.proposals = read_proposals(files.proposals)
+        session.proposals_path = files.proposals if done < 1.0 else None
         self._sessions[project] = session
         self._ended.pop(project, None)
         threading.Thread(target=self._follow, args=(session,), name=f"live-{project}", daemon=True).start()

@@ -4,7 +4,6 @@ The segmenter gets all objects of the project, as a click on one may split the f
 The methods are called under the lock of app.jobs.live, except `take`, which acquires it.
 """
 
-import json
 import logging
 import threading
 import time
@@ -20,8 +19,8 @@ from app.hub import Hub
 from app.jobs import mask_store
 from app.jobs.far import FarWorker
 from app.jobs.mask_store import MaskFile, mask_path
+from app.jobs.proposal_wire import write_proposals
 from app.process import Line, Worker
-from r2c2r_core.workspace import write_atomically
 
 _log = logging.getLogger(__name__)
 
@@ -68,8 +67,8 @@ class LiveSession:
     watched: float | None = None  # when a tab last watched it; None: never
     tasks: dict[int, Task] = field(default_factory=dict)
     objects: list[dict[str, Any]] = field(default_factory=list)  # the project's, in the format of app.jobs.disputes
-    proposals_path: Path | None = None  # destination of proposals; None when they exist already
-    proposals: list[dict[str, Any]] = field(default_factory=list)
+    proposals_path: Path | None = None  # destination of proposals; None when all exist already
+    proposals: list[dict[str, Any]] = field(default_factory=list)  # found so far, also by an interrupted search before this one
     proposed: float = 0.0  # fraction of the proposal work done
     at_work: float | None = field(default_factory=time.time)  # start of the work not yet recorded
     worked: list[tuple[float, float]] = field(default_factory=list)  # (began, ended), to be stored by the caller
@@ -159,23 +158,27 @@ class LiveSession:
         self.tell_status()
 
     def _take_proposals(self, line: Line) -> None:
+        """Show and store the proposals so far; those of an interrupted search are kept until this one is complete."""
         with self.lock:
             self.used = time.monotonic()
-            grown = len(line["proposals"]) != len(self.proposals)
-            self.proposals, self.proposed = line["proposals"], float(line["fraction"])
-            done = self.proposed >= 1.0
+            found, self.proposed = line["proposals"], float(line["fraction"])
+            done, known = self.proposed >= 1.0, {one["id"] for one in found}
+            before = self.proposals
+            self.proposals = found if done else [*found, *(one for one in before if one["id"] not in known)]
+            changed = done or self.proposals != before
+            if changed and "error" not in line:
+                self._keep_proposals()
             if done:
-                self._keep_proposals("error" in line)
+                self.proposals_path = None
             self._note_work()
-        self.hub.publish("proposals", self.project, fraction=self.proposed, changed=grown or done)
+        self.hub.publish("proposals", self.project, fraction=self.proposed, changed=changed)
 
-    def _keep_proposals(self, failed: bool) -> None:
-        path, self.proposals_path = self.proposals_path, None
-        if path is not None and not failed:
-            try:
-                write_atomically(path, json.dumps(self.proposals).encode())
-            except OSError as error:  # a full disk: they are shown during this session, and computed again another time
-                _log.warning("proposals of %s: %s", self.project, error)
+    def _keep_proposals(self) -> None:
+        try:
+            if self.proposals_path is not None:
+                write_proposals(self.proposals_path, self.proposed, self.proposals)
+        except OSError as error:  # a full disk: those not stored are computed again another time
+            _log.warning("proposals of %s: %s", self.project, error)
 
     def _take_mask(self, line: Line) -> None:
         number = int(line["object"])

@@ -12,6 +12,7 @@ from app.jobs.mask_wire import mask_bits
 from r2c2r_core.arrays import Mask
 from r2c2r_core.geometry.masks import unpack_mask
 from r2c2r_core.model.proposal import Proposal
+from r2c2r_core.workspace import write_atomically
 
 _SMOOTH = 0.002  # tolerance of the outline's simplification, as a fraction of the frame's width
 
@@ -36,13 +37,18 @@ def proposal_line(proposal: Proposal, preview_width: int) -> dict[str, Any]:
     }
 
 
-def read_proposals(path: Path) -> list[dict[str, Any]] | None:
-    """The proposals stored in a file; None where it is missing or incomplete."""
+def write_proposals(path: Path, fraction: float, lines: list[dict[str, Any]]) -> None:
+    """Store the proposals found so far, with the completed fraction of the search."""
+    write_atomically(path, json.dumps({"fraction": fraction, "proposals": lines}).encode())
+
+
+def read_proposals(path: Path) -> tuple[float, list[dict[str, Any]]]:
+    """Completed fraction of the search (1: all are known) and the proposals, as stored; none where the file is unreadable."""
     try:
-        lines: list[dict[str, Any]] = json.loads(path.read_text())
-    except (FileNotFoundError, ValueError):
-        return None
-    return lines
+        stored = json.loads(path.read_text())
+        return float(stored["fraction"]), list(stored["proposals"])
+    except (FileNotFoundError, ValueError, KeyError, TypeError):
+        return 0.0, []
 
 
 def _outline(mask: Mask) -> list[list[float]]:

@@ -87,13 +87,10 @@ def _look(context: Context, project_id: str) -> _Found:
         there, by_object = queries.live_objects(session, project_id), queries.clicks_by_object(session, project_id)
     clicks = {(c.frame, c.x, c.y) for item in there for c in by_object.get(item.id or 0, []) if c.label}
     at_work = context.live.proposing(project_id)
-    stored = read_proposals(context.files(project).proposals) if at_work is None else None
-    lines = at_work[1] if at_work is not None else stored or []
+    fraction, lines = at_work or read_proposals(context.files(project).proposals)
     left = [line for line in lines if (line["frame"], line["x"], line["y"]) not in clicks]
     names = {item.id: item.name for item in there}
-    if at_work is not None:
-        return _Found("running", at_work[0], left, dismissed, names)
-    return _Found("none" if stored is None else "done", float(stored is not None), left, dismissed, names)
+    return _Found("running" if at_work is not None else "done" if fraction >= 1.0 else "none", fraction, left, dismissed, names)
 
 
 def _wanted(context: Context, project_id: str, ids: list[str]) -> list[schemas.Proposal]:

@@ -1,6 +1,8 @@
 from collections.abc import Callable
 from typing import Any
 
+from app.files import project_files
+from app.jobs.proposal_wire import read_proposals, write_proposals
 from tests.app.conftest import Running
 
 CLICK = {"frame": 3, "x": 100.5, "y": 60.5, "label": 1}
@@ -92,6 +94,41 @@ def test_dismissals_survive_a_restart_and_can_be_restored(start: Callable[..., A
         assert web.get(f"/api/projects/{project}/live")["state"] == "off"
         back = web.post(f"/api/projects/{project}/proposals/restore")
         assert (len(back["items"]), back["dismissed"]) == (3, 0)
+
+
+def test_proposals_of_an_interrupted_search_are_shown_and_kept(start: Callable[..., Any]) -> None:
+    with start() as web:
+        project = web.sample()
+        at = f"/api/projects/{project}/proposals"
+        slow = next(web.settings.data_dir.rglob("work")) / "propose_slowly"
+        slow.touch()
+        web.post(f"/api/projects/{project}/live/open")
+        web.until(lambda: len(web.get(at)["items"]) == 1)
+        found = web.get(at)
+        assert (found["state"], found["fraction"]) == ("running", 0.5)
+    with start() as web:
+        kept = web.get(at)  # before the search begins again
+        assert (kept["state"], kept["items"]) == ("none", found["items"])
+        web.post(f"{at}/dismiss", {"ids": [found["items"][0]["id"]]})
+        slow.unlink()
+        assert [item["category"] for item in proposed(web, project, count=2)] == ["drawer", "bottle"]
+        assert web.get(at)["dismissed"] == 1
+
+
+def test_a_search_that_begins_again_keeps_showing_earlier_proposals(web: Running) -> None:
+    project = web.sample()
+    files = project_files(web.settings.data_dir, project)
+    earlier = proposed(web, project)
+    web.context.live.close(project)
+    stored = read_proposals(files.proposals)[1]
+    write_proposals(files.proposals, 0.6, [stored[0], stored[2]])  # as an interrupted search leaves them
+    (files.work / "propose_slowly").touch()
+    web.post(f"/api/projects/{project}/live/open")
+    at = f"/api/projects/{project}/proposals"
+    web.until(lambda: web.get(at)["fraction"] == 0.5)
+    assert [item["id"] for item in web.get(at)["items"]] == [earlier[0]["id"], earlier[2]["id"]]
+    (files.work / "propose_slowly").unlink()
+    assert proposed(web, project) == earlier
 
 
 def test_confirming_a_dismissed_proposal_is_not_found(web: Running) -> None:

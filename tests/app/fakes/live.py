@@ -64,6 +64,8 @@ def propose() -> None:
         for k, (kind, category, confidence, x) in enumerate(PROPOSED)
     ]
     say(proposals=found[:1], fraction=0.5)
+    while Path(sys.argv[1], "propose_slowly").exists():
+        time.sleep(0.02)
     say(proposals=found, fraction=1.0)
 
 
