@@ -15,7 +15,7 @@ from app.schemas.description import DescribedObject, DescribedPoint, Description
 from r2c2r_core.errors import InputError
 
 _OF_ACCOUNTS = {"owner_id", "assignee_id"}  # described by name, as account numbers differ between databases
-_DESCRIBED = {"id", "name", "category", "colour", "deleted", "front", "frames", "crop", "run_name", "assignee"}  # of an object
+_UNDESCRIBED = {"project_id", "version", "masks_key", "inputs"}  # of an object: derived, or given by the database
 _DERIVED = {"certificate"}  # stored in the bundle itself
 
 
@@ -43,7 +43,7 @@ def describe(session: Session, project: Project, files: ProjectFiles) -> Descrip
         members=sorted(queries.who_sees(session, project) - {owner}),
         objects=[
             DescribedObject(
-                **item.model_dump(include=_DESCRIBED),
+                **item.model_dump(exclude=_UNDESCRIBED),
                 points=points[item.id or 0],
                 override=relative(overrides.get(item.id, {}), files.root),
                 verdicts=verdicts[item.id or 0],

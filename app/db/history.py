@@ -1,6 +1,6 @@
 """Event history with old and new values of every change, for undo and redo that survive a restart.
 
-An object's state has two scopes with separate undo: `prompts` (name, category, colour, clicks, assignee, deletion) and
+An object's state has two scopes with separate undo: `prompts` (name, category, colour, clicks, assignee, lock, deletion) and
 `review` (verdicts, corrections). A state is flat: a key for each field, click, correction and verdict. An event stores only
 the differing keys, so the history grows with the changes, not with the state. Undo restores an event's old values and is
 itself an event; nothing is ever removed.
@@ -27,7 +27,7 @@ from app.errors import Conflict
 Scope = Literal["prompts", "review"]
 State = dict[str, Any]
 
-_FIELDS = ("name", "category", "colour", "deleted", "front", "crop", "assignee")
+_FIELDS = ("name", "category", "colour", "deleted", "front", "crop", "assignee", "locked_by")
 _POINT, _FRAME, _CORRECTION, _VERDICT = "point ", "frame ", "override ", "verdict "  # then id, frame, field, candidate
 
 

@@ -239,6 +239,7 @@ class SceneObject(SQLModel, table=True):
     crop: dict[str, Any] | None = Field(default=None, sa_column=Column(JSON(none_as_null=True)))  # as in prompts.json
     masks_key: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of all inputs of its masks
     assignee: str | None = Field(default=None, index=True)  # current assignee, by name
+    locked_by: str | None = None  # name of the user who locked it against changes
     inputs: str = Field(default="", sa_column_kwargs={"server_default": ""})  # db/keys.py: of all inputs of its results
     run_name: str = Field(default="", sa_column_kwargs={"server_default": ""})  # name in the last run; empty: unchanged
 

@@ -31,6 +31,7 @@ class DescribedObject(Shape):
     front: dict[str, Any] | None = None
     crop: dict[str, Any] | None = None
     assignee: str | None = None
+    locked_by: str | None = None
     run_name: str = ""  # its name in the last run, if different
     frames: dict[str, Any] = Field(default_factory=dict)
     override: dict[str, Any] = Field(default_factory=dict)

@@ -78,6 +78,7 @@ class ObjectPatch(Shape):
     front: PromptsFileFront | None = None
     crop: PromptsFileCrop | None = None
     assignee: Word | None = None
+    locked: bool | None = None  # against changes by anybody, until somebody unlocks it
     version: int | None = None
 
 
@@ -96,6 +97,7 @@ class SceneObject(Shape):
     frames: list[FrameSaid]  # corrected by a user
     crop: PromptsFileCrop | None  # bounding box drawn by a user
     assignee: str | None  # current assignee
+    locked_by: str | None  # the user who locked it against changes
     can_undo: bool
     can_redo: bool
     segment: SegmentState

@@ -66,6 +66,11 @@ class ProjectFile(Document):
     colours: list[Annotated[int, Field(ge=0, lt=2**31)]] = Field(
         max_length=MOST_OBJECTS, description="a list of places in the palette, one for each object of prompts.json"
     )
+    locks: list[Word | None] = Field(
+        default_factory=list,
+        max_length=MOST_OBJECTS,
+        description="a list of who locked each object of prompts.json; null: nobody",
+    )
     checklist: list[ListedObject] = Field(
         default_factory=list, max_length=MOST_OBJECTS, description="a list of objects that are to be clicked"
     )

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, BeforeValidator, StringConstraints
 from r2c2r_core.texts import OBEYED
 
 LONGEST_FILE_NAME = 255  # bytes: the limit of file systems
+LONGEST_WORD = 60  # characters
 
 
 def readable(value: Any) -> Any:
@@ -34,7 +35,9 @@ def short_enough(text: str) -> str:
     return text
 
 
-Word = Annotated[str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=60)]  # of an object, a category …
+Word = Annotated[
+    str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=LONGEST_WORD)
+]  # an object, a user …
 Title = Annotated[str, BeforeValidator(one_line), StringConstraints(min_length=1, max_length=120)]  # of a project
 Remark = Annotated[str, BeforeValidator(one_line), StringConstraints(max_length=1000)]  # a reason, possibly empty
 Prose = Annotated[str, BeforeValidator(lines), StringConstraints(min_length=1, max_length=2000)]  # of several lines

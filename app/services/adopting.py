@@ -144,6 +144,7 @@ def _write_prompts(session: Session, item: SceneObject, entry: DescribedObject, 
     item.name, item.category, item.colour, item.deleted = entry.name, entry.category, entry.colour, False
     item.front, item.frames, item.crop, item.run_name = entry.front, entry.frames, entry.crop, entry.run_name
     item.assignee = entry.assignee if entry.assignee and queries.has_account(session, entry.assignee) else None
+    item.locked_by = entry.locked_by
     session.add(item)
     session.exec(delete(Point).where(col(Point.object_id) == item.id))
     session.add_all(Point(object_id=item.id or 0, **point.model_dump()) for point in entry.points)

@@ -15,7 +15,7 @@ IDLE_S = 120.0  # a longer pause between changes does not count as work
 _HEAD = ["project", "person", "object", "category", "clicks", "verdicts and corrections", "comments", "minutes"]
 _TRUTH = ["true object", "mask IoU", "same category"]  # of a honeypot
 _COUNTED = {"prompts": "clicks", "proposals": "clicks", "review": "verdicts", "comments": "comments"}
-_NO_CLICKS = {"prompts/import", "prompts/assign", "proposals/restore"}  # actions without clicks
+_NO_CLICKS = {"prompts/import", "prompts/assign", "prompts/lock", "proposals/restore"}  # actions without clicks
 
 
 @dataclass(slots=True)

@@ -147,6 +147,7 @@ def _about(session: Session, project: Project, files: ProjectFiles, kept: Path |
         ),
         checklist=[schemas.ListedObject(**entry) for entry in project.checklist],
         colours=[item.colour for item in items],
+        locks=[item.locked_by for item in items],
         comments=[_comment(row, places) for row in comments],
         true_lengths=[_length(row, project, places) for row in lengths if row.object_id is None or row.object_id in places],
     )

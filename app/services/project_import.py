@@ -1,6 +1,6 @@
 """Import of a project's file (project_export.py), fully validated and without acting for local users.
 
-Comments are attributed to the importing user, with the original names in the text; approvals and verdicts are not imported.
+Comments and locks keep their users' names, marked as imported; approvals and verdicts are not imported.
 """
 
 import json
@@ -10,6 +10,7 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from app.db.keys import stored_entry
 from app.db.tables import Comment, Event, Project, SceneObject, TrueLength, Upload
 from app.files import ProjectFiles, delete_folder, project_files, require_free, safe_name
 from app.jobs.outcomes import adopt_prompts
+from app.schemas.text import LONGEST_WORD
 from app.services import imports, in_frames, probing, projects, quotas
 from app.services.context import Context
 from app.services.project_export import ABOUT, MESHES, OVERRIDES, PROMPTS, RECORDING, recording_name
@@ -38,6 +40,7 @@ from r2c2r_core.workspace import write_atomically
 _HINT = "export the project again"
 _ID = re.compile(r"[A-Za-z0-9_.:+-]+")  # of a candidate: never a path
 _PIECE = 1 << 20
+_ELSEWHERE = " (imported)"  # after the name of a user of another server
 MISSING = {
     "kind": "recording",
     "message": "the project's file came without its recording",
@@ -129,6 +132,8 @@ def _check_places(given: _Given, name: str) -> None:
     in_frames.check_file(table, given.prompts)
     if len(about.colours) != objects:
         raise InputError(f"{name}: {ABOUT}: {len(about.colours)} colours of {objects} objects", hint=_HINT)
+    if len(about.locks) > objects:
+        raise InputError(f"{name}: {ABOUT}: {len(about.locks)} locks of {objects} objects", hint=_HINT)
     for place in (*(one.said.object for one in about.comments), *(one.said.object for one in about.true_lengths)):
         if place is not None and place >= objects:
             raise InputError(f"{name}: {ABOUT}: it refers to object {place}, the last is {objects - 1}", hint=_HINT)
@@ -228,8 +233,8 @@ def _rows(
         )
         absent = _choose(project, about)
         items = adopt_prompts(session, project, given.prompts, context.who)
-        for item, colour in zip(items, about.colours, strict=True):
-            item.colour = colour
+        for item, colour, locked_by in zip_longest(items, about.colours, about.locks):
+            item.colour, item.locked_by = colour, _imported(locked_by) if locked_by else None
             if (entry := given.overrides.get(item.name)) is not None:
                 with history.change(session, item, "review", "import", f"corrections of {item.name}", who=context.who):
                     history.set_override(session, item, entry)
@@ -259,12 +264,12 @@ def _choose(project: Project, about: schemas.ProjectFile) -> list[str]:
 
 
 def _say(context: Context, session: Session, project: Project, about: schemas.ProjectFile, items: list[SceneObject]) -> None:
-    """Add comments and lengths, attributed to the importing user."""
+    """Add comments by their authors, marked as imported, and lengths, attributed to the importing user."""
     now = time.time()
     for comment in about.comments:
         place, said = comment.said.object, comment.said.model_dump(exclude={"object", "text", "point_world"})
-        row = Comment(project_id=project.id, who=context.who, at=min(comment.at, now), **said)
-        row.text, row.object_id = f"{comment.who}: {comment.said.text}", None if place is None else items[place].id
+        row = Comment(project_id=project.id, who=_imported(comment.who), at=min(comment.at, now), **said)
+        row.text, row.object_id = comment.said.text, None if place is None else items[place].id
         row.point_world = list(comment.said.point_world) if comment.said.point_world else None
         if comment.resolved:
             row.resolved_by, row.resolved_at = context.who, now
@@ -274,6 +279,11 @@ def _say(context: Context, session: Session, project: Project, about: schemas.Pr
         row_of = TrueLength(project_id=project.id, who=context.who, at=min(length.at, now), scale=project.scale, **measured)
         row_of.side, row_of.object_id = length.said.side or "", None if place is None else items[place].id
         session.add(row_of)
+
+
+def _imported(who: str) -> str:
+    """Name of a user of another server, who may not be the one of that name here."""
+    return f"{who.removesuffix(_ELSEWHERE)[: LONGEST_WORD - len(_ELSEWHERE)]}{_ELSEWHERE}"
 
 
 def _note(

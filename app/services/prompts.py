@@ -19,6 +19,8 @@ from r2c2r_core.errors import PromptError
 from r2c2r_core.texts import identifier, name_fault
 from r2c2r_core.workspace import noun_path
 
+_ACTIONS = {("assignee",): "assign", ("locked_by",): "lock"}  # by the changed fields: those that no result depends on
+
 
 class Change(NamedTuple):
     """A changed object with its API schema."""
@@ -74,9 +76,11 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
         project = queries.project_row(session, project_id)
         item = queries.object_row(session, project_id, object_id)
         refuse_overtaken(context, session, project, item, body)
+        if body.locked is not False:
+            _refuse_locked(item)
         wanted = _wanted(context, session, item, body)
         text = ", ".join(_said_of(item, key, value) for key, value in wanted.items()) or "nothing"
-        action = "assign" if wanted.keys() == {"assignee"} else "edit"
+        action = _ACTIONS.get(tuple(wanted), "edit")
         with history.change(session, item, "prompts", action, text, who=context.who):
             if "name" in wanted and not item.run_name and _has_results(context.files(project), item.name, str(wanted["name"])):
                 item.run_name = item.name
@@ -103,7 +107,7 @@ def delete(context: Context, project_id: str, object_id: int) -> schemas.SceneOb
     """Delete the object; undo restores it."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        item = queries.object_row(session, project_id, object_id)
+        item = _unlocked_row(session, project_id, object_id)
         with history.change(session, item, "prompts", "delete", f"deleted {item.name}", who=context.who):
             item.deleted = True
             session.add(item)
@@ -115,7 +119,7 @@ def add_point(context: Context, project_id: str, object_id: int, body: schemas.P
     """Add one click."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        item = queries.object_row(session, project_id, object_id)
+        item = _unlocked_row(session, project_id, object_id)
         check_point(table_of(context, project), body.frame, body.x, body.y)
         text = f"{'+' if body.label else '-'} point on {item.name}, frame {body.frame}"
         with history.change(session, item, "prompts", "add point", text, who=context.who, frame=body.frame):
@@ -128,7 +132,7 @@ def add_points(context: Context, project_id: str, object_id: int, body: schemas.
     """Add several clicks as one change."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        item = queries.object_row(session, project_id, object_id)
+        item = _unlocked_row(session, project_id, object_id)
         table = table_of(context, project)
         for point in body.points:
             check_point(table, point.frame, point.x, point.y)
@@ -146,7 +150,7 @@ def move_point(
     """Move a click or flip its label."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        item = queries.object_row(session, project_id, object_id)
+        item = _unlocked_row(session, project_id, object_id)
         point = _point(session, item, point_id)
         changes = body.model_dump(exclude_none=True)
         check_point(table_of(context, project), point.frame, changes.get("x", point.x), changes.get("y", point.y))
@@ -162,7 +166,7 @@ def delete_point(context: Context, project_id: str, object_id: int, point_id: in
     """Delete a click."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        item = queries.object_row(session, project_id, object_id)
+        item = _unlocked_row(session, project_id, object_id)
         point = _point(session, item, point_id)
         text = f"removed a point of {item.name}, frame {point.frame}"
         with history.change(session, item, "prompts", "remove point", text, who=context.who, frame=point.frame):
@@ -177,7 +181,7 @@ def say_of_frame(
     """Correct an object in one frame; None removes the correction."""
     with writing(context.engine) as session:
         project = queries.project_row(session, project_id)
-        item = queries.object_row(session, project_id, object_id)
+        item = _unlocked_row(session, project_id, object_id)
         if body is not None:  # a correction of a missing frame can still be removed
             check_said(table_of(context, project), item.name, frame, body.mask)
         others = {number: said for number, said in item.frames.items() if number != str(frame)}
@@ -311,6 +315,7 @@ def _shape(
         deleted=item.deleted,
         points=[schemas.Point(id=p.id or 0, frame=p.frame, x=p.x, y=p.y, label=1 if p.label else 0) for p in clicks],
         assignee=item.assignee,
+        locked_by=item.locked_by,
         can_undo=steps.undo,
         can_redo=steps.redo,
         front=schemas.PromptsFileFront.model_validate(readable_front(item.front)) if item.front is not None else None,
@@ -353,6 +358,8 @@ def _wanted(context: Context, session: Session, item: SceneObject, body: schemas
     if "assignee" in body.model_fields_set:
         name = assigning.require_name(context, session, item.project_id, body.assignee) if body.assignee else None
         wanted |= {"assignee": name} if name != item.assignee else {}
+    if body.locked is not None and body.locked == (item.locked_by is None):
+        wanted["locked_by"] = context.who if body.locked else None
     return wanted
 
 
@@ -365,6 +372,8 @@ def _said_of(item: SceneObject, key: str, value: object) -> str:
     """Description of a field's change."""
     if key == "assignee":
         return f"{item.name} assigned to {value or 'nobody'}"
+    if key == "locked_by":
+        return f"{item.name} {'locked' if value else 'unlocked'}"
     if key == "crop":
         return f"crop box of {item.name} {'set' if value is not None else 'taken away'}"
     if key != "front":
@@ -374,6 +383,19 @@ def _said_of(item: SceneObject, key: str, value: object) -> str:
 
 def _gives_masks(body: schemas.ObjectIn) -> bool:
     return bool(body.points) or body.front is not None
+
+
+def _unlocked_row(session: Session, project_id: str, object_id: int) -> SceneObject:
+    """The row of an object that may be changed."""
+    item = queries.object_row(session, project_id, object_id)
+    _refuse_locked(item)
+    return item
+
+
+def _refuse_locked(item: SceneObject) -> None:
+    """Raise Conflict for a locked object."""
+    if item.locked_by is not None:
+        raise Conflict(f"{item.name} is locked by {item.locked_by}", hint="unlock it in the list of objects to change it")
 
 
 def _point(session: Session, item: SceneObject, point_id: int) -> Point:

@@ -177,7 +177,7 @@ def _record(context: Context, session: Session, project: Project, to: str, reaso
 
 def _figures(session: Session, project: Project) -> schemas.Figures:
     items = queries.live_objects(session, project.id)
-    clicks = _events(session, project.id, "prompts", without=("import", "assign"))
+    clicks = _events(session, project.id, "prompts", without=("import", "assign", "lock"))
     clicks += _events(session, project.id, "proposals", without=("restore",))
     accepted = select(Verdict.object_id).where(
         col(Verdict.object_id).in_([item.id for item in items]), Verdict.verdict == "accepted"

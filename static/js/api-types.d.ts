@@ -741,6 +741,7 @@ export interface ObjectPatch {
   front?: PromptsFileFrontInput | null;
   crop?: PromptsFileCrop | null;
   assignee?: string | null;
+  locked?: boolean | null;
   version?: number | null;
 }
 
@@ -1264,6 +1265,7 @@ export interface SceneObject {
   frames: FrameSaid[];
   crop: PromptsFileCrop | null;
   assignee: string | null;
+  locked_by: string | null;
   can_undo: boolean;
   can_redo: boolean;
   segment: "none" | "waiting" | "running" | "partial" | "done" | "failed";

@@ -20,8 +20,6 @@ import { verdictOf } from "./lib/rebased.js";
 const at = (project) => `/api/projects/${encodeURIComponent(project)}`;
 /** @param {string} project @param {Ref} object */
 const on = (project, object) => `${at(project)}/objects/${object}`;
-/** Id of the object that a change applies to; NaN if the server has not assigned one yet. @param {Change} change */
-export const objectOf = ({ path }) => Number(/\/objects\/(\d+)/.exec(path)?.[1]);
 /** @param {object} json @returns {Record<string, unknown>} */
 const body = (json) => ({ ...json });
 

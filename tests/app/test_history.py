@@ -147,7 +147,7 @@ def whole(session: Session, scope: history.Scope) -> Any:
     flat = history.snapshot(session, session.get_one(SceneObject, 1), scope)
     if scope == "prompts":
         points = [{"id": int(key.split()[1]), **value} for key, value in flat.items() if key.startswith("point ")]
-        newer = ("front", "crop", "assignee")  # fields that did not exist at that revision
+        newer = ("front", "crop", "assignee", "locked_by")  # fields that did not exist at that revision
         fields = {key: value for key, value in flat.items() if " " not in key and key not in newer}
         return fields | {"points": points}
     corrected = {key.split()[1]: value for key, value in flat.items() if key.startswith("override ")}

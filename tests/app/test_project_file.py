@@ -45,6 +45,7 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, s
         at = f"/api/projects/{project}"
         drawer, mug = (item["id"] for item in web.post(f"{at}/prompts.json", {"version": 2, "objects": OBJECTS}))
         web.patch(f"{at}/objects/{mug}", {"colour": 9})
+        web.patch(f"{at}/objects/{drawer}", {"locked": True})
         web.patch(f"{at}/objects/{drawer}/override", {"joint_upper": 0.3, "dimensions_m": [0.6, 0.5, 0.2], "rerun": False})
         web.post(f"{at}/objects/{mug}/candidates?filename=mine.glb&rerun=false", content=b"glTF" * 99, status=201)
         web.post(f"{at}/comments", {"object": mug, "frame": 3, "x": 4.0, "y": 5.0, "text": SAID}, 201)
@@ -115,7 +116,8 @@ def test_a_project_file_restores_all_annotations_on_another_server(first: tuple[
     assert (stored / "uploads" / mesh.removeprefix("meshes/")).read_bytes() == b"glTF" * 99
     assert [item["colour"] for item in second.get(f"{at}/objects")] == [0, 9]
     one, settled = second.get(f"{at}/comments")
-    assert (one["text"], one["who"], one["object"]) == (f"ann: {SAID}", "bea", second.get(f"{at}/objects")[1]["id"])
+    assert [item["locked_by"] for item in second.get(f"{at}/objects")] == ["ann (imported)", None]
+    assert (one["text"], one["who"], one["object"]) == (SAID, "ann (imported)", second.get(f"{at}/objects")[1]["id"])
     assert (settled["resolved_by"], one["resolved_at"]) == ("bea", None)
     (length,) = second.get(f"{at}/lengths")["lengths"]
     assert (length["text"], length["metres"], length["who"]) == ("width of drawer_1", 0.6, "bea")
@@ -201,6 +203,7 @@ REFUSED: list[tuple[str, Callable[[Any], Any], str]] = [
     ("project.json", lambda d: {**d, "owner": "root"}, "unknown key 'owner'"),
     ("project.json", lambda d: {**d, "recording": {**d["recording"], "included": True}}, "names the recording"),
     ("project.json", lambda d: {**d, "colours": [1]}, "1 colours of 2 objects"),
+    ("project.json", lambda d: {**d, "locks": [None] * 3}, "3 locks of 2 objects"),
     (
         "project.json",
         lambda d: {**d, "comments": [{**d["comments"][0], "said": {"object": 2, "text": "x"}}]},

@@ -78,9 +78,10 @@ def test_sixty_objects_are_grouped_locked_and_edited_together(new_context: NewCo
     page.get_by_label("Category for all").press("Enter")
     expect(page.get_by_role("heading", name="sink 3")).to_be_visible()
     page.get_by_label("Selected objects").get_by_role("button", name="Lock").click()
+    expect(page.get_by_label("Selected objects").get_by_role("button", name="Unlock")).to_be_visible()
     picture(page, "sixty-objects")
     page.get_by_label("Selected objects").get_by_role("button", name="Delete").click()
-    wait_for_toast(page, "jar_1 is locked")
+    wait_for_toast(page, "3 locked objects left out: jar_1 (by ann)")
     page.get_by_label("Which objects").select_option("locked")
     expect(page.locator(".object-list .pick")).to_have_count(3)
     page.reload()  # a lock is stored

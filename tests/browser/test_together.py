@@ -126,6 +126,17 @@ def test_clicks_survive_undo_conflicts_lost_connections_and_server_crashes(peopl
     for page in people:
         expect(page.get_by_role("button", name="glass_of_ann", exact=True)).to_be_visible()
 
+    # a lock holds for both
+    ann.get_by_role("button", name="Lock glass_of_ann").click()
+    bea.get_by_role("button", name="Unlock glass_of_ann").wait_for()
+    bea.get_by_role("button", name="Delete glass_of_ann").click()
+    wait_for_toast(bea, "1 locked object left out: glass_of_ann (by ann)")
+    pick(bea, "glass_of_ann")
+    click_frame(bea, 100, 30)
+    wait_for_toast(bea, "glass_of_ann is locked by ann")
+    bea.get_by_role("button", name="Unlock glass_of_ann").click()
+    ann.get_by_role("button", name="Lock glass_of_ann").wait_for()
+
     # the server dies; later clicks are sent once it is back, even from a page that was closed
     stored(ann)
     server.kill()

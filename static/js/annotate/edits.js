@@ -21,6 +21,8 @@ import { saving } from "../saving.js";
  * @typedef {import("../changes.js").Change<T>} Change
  */
 
+const UNLOCK = "To change one, unlock it in the list, or choose it and press Shift+L.";
+
 export class Edits extends EventTarget {
   project = "";
   #objects;
@@ -125,18 +127,35 @@ export class Edits extends EventTarget {
 
   /**
    * @param {number} id
-   * @param {{ name?: string, category?: string, assignee?: string | null, crop?: import("../api-types").PromptsFileCrop | null }} wanted
+   * @param {{ name?: string, category?: string, assignee?: string | null, locked?: boolean, crop?: import("../api-types").PromptsFileCrop | null }} wanted
    * @param {SceneObject | null} seen the object as the user saw it when changing it
    */
   patch(id, wanted, seen = this.#objects.get(id)) {
     return seen ? this.#tell(changes.changeObject(this.project, seen, wanted)) : Promise.resolve(false);
   }
 
+  /** Lock the objects against changes by anybody, or unlock them if all are locked. @param {SceneObject[]} objects */
+  lock(objects) {
+    const locked = objects.some(({ locked_by }) => locked_by === null);
+    for (const one of objects) if (locked === (one.locked_by === null)) this.patch(one.id, { locked });
+  }
+
+  /** The objects that may be changed; a message names the locked ones. @param {SceneObject[]} objects */
+  unlocked(objects) {
+    const locked = objects.filter(({ locked_by }) => locked_by !== null);
+    const named = locked.slice(0, 4).map(({ name, locked_by }) => `${name} (by ${locked_by})`);
+    const more = locked.length > named.length ? " …" : "";
+    if (locked.length)
+      say(`${counted(locked.length, "locked object")} left out: ${named.join(", ")}${more}`, { hint: UNLOCK });
+    return objects.filter(({ locked_by }) => locked_by === null);
+  }
+
   /**
-   * @param {SceneObject[]} objects
+   * @param {SceneObject[]} all
    * @param {string | null} name
    */
-  async assign(objects, name) {
+  async assign(all, name) {
+    const objects = this.unlocked(all);
     const answers = await Promise.all(objects.map(({ id }) => this.patch(id, { assignee: name })));
     const count = answers.filter(Boolean).length;
     if (!count) return;
@@ -146,10 +165,11 @@ export class Edits extends EventTarget {
 
   /**
    * Give several objects one name, numbered from left to right and top to bottom as they stand in the room.
-   * @param {SceneObject[]} objects
+   * @param {SceneObject[]} all
    * @param {string} name
    */
-  async renameAll(objects, name) {
+  async renameAll(all, name) {
+    const objects = this.unlocked(all);
     const fronts = await getFoundFronts(this.project).catch((error) => (sayError(error), null));
     if (!fronts) return;
     const mine = arranged(objects, fronts).map((object) => ({ key: String(object.id), name: object.name }));
@@ -165,7 +185,7 @@ export class Edits extends EventTarget {
    */
   async merge(id, other) {
     const [kept, gone] = [this.#objects.get(Math.min(id, other)), this.#objects.get(Math.max(id, other))];
-    if (!kept || !gone) return;
+    if (!kept || !gone || this.unlocked([kept, gone]).length < 2) return;
     const points = gone.points.flatMap(({ frame, x, y, label }) => (label === 1 ? [{ frame, x, y, label }] : []));
     this.#objects.choose(kept.id);
     const merged = !points.length || (await this.#tell(changes.addPoints(this.project, kept.id, points)));
@@ -173,8 +193,9 @@ export class Edits extends EventTarget {
       say(`${gone.name} is merged into ${kept.name}`, { hint: "undo twice brings it back" });
   }
 
-  /** @param {SceneObject[]} objects */
-  async remove(objects) {
+  /** @param {SceneObject[]} all */
+  async remove(all) {
+    const objects = this.unlocked(all);
     const answers = await Promise.all(objects.map(({ id }) => this.#tell(changes.deleteObject(this.project, id))));
     const gone = objects.filter((_, k) => answers[k]);
     if (gone.length === 1) say(`Deleted ${gone[0]?.name}; undo brings it back`);
@@ -210,18 +231,13 @@ export class Edits extends EventTarget {
   }
 
   /**
-   * Send a change and report its saving state; a refusal by the server or by a lock is shown as a toast.
+   * Send a change and report its saving state; a refusal by the server is shown as a toast.
    * @template T
    * @param {Change<T>} change
    * @param {string} [key]
    * @returns {Promise<T>}
    */
   save(change, key) {
-    const locked = this.#objects.get(changes.objectOf(change));
-    if (locked && this.#objects.isLocked(locked.id)) {
-      say(`${locked.name} is locked: unlock it in the list to change it`);
-      return Promise.reject(new Error("locked"));
-    }
     return saving(change, key, (how) => this.#say("saved", how));
   }
 

@@ -58,7 +58,7 @@ export class ObjectsPane extends EventTarget {
         current: object.id === current,
         selected: objects.isSelected(object.id),
         hidden: objects.isHidden(object.id),
-        locked: objects.isLocked(object.id),
+        locked: object.locked_by !== null,
         mine: object.assignee === this.me,
       })),
     );

@@ -1,14 +1,11 @@
 /**
- * Client-side state of the project's objects: chosen, selected, hidden, locked, and the colour of each. Locks are stored in
- * this browser only: they protect finished objects from the user's own accidental changes.
+ * Client-side state of the project's objects: chosen, selected, hidden, and the colour of each.
  * Emits "change" when a redraw is needed, "choose" when another object or none is chosen, "gone" {id} when one is deleted.
  */
 
 import { isComing } from "../lib/listing.js";
 
 /** @typedef {import("../api-types").SceneObject} SceneObject */
-
-const LOCKED = "r2c2r-locked";
 
 export class SceneObjects extends EventTarget {
   /** @type {Map<number, SceneObject>} */
@@ -17,11 +14,8 @@ export class SceneObjects extends EventTarget {
   #current = null;
   /** @type {Set<number>} */
   #hidden = new Set();
-  /** @type {Set<number>} */
-  #locked = new Set();
   /** @type {Set<number>} objects to be changed together */
   #selected = new Set();
-  #project = "";
   /** @type {string[]} */
   palette = ["#e69f00"];
 
@@ -30,12 +24,6 @@ export class SceneObjects extends EventTarget {
     this.#all = new Map(objects.map((object) => [object.id, object]));
     if (this.#current !== null && !this.#all.has(this.#current)) this.choose(null);
     else this.#say("change");
-  }
-
-  /** @param {string} id */
-  set project(id) {
-    this.#project = id;
-    this.#locked = new Set(JSON.parse(localStorage.getItem(`${LOCKED}-${id}`) ?? "[]"));
   }
 
   /** Id of the chosen object. */
@@ -79,17 +67,6 @@ export class SceneObjects extends EventTarget {
   /** @param {number} id */
   isHidden(id) {
     return this.#hidden.has(id);
-  }
-
-  /** @param {number} id */
-  isLocked(id) {
-    return this.#locked.has(id);
-  }
-
-  /** Lock the objects, or unlock them if all are locked. @param {number[]} ids */
-  lock(ids) {
-    this.#switch(this.#locked, ids);
-    localStorage.setItem(`${LOCKED}-${this.#project}`, JSON.stringify([...this.#locked]));
   }
 
   /** Selected objects in order of creation. */
@@ -139,15 +116,10 @@ export class SceneObjects extends EventTarget {
 
   /** Hide the objects, or show them if all are hidden. @param {number[]} ids */
   hide(ids) {
-    this.#switch(this.#hidden, ids);
-  }
-
-  /** @param {Set<number>} set @param {number[]} ids */
-  #switch(set, ids) {
-    const all = ids.every((id) => set.has(id));
+    const all = ids.every((id) => this.#hidden.has(id));
     for (const id of ids)
-      if (all) set.delete(id);
-      else set.add(id);
+      if (all) this.#hidden.delete(id);
+      else this.#hidden.add(id);
     this.#say("change");
   }
 

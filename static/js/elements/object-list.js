@@ -208,6 +208,7 @@ export class ObjectList extends LiveElement {
       event.ctrlKey || event.metaKey || event.shiftKey ? this.#select(id, event) : this.emit("pick-object", id),
     );
     const lock = button("lock", `${locked ? "Unlock" : "Lock"} ${name}`, id, icon(locked ? "lock" : "unlock"));
+    if (locked) lock.title = `Locked by ${object.locked_by}; unlock it to change it`;
     const eye = button("hide", `${hidden ? "Show" : "Hide"} ${name}`, id, icon(hidden ? "eye-off" : "eye"));
     const remove = button("delete", `Delete ${name}`, id, icon("trash"));
     remove.classList.add("danger");

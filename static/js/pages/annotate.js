@@ -102,7 +102,6 @@ export class AnnotatePage extends LiveElement {
 
   connected() {
     for (const part of [
-      this.#objects,
       this.#painter,
       this.#cropper,
       this.#edits,
@@ -187,11 +186,11 @@ export class AnnotatePage extends LiveElement {
     this.#on(list, "pick-object", (id) => (id === null ? this.#presses.startNew() : this.#objects.choose(id)));
     this.#on(list, "choose-several", (ids) => this.#objects.select(ids));
     this.#on(list, "hide", (ids) => this.#objects.hide(ids));
-    this.#on(list, "lock", (ids) => this.#objects.lock(ids));
+    this.#on(list, "lock", (ids) => this.#edits.lock(this.#those(ids)));
     this.#on(list, "delete", (ids) => this.#edits.remove(this.#those(ids)));
     this.#on(list, "rename-all", ({ ids, name }) => this.#edits.renameAll(this.#those(ids), name));
     this.#on(list, "categorise-all", ({ ids, category }) =>
-      this.#those(ids).forEach(({ id }) => this.#categorise(category, id)),
+      this.#edits.unlocked(this.#those(ids)).forEach(({ id }) => this.#categorise(category, id)),
     );
     this.#on(list, "assign", ({ ids, name }) => this.#edits.assign(this.#those(ids), name));
     this.#on(list, "merge", ({ id, other }) => this.#edits.merge(id, other));
