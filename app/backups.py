@@ -88,7 +88,7 @@ def _require_rows(settings: Settings) -> int:
     if settings.postgres:
         return 0
     if not settings.database.is_file():
-        raise InputError(f"{settings.database}: no such file", hint="give the data folder: r2c2r backup DATA -o OUT")
+        raise InputError(f"{settings.database}: no such file", hint="give the data folder: r2c2r backup --data DIR -o OUT")
     require_usable(settings.database)
     return settings.database.stat().st_size
 

@@ -73,7 +73,7 @@ def restore(source: Path, data_dir: Path, *, progress: Progress = SILENT) -> lis
     """Copy a SQLite file's rows into the empty Postgres of the settings."""
     settings = Settings(data_dir=resolved(data_dir))
     if isinstance(settings.rows, Path):
-        raise InputError("R2C2R_DATABASE is not set: the database is a file", hint=f"r2c2r restore {source} {data_dir}")
+        raise InputError("R2C2R_DATABASE is not set: the database is a file", hint=f"r2c2r restore {source} --data {data_dir}")
     return move(str(source), settings.rows, progress=progress)
 
 

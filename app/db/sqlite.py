@@ -9,7 +9,7 @@ from app.errors import DatabaseUnusable, NoSpace, Unavailable
 from app.files import free_bytes
 from r2c2r_core.errors import R2C2RError
 
-RESTORE = "r2c2r restore BACKUP DATA puts a copy in its place: see docs/data.md"
+RESTORE = "r2c2r restore BACKUP --data DIR puts a copy in its place: see docs/data.md"
 _ROOM_BYTES = 1 << 20  # with less free space, SQLite's "disk I/O error" means a full disk
 _FAULTS = {
     sqlite3.SQLITE_NOTADB: ("no database", RESTORE),

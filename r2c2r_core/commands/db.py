@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from r2c2r_core.commands.options import Parsers, add_command, add_data_folder, web_module
+from r2c2r_core.commands.options import Parsers, add_command, add_data, web_module
 from r2c2r_core.terminal import show_progress, table
 
 _PLACE = "a new FILE.db, or postgresql+psycopg://USER@HOST/NAME"
@@ -16,12 +16,12 @@ def add(parsers: Parsers) -> None:
     move.add_argument("source", metavar="FROM", help="FILE.db, or the address of a PostgreSQL database")
     move.add_argument("target", metavar="TO", help=_PLACE)
     backup = actions.add_parser("backup")
-    add_data_folder(backup)
+    add_data(backup)
     backup.add_argument("-o", dest="target", type=Path, required=True, metavar="OUT.db", help="new file to write")
     restore = actions.add_parser("restore")
     restore.add_argument("source", type=Path, metavar="BACKUP.db", help="file written by `r2c2r db backup`")
-    add_data_folder(restore)
-    add_data_folder(actions.add_parser("check"))
+    add_data(restore)
+    add_data(actions.add_parser("check"))
 
 
 def db(options: argparse.Namespace) -> int:
@@ -32,11 +32,11 @@ def db(options: argparse.Namespace) -> int:
         if options.what == "move":
             held = rows.move(options.source, options.target, progress=progress)
         elif options.what == "backup":
-            rows.backup(options.folder, options.target, progress=progress)
+            rows.backup(options.data, options.target, progress=progress)
             held = []
         elif options.what == "restore":
-            held = rows.restore(options.source, options.folder, progress=progress)
+            held = rows.restore(options.source, options.data, progress=progress)
         else:
-            held = rows.check(options.folder)
+            held = rows.check(options.data)
     print(table(("table", "rows", "digest"), [(each.table, str(each.rows), each.digest) for each in held]) if held else "done")
     return 0

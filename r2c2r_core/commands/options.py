@@ -36,14 +36,8 @@ def add_command(parsers: Parsers, name: str, command: Command) -> argparse.Argum
 
 
 def add_data(parser: argparse.ArgumentParser) -> None:
-    """Add --data: the project folder of the web app."""
-    parser.add_argument("--data", type=data_folder, default=DATA_FOLDER, help="project folder (default: %(default)s)")
-
-
-def add_data_folder(parser: argparse.ArgumentParser) -> None:
-    """Add DATA: the same folder as a positional argument."""
-    folder = "data folder (default: %(default)s)"
-    parser.add_argument("folder", type=data_folder, nargs="?", default=DATA_FOLDER, metavar="DATA", help=folder)
+    """Add --data: the data folder of the web app."""
+    parser.add_argument("--data", type=data_folder, default=DATA_FOLDER, metavar="DIR", help="data folder (default: %(default)s)")
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

@@ -58,13 +58,13 @@ def test_restore_recreates_missing_files_and_keeps_existing_ones(
 ) -> None:
     data, project = kept
     copy, bundle = tmp_path / "copy", data / "projects" / project / "bundles" / "v1.zip"
-    assert main(["backup", str(data), "-o", str(copy)]) == 0
+    assert main(["backup", "--data", str(data), "-o", str(copy)]) == 0
     assert "of 1 projects" in capsys.readouterr().out
-    assert main(["backup", str(data), "-o", str(copy)]) == 2  # never overwritten
+    assert main(["backup", "--data", str(data), "-o", str(copy)]) == 2  # never overwritten
     bundle.unlink()
     (data / "projects" / project / "facts.json").write_text("newer")
     (data / "r2c2r.db").write_bytes(b"damaged" * 1000)
-    assert main(["restore", str(copy), str(data)]) == 0
+    assert main(["restore", str(copy), "--data", str(data)]) == 0
     assert bundle.is_file()
     assert (data / "projects" / project / "facts.json").read_text() == "newer"
     (replaced,) = (data / "backups").glob("replaced-*/r2c2r.db")
@@ -75,9 +75,9 @@ def test_restore_recreates_missing_files_and_keeps_existing_ones(
 
 def test_a_database_alone_is_backed_up_and_restored(kept: tuple[Path, str], tmp_path: Path) -> None:
     data, _ = kept
-    assert main(["backup", str(data), "-o", str(tmp_path / "night.db")]) == 0
+    assert main(["backup", "--data", str(data), "-o", str(tmp_path / "night.db")]) == 0
     (data / "r2c2r.db").unlink()
-    assert main(["restore", str(tmp_path / "night.db"), str(data)]) == 0
+    assert main(["restore", str(tmp_path / "night.db"), "--data", str(data)]) == 0
     assert findings(data) == set()
 
 
@@ -86,13 +86,13 @@ def test_restore_is_refused_under_a_running_server_or_from_an_invalid_backup(
 ) -> None:
     data, _ = kept
     before = (data / "r2c2r.db").read_bytes()
-    assert main(["backup", str(data), "-o", str(tmp_path / "night.db")]) == 0
+    assert main(["backup", "--data", str(data), "-o", str(tmp_path / "night.db")]) == 0
     with only_server(data):
-        assert main(["restore", str(tmp_path / "night.db"), str(data)]) == 1
+        assert main(["restore", str(tmp_path / "night.db"), "--data", str(data)]) == 1
     assert "serves this folder" in capsys.readouterr().err
     (tmp_path / "garbage.db").write_bytes(b"no database" * 1000)
     for source in ("garbage.db", "nothing.db", "data"):
-        assert main(["restore", str(tmp_path / source), str(data)]) > 0
+        assert main(["restore", str(tmp_path / source), "--data", str(data)]) > 0
         assert capsys.readouterr().err.count("\n") == 1
     assert (data / "r2c2r.db").read_bytes() == before
 
@@ -101,7 +101,7 @@ def test_check_data_reports_missing_unknown_damaged_and_exposed_files(
     kept: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data, project = kept
-    assert main(["check-data", str(data)]) == 0
+    assert main(["check-data", "--data", str(data)]) == 0
     assert "no problems found" in capsys.readouterr().out
     folder = data / "projects" / project
     shutil.copy(folder / "bundles" / "v1.zip", folder / "bundles" / "v7.zip")
@@ -116,7 +116,7 @@ def test_check_data_reports_missing_unknown_damaged_and_exposed_files(
     said = json.loads((folder / "project.json").read_text()) | {"changed": 1.0}
     (folder / "project.json").write_text(json.dumps(said))
     data.chmod(0o755)
-    assert main(["check-data", str(data), "--json", str(tmp_path / "found.json")]) == 1
+    assert main(["check-data", "--data", str(data), "--json", str(tmp_path / "found.json")]) == 1
     found = json.loads((tmp_path / "found.json").read_text())
     assert found["version"] == 1
     assert {(one["what"], Path(one["where"]).name) for one in found["findings"]} == {
@@ -134,8 +134,8 @@ def test_check_data_reports_missing_unknown_damaged_and_exposed_files(
     shutil.rmtree(folder)  # the rows stay
     assert ("missing", project) in findings(data)
     (data / "r2c2r.db").write_bytes(b"damaged" * 1000)
-    assert main(["check-data", str(data)]) == 2
-    assert main(["check-data", str(tmp_path / "nowhere")]) == 2
+    assert main(["check-data", "--data", str(data)]) == 2
+    assert main(["check-data", "--data", str(tmp_path / "nowhere")]) == 2
 
 
 def test_check_data_reads_an_outdated_database_without_changing_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -148,14 +148,14 @@ def test_check_data_reads_an_outdated_database_without_changing_it(tmp_path: Pat
     engine.dispose()
     before = path.read_bytes()
     assert findings(tmp_path) >= {("outdated", "r2c2r.db"), ("missing", "lost"), ("missing", "frames.json")}
-    assert main(["check-data", str(tmp_path)]) == 1
+    assert main(["check-data", "--data", str(tmp_path)]) == 1
     assert f"revision {older}" in capsys.readouterr().out
     assert path.read_bytes() == before
     assert [found.name for found in tmp_path.iterdir()] == ["r2c2r.db"]
 
 
 def test_check_data_creates_no_database_in_an_empty_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check-data", str(tmp_path)]) == 2
+    assert main(["check-data", "--data", str(tmp_path)]) == 2
     assert "no database yet" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
@@ -164,9 +164,9 @@ def test_backup_restore_and_check_data_report_progress(
     kept: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data, _ = kept
-    assert main(["backup", str(data), "-o", str(tmp_path / "copy")]) == 0
-    assert main(["restore", str(tmp_path / "copy"), str(data)]) == 0
-    assert main(["check-data", str(data)]) == 0
+    assert main(["backup", "--data", str(data), "-o", str(tmp_path / "copy")]) == 0
+    assert main(["restore", str(tmp_path / "copy"), "--data", str(data)]) == 0
+    assert main(["check-data", "--data", str(data)]) == 0
     said = capsys.readouterr().err.splitlines()
     for step in ("backup 0 % copying the database", "restore 0 % copying the database", "check-data 0 % reading the database"):
         assert step in said

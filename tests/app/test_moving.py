@@ -81,7 +81,7 @@ def test_moving_and_restoring_never_overwrite_existing_rows(
     assert main(["db", "move", address, file]) != 0
     assert "is there already" in capsys.readouterr().err
     assert main(["db", "move", str(tmp_path / "none.db"), address]) == 2
-    assert main(["db", "restore", file, str(worked_on)]) == 2  # without a Postgres
+    assert main(["db", "restore", file, "--data", str(worked_on)]) == 2  # without a Postgres
     assert "r2c2r restore" in capsys.readouterr().err
     postgres_server.drop_all()
 
@@ -114,16 +114,16 @@ def test_a_postgres_backup_is_restored_into_an_empty_database(
     kept = tmp_path / "night.db"
     before = moving.move(str(worked_on / "r2c2r.db"), first)
     monkeypatch.setenv("R2C2R_DATABASE", first)
-    assert main(["db", "backup", str(worked_on), "-o", str(kept)]) == 0
-    assert main(["db", "backup", str(worked_on), "-o", str(kept)]) != 0  # existing files are not overwritten
+    assert main(["db", "backup", "--data", str(worked_on), "-o", str(kept)]) == 0
+    assert main(["db", "backup", "--data", str(worked_on), "-o", str(kept)]) != 0  # existing files are not overwritten
     monkeypatch.setenv("R2C2R_DATABASE", second)
-    assert main(["db", "restore", str(kept), str(worked_on)]) == 0
-    assert main(["restore", str(kept), str(worked_on)]) != 0
+    assert main(["db", "restore", str(kept), "--data", str(worked_on)]) == 0
+    assert main(["restore", str(kept), "--data", str(worked_on)]) != 0
     assert "r2c2r db restore" in capsys.readouterr().err
-    assert main(["check-data", str(worked_on)]) == 2  # the remaining file is outdated
+    assert main(["check-data", "--data", str(worked_on)]) == 2  # the remaining file is outdated
     assert "r2c2r db check" in capsys.readouterr().err
     assert moving.check(worked_on) == before
-    assert main(["db", "check", str(worked_on)]) == 0
+    assert main(["db", "check", "--data", str(worked_on)]) == 0
     assert "prompt_points" in capsys.readouterr().out
     postgres_server.drop_all()
 
