@@ -70,6 +70,19 @@ def test_the_variants_manifest_lists_changes_and_rejections(made: Variants) -> N
     assert set(first["joints"]["drawer_1_slide"]) == {"damping", "friction", "armature", "upper"}
 
 
+def test_a_variant_that_fails_the_certificate_is_drawn_again(
+    bundle: Path, made: Variants, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verdicts = iter([False, False, True, *[False] * 5])  # the first passes at its third draw, the second at none of five
+    monkeypatch.setattr("r2c2r_core.variants.stage._passes", lambda scene: next(verdicts))
+    again = make_variants(bundle, 2, 0, tmp_path / "again")
+    assert again.certified == {"00000": True, "00001": False}
+    assert again.rejected["it fails the certificate"] == 2 + 4
+    entries = json.loads((again.folder / "variants.json").read_text())["variants"]
+    assert sum(entry["draws"] - 1 for entry in entries) == sum(again.rejected.values())
+    assert (again.folder / "variants/00000.xml").read_bytes() != (made.folder / "variants/00000.xml").read_bytes()
+
+
 def test_a_scaled_object_keeps_its_front_and_bottom_planes(bundle: Path, tmp_path: Path) -> None:
     base = base_of(bundle)
     change = Change(name="cabinet_1", scale=(1.01, 1.05, 0.98), mass=1.2)
