@@ -18,10 +18,11 @@ from sqlalchemy import Engine
 from sqlmodel import select
 from uvicorn.config import LOGGING_CONFIG
 
+from app.db import queries
 from app.db.engine import opened, reading, writing
 from app.db.tables import Project
 from app.db.usable import require_projects_known
-from app.files import only_server, project_files, running_server
+from app.files import folder_bytes, only_server, project_files, running_server
 from app.jobs.outcomes import adopt_bundle, adopt_capture, adopt_prompts, keep_bundle
 from app.logs import log_as
 from app.main import create_app, let_go
@@ -166,6 +167,8 @@ def register_finished(data_dir: Path, *, name: str, source: Path, prompts: Path,
                 kept = keep_bundle(session, project, files)
             with writing(engine) as session:
                 adopt_bundle(session, session.get_one(Project, project.id), project.inputs, kept)
+        with writing(engine) as session:
+            queries.note_size(session, project.id, folder_bytes(files.root))
     return project.id
 
 

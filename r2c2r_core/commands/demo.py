@@ -8,6 +8,8 @@ from r2c2r_core.commands.run import write_bundle
 from r2c2r_core.commands.sample import add_size, write_recording
 from r2c2r_core.commands.serve import add_address
 
+NAME = "Sample kitchen"  # of the project, and of the recording, from which the bundle takes its title
+
 
 def add(parsers: Parsers) -> None:
     """The command and its options."""
@@ -23,13 +25,14 @@ def demo(options: argparse.Namespace) -> int:
     app = web_module("serve")
     app.require_database(options.data)
     folder: Path = options.data / "demo"
-    scan, work = folder / "sample" / "scan.r3d", folder / "work"
+    scan, work = folder / "sample" / f"{NAME}.r3d", folder / "work"
     if not scan.exists():
-        write_recording(scan.parent, frames=options.frames, size=options.size)
+        write_recording(scan.parent, frames=options.frames, size=options.size, name=NAME)
     prompts = scan.with_name("prompts.json")
     passed = write_bundle(scan, prompts, folder / "kitchen.zip", workdir=work)
-    if not passed or options.no_serve:
-        return 0 if passed else 1
-    project = app.register_finished(options.data, name="Sample kitchen", source=scan, prompts=prompts, workdir=work)
-    app.serve(host=options.host, port=options.port, data_dir=options.data, open_project=project)
+    if not passed:
+        return 1
+    project = app.register_finished(options.data, name=NAME, source=scan, prompts=prompts, workdir=work)
+    if not options.no_serve:
+        app.serve(host=options.host, port=options.port, data_dir=options.data, open_project=project)
     return 0

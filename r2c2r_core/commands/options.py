@@ -37,7 +37,9 @@ def add_command(parsers: Parsers, name: str, command: Command) -> argparse.Argum
 
 def add_data(parser: argparse.ArgumentParser) -> None:
     """Add --data: the data folder of the web app."""
-    parser.add_argument("--data", type=data_folder, default=DATA_FOLDER, metavar="DIR", help="data folder (default: %(default)s)")
+    parser.add_argument(
+        "--data", type=data_folder, default=DATA_FOLDER, metavar="DIR", help="data folder (default: %(default)s)"
+    )
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

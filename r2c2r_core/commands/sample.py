@@ -3,9 +3,10 @@
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from r2c2r_core.commands.options import Parsers, add_command, seed, size, whole
-from r2c2r_core.synthetic.choices import LAYOUTS, PALETTES, SEEDS_OWN, STYLES, Choice
+from r2c2r_core.synthetic.choices import LAYOUTS, PALETTES, STYLES, Choice
 from r2c2r_core.terminal import show_progress
 
 
@@ -51,14 +52,11 @@ def sample(options: argparse.Namespace) -> int:
     return 0
 
 
-def write_recording(
-    out: Path, *, frames: int, size: tuple[int, int], seed: int = 0, opened: bool = False, choice: Choice = SEEDS_OWN
-) -> None:
-    """Write the recording, its truth and its prompts, and print their paths."""
+def write_recording(out: Path, **chosen: Any) -> None:
+    """Write the recording, its truth and its prompts, as chosen of `write_sample`'s options, and print their paths."""
     from r2c2r_core.disk import explained_io
     from r2c2r_core.synthetic.stage import write_sample
 
     with show_progress() as progress, explained_io(out):
-        work = progress.for_stage("sample")
-        paths = write_sample(out, seed=seed, frames=frames, size=size, opened=opened, choice=choice, progress=work)
+        paths = write_sample(out, progress=progress.for_stage("sample"), **chosen)
     print(f"{paths.scan}  {paths.truth}  {paths.prompts}")

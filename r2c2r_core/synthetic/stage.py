@@ -63,15 +63,16 @@ def write_sample(
     size: tuple[int, int] = (960, 720),
     opened: bool = False,
     choice: Choice = SEEDS_OWN,
+    name: str = "scan",
     progress: Progress = SILENT,
     show: Callable[[Image], None] = lambda rgb: None,
 ) -> SamplePaths:
-    """Write scan.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames.
+    """Write NAME.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames.
 
     With `opened`, fronts are opened and closed during the recording (opening.py). `show` receives each colour frame.
     """
     paths = SamplePaths(
-        scan=out / "scan.r3d", truth=out / "truth.json", prompts=out / "prompts.json", masks=out / "truth_masks"
+        scan=out / f"{name}.r3d", truth=out / "truth.json", prompts=out / "prompts.json", masks=out / "truth_masks"
     )
     out.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(paths.masks, ignore_errors=True)

@@ -264,6 +264,7 @@ def test_registering_a_finished_workspace_twice_creates_one_project(start: Calla
     with start() as web:
         (found,) = web.get("/api/projects")
         assert (found["id"], found["status"], found["counts"]["objects"], found["result"]) == (project, "ready", 1, "current")
+        assert found["size_bytes"] > 0
         assert web.get(f"/api/projects/{project}/objects")[0]["segment"] == "done"
         assert web.client.get(f"/media/{project}/frames/3.jpg").status_code == 200
         web.delete(f"/api/projects/{project}")

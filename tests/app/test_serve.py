@@ -18,7 +18,8 @@ from app.services import accounts, audit
 from app.settings import Settings
 from r2c2r_core.cli import main
 from r2c2r_core.errors import EnvironmentProblem, InputError
-from tests.app.conftest import Running
+from tests.app.conftest import Running, running
+from tests.app.nouns import finish
 from tests.forked import forked
 from tests.waiting import PATIENCE_S
 
@@ -76,6 +77,28 @@ def test_a_data_folder_that_cannot_be_created_is_reported_in_one_line(
     captured = capsys.readouterr()
     (line,) = (captured.out + captured.err).splitlines()
     assert "file/data: Not a directory; choose another folder with --data" in line
+
+
+def test_a_demo_that_is_not_served_leaves_a_project_titled_like_its_bundle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def film(out: Path, **_: Any) -> None:  # without the recording itself, which only a re-reading needs
+        out.mkdir(parents=True)
+        (out / "prompts.json").write_text('{"version": 1, "objects": []}')
+
+    def write_bundle(scan: Path, prompts: Path, destination: Path, *, workdir: Path) -> bool:
+        finish(workdir)
+        titles.append(scan.stem)  # the name that ingest gives a recording
+        return True
+
+    titles: list[str] = []
+    monkeypatch.setattr("r2c2r_core.commands.demo.write_recording", film)
+    monkeypatch.setattr("r2c2r_core.commands.demo.write_bundle", write_bundle)
+    assert main(["demo", "--no-serve", "--data", str(tmp_path)]) == 0
+    with running(tmp_path) as web:
+        (project,) = web.get("/api/projects")
+        assert (project["name"], project["status"]) == ("Sample kitchen", "ready")
+        assert titles == [project["name"]]
 
 
 def test_the_server_prints_its_address_and_locks_its_data_folder(tmp_path: Path) -> None:
