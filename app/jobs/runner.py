@@ -291,7 +291,7 @@ class Runner:
         with self._lock:
             self._workers[job_id] = worker
         try:
-            self.rows.began_step(job_id, step.stage, progress.fraction, log, worker, progress.overall, progress.eta_s)
+            self.rows.began_step(job_id, step.stage, progress.fraction, log, worker, progress.overall, progress.estimate_s())
             last = listen(
                 worker,
                 step.stage,
@@ -324,7 +324,7 @@ class Runner:
 
     def _store(self, job_id: int, step: Step, progress: JobProgress, words: str | None) -> None:
         try:
-            self.rows.progressed(job_id, step.stage, progress.fraction, words, progress.overall, progress.eta_s)
+            self.rows.progressed(job_id, step.stage, progress.fraction, words, progress.overall, progress.estimate_s())
         except NotFound:  # the job was deleted
             self._cancelled.add(job_id)
         except R2C2RError as error:  # the work continues even if its progress cannot be stored

@@ -14,6 +14,7 @@ from r2c2r_core.limits import HOURS_VARIABLE
 POLL_S = 0.15
 STORE_EVERY_S = 0.5
 HEARTBEAT_S = 2.0
+CLEAR_RISE = 1.2  # ratio of an estimate to the one told before
 SHORTEST_S = 0.1  # a step is a process, which takes at least this long to start
 
 
@@ -27,6 +28,7 @@ class JobProgress:
     fraction: float = 0.0  # of the step
     span: tuple[float, float] = (0.0, 1.0)  # part of the step done by the current process
     stored: float = 0.0
+    told_s: float | None = None  # the last estimate of the time left
 
     @property
     def overall(self) -> float:
@@ -34,19 +36,20 @@ class JobProgress:
         weights, _ = self._weights
         return (sum(weights[: self.at_step]) + weights[self.at_step] * self.fraction) / sum(weights)
 
-    @property
-    def eta_s(self) -> float | None:
+    def estimate_s(self) -> float | None:
         """Estimated seconds left, from earlier durations in this project, or more if this job is slower; None if unknown.
 
         A job that reuses most results passes the first steps at once: its own pace alone would underestimate the rest, and
-        the estimate would rise.
+        the estimate would rise. Steps progress unevenly too, so only a clear rise is told.
         """
         weights, measured = self._weights
         elapsed, overall = time.monotonic() - self.began, self.overall
         before = sum(weights) * (1 - overall) if measured else None
         paced = elapsed * (1 - overall) / overall if overall > 0.02 and elapsed > 2 else None
-        told = [seconds for seconds in (before, paced) if seconds is not None]
-        return round(max(told), 1) if told else None
+        found = max((seconds for seconds in (before, paced) if seconds is not None), default=None)
+        if found is not None and (self.told_s is None or not self.told_s < found < CLEAR_RISE * self.told_s):
+            self.told_s = round(found, 1)
+        return self.told_s
 
     @property
     def _weights(self) -> tuple[list[float], bool]:

@@ -19,13 +19,13 @@ def test_the_estimate_never_increases_after_stages_that_were_cached(monkeypatch:
     now = [1000.0]
     monkeypatch.setattr("app.jobs.steps.time", SimpleNamespace(monotonic=lambda: now[0]))
     progress = JobProgress([Step(stage, (), 30.0, took_s) for stage, took_s in TOOK_S.items()], began=now[0])
-    said = [progress.eta_s]
+    said = [progress.estimate_s()]
     for at, took_s in enumerate((2.0, 2.0, 60.0)):  # the first two were computed before
         progress.at(at)
         for tenth in range(1, 11):
             now[0] += took_s / 10
             progress.fraction = tenth / 10
-            said.append(progress.eta_s)
+            said.append(progress.estimate_s())
     assert said[0] == 110.0
     told = [seconds for seconds in said if seconds is not None]
     assert len(told) == len(said)
@@ -38,7 +38,22 @@ def test_a_slower_run_increases_the_estimate(monkeypatch: pytest.MonkeyPatch) ->
     progress = JobProgress([Step(stage, (), 30.0, took_s) for stage, took_s in TOOK_S.items()], began=now[0])
     progress.at(1)
     now[0] += 60.0  # a stage that took half a minute
-    assert progress.eta_s == pytest.approx(160.0)
+    assert progress.estimate_s() == pytest.approx(160.0)
+
+
+def test_a_step_that_stalls_for_a_while_does_not_raise_the_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [1000.0]
+    monkeypatch.setattr("app.jobs.steps.time", SimpleNamespace(monotonic=lambda: now[0]))
+    progress = JobProgress([Step(stage, (), 10.0) for stage in ("segment", "align")], began=now[0])  # never done before
+    progress.at(1)
+    now[0] += 368.0
+    assert progress.estimate_s() == pytest.approx(368.0)
+    now[0] += 25.0  # without news
+    assert progress.estimate_s() == pytest.approx(368.0)
+    progress.fraction = 0.2
+    assert progress.estimate_s() == pytest.approx(393.0 * 0.4 / 0.6, abs=0.1)
+    now[0] += 100.0
+    assert progress.estimate_s() == pytest.approx(493.0 * 0.4 / 0.6, abs=0.1)  # it is slower
 
 
 def test_the_estimate_uses_the_longest_finished_run_of_the_project(tmp_path: Path) -> None:
