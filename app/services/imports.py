@@ -1,9 +1,10 @@
 """Import of recordings: by upload, by a local path, or as a synthetic sample."""
 
 import time
+from itertools import chain, count
 from pathlib import Path
 
-from sqlmodel import Session, select
+from sqlmodel import Session, col, select
 
 from app import archives, schemas
 from app.db import queries
@@ -15,6 +16,9 @@ from app.services import project_shapes, projects, quotas
 from app.services.context import Context
 from app.services.system import allowed_path
 from r2c2r_core.errors import CaptureError, InputError
+
+_SAYS_NOTHING = {"capture", "data", "frames", "recording", "scan"}  # names of recordings, lower case
+_LONGEST = 100  # characters of a name before its number
 
 
 def from_finished_upload(context: Context, upload: Upload, received: Path) -> schemas.Project:
@@ -29,7 +33,7 @@ def from_finished_upload(context: Context, upload: Upload, received: Path) -> sc
     context.store.keep(upload.id)  # before a job can read it
     with writing(context.engine) as session:
         quotas.check_project(context, session)
-        name = _name(upload.name, upload.file_name)
+        name = upload.name or _free_name(context, session, Path(file_name))
         project = projects.new_project(
             session, name, file_name, target, project_id=upload.id, began=upload.created, owner_id=account_of(context, session)
         )
@@ -85,9 +89,8 @@ def from_path(context: Context, body: schemas.ImportPath) -> schemas.Project:
         raise CaptureError(f"{source} is empty", hint="choose the recording's folder")
     _require_room(context)
     with writing(context.engine) as session:
-        project = projects.new_project(
-            session, _name(body.name, source.name), source.name, source, owner_id=account_of(context, session)
-        )
+        name = body.name or _free_name(context, session, source)
+        project = projects.new_project(session, name, source.name, source, owner_id=account_of(context, session))
         job = queue_job(context, session, project, "import", {})
     return _started(context, project.id, job)
 
@@ -133,5 +136,11 @@ def _require_room(context: Context) -> None:
     require_free(context.settings.data_dir, 0, context.settings.min_free_bytes)
 
 
-def _name(name: str | None, filename: str) -> str:
-    return name or Path(safe_name(filename)).stem or "Recording"
+def _free_name(context: Context, session: Session, source: Path) -> str:
+    """The recording's name, or its folder's where that says nothing, with a number if the user sees a project of that name."""
+    stem = Path(safe_name(source.name)).stem
+    name = (safe_name(source.parent.name, stem) if stem.casefold() in _SAYS_NOTHING else stem)[:_LONGEST] or "Recording"
+    hidden = col(Project.id).in_(context.access.hidden(context.person))
+    taken = {other.casefold() for other in session.exec(select(Project.name).where(~hidden))}
+    numbered = (f"{name} {number}" for number in count(2))
+    return next(one for one in chain([name], numbered) if one.casefold() not in taken)

@@ -123,6 +123,19 @@ def test_an_import_by_path_leaves_the_recording_in_place(web: Running, tmp_path:
     assert (folder / "frame.txt").exists()
 
 
+def test_recordings_of_equal_names_are_told_apart(web: Running, tmp_path: Path) -> None:
+    def named(*path: str, **given: str) -> str:
+        folder = tmp_path.joinpath(*path)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "frame.txt").write_text("x")
+        name: str = web.post("/api/projects/import", {"path": str(folder), **given}, 202)["name"]
+        return name
+
+    assert [named("oak", "capture"), named("pine", "Capture"), named("oak", "scan")] == ["oak", "pine", "oak 2"]
+    assert [named("loft"), named("attic", "loft"), named("loft", name="loft")] == ["loft", "loft 2", "loft"]
+    assert [upload(web, R3D)["name"] for _ in range(2)] == ["scan", "scan 2"]
+
+
 def test_paths_outside_the_import_roots_are_refused_also_through_symlinks(web: Running, tmp_path: Path) -> None:
     (tmp_path / "out").symlink_to("/etc")
     for path in ("/etc", "/etc/passwd", f"{tmp_path}/../..", str(tmp_path / "out"), "/proc/self/environ"):
