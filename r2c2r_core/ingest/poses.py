@@ -98,8 +98,8 @@ def refine_poses(
         return SettledPoses(tuple(frames), PoseEvidence(source="file", given_gap_m=before, gap_m=before), ())
     shift_m = np.linalg.norm([a.translation - b.translation for a, b in zip(moved, given, strict=True)], axis=1)
     notice = (
-        f"the poses drift: frames of one place at different times disagreed by {before * 1000:.1f} mm, "
-        f"{after * 1000:.1f} mm after moving the cameras by up to {shift_m.max() * 1000:.0f} mm"
+        f"the recorded poses drifted and were corrected: frames of one place at different times disagreed by "
+        f"{before * 1000:.1f} mm, now by {after * 1000:.1f} mm; cameras moved by up to {shift_m.max() * 1000:.0f} mm"
     )
     recorded = np.array([f.world_from_camera.matrix for f in frames])
     evidence = PoseEvidence(source="refined", given_gap_m=before, gap_m=after, given=recorded)

@@ -24,7 +24,7 @@ export function verdictCard(capture, notices) {
           "p",
           { class: "muted" },
           notices
-            ? "Poses, depth and colour agree frame by frame; remarks from reading it are listed below."
+            ? "No problem is left; what was noted or corrected on reading is listed below."
             : "Poses, depth and colour agree; no problem was found.",
         ),
   );

@@ -70,7 +70,7 @@ def test_drift_of_3_cm_is_corrected_with_a_notice(walk):
     bent = drifted(frames, 0.03, 1.5)
     result = refined(bent, views)
     assert result.evidence.source == "refined"
-    assert "drift" in result.notices[0]
+    assert "drifted and were corrected" in result.notices[0]  # not a fault that is left: the verdict may be good
     assert error_m(result.frames, views.poses) < 0.25 * error_m(bent, views.poses)
     assert error_m(result.frames, views.poses) < 0.003
     assert np.allclose(result.evidence.given, [f.world_from_camera.matrix for f in bent])
