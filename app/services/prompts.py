@@ -19,7 +19,7 @@ from r2c2r_core.errors import PromptError
 from r2c2r_core.texts import identifier, name_fault
 from r2c2r_core.workspace import noun_path
 
-_ACTIONS = {("assignee",): "assign", ("locked_by",): "lock"}  # by the changed fields: those that no result depends on
+_ACTIONS = {"assignee": "assign", "locked_by": "lock"}  # by the changed field: the two that no result depends on
 
 
 class Change(NamedTuple):
@@ -80,7 +80,7 @@ def edit(context: Context, project_id: str, object_id: int, body: schemas.Object
             _refuse_locked(item)
         wanted = _wanted(context, session, item, body)
         text = ", ".join(_said_of(item, key, value) for key, value in wanted.items()) or "nothing"
-        action = _ACTIONS.get(tuple(wanted), "edit")
+        action = _ACTIONS.get(" ".join(wanted), "edit")
         with history.change(session, item, "prompts", action, text, who=context.who):
             if "name" in wanted and not item.run_name and _has_results(context.files(project), item.name, str(wanted["name"])):
                 item.run_name = item.name
