@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 from playwright.sync_api import Page, expect, sync_playwright
 
-from app.serve import register_finished
 from r2c2r_core.cli import main as r2c2r
+from r2c2r_core.commands.demo import NAME
 from r2c2r_core.synthetic.choices import STYLES, Choice
 from r2c2r_core.synthetic.stage import write_sample
 from tests.browser.conftest import CHROMIUM, QUIET, served
@@ -44,21 +44,13 @@ def main() -> int:
     data: Path = parser.parse_args().data
     if r2c2r(["demo", "--data", str(data), "--no-serve"]):
         return 1
-    demo = data / "demo"
-    project = register_finished(
-        data,
-        name="Sample kitchen",
-        source=demo / "sample" / "scan.r3d",
-        prompts=demo / "sample" / "prompts.json",
-        workdir=demo / "work",
-    )
-    draw_kitchen(demo / "sample" / "scan.r3d", demo / "kitchen.zip")
+    draw_kitchen(data / "demo" / "sample" / f"{NAME}.r3d", data / "demo" / "kitchen.zip")
     draw_styles()
     with opened_app(data) as page:
-        home = page.url.split("?")[0].rstrip("/")
-        photograph_annotate(page, f"{home}/p/{project}/annotate")
-        photograph_elevation(page, f"{home}/p/{project}/elevation")
-        photograph_review(page, f"{home}/p/{project}/review")
+        project = page.url
+        photograph_annotate(page, f"{project}/annotate")
+        photograph_elevation(page, f"{project}/elevation")
+        photograph_review(page, f"{project}/review")
     return 0
 
 
@@ -93,14 +85,15 @@ def draw_styles() -> None:
 
 @contextmanager
 def opened_app(data: Path) -> Iterator[Page]:
-    """A Chromium page signed in to the app on this data folder."""
+    """Overview of the demo's project, in a Chromium that is signed in to the app on this data folder."""
     expect.set_options(timeout=LONG_MS)
     with served(data) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
         page = browser.new_page(viewport=PAGE_PX)
         page.set_default_timeout(LONG_MS)
         page.goto(address)
-        page.get_by_role("link", name="Sample kitchen").first.wait_for()
+        page.get_by_role("link", name=NAME).first.click()
+        page.wait_for_url("**/p/*")
         yield page
         browser.close()
 
