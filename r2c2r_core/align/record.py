@@ -101,7 +101,7 @@ def _warnings(pose: Similarity3, rms_m: float, condition: float, case: Case) -> 
     elif rms_m > allowed:
         lines.append(f"scan and mesh are {rms_m * 1000:.0f} mm apart (rms; {allowed * 1000:.0f} mm allowed)")
     if condition > 30000:
-        lines.append("the visible surface is flat or round: only outlines constrain how it could slide or turn")
+        lines.append("it is flat or round: only its outlines tell how far it slid or turned; compare them with the photos")
     if len(case.observation.views) == 2:
         lines.append("only 2 frames show the object")
     lean = lean_deg(pose, case)

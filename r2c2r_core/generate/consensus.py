@@ -137,37 +137,37 @@ def _costs(candidates: Sequence[MeshAsset], allowed: Sequence[int], rule: Rule) 
 
 
 def _papers_choice(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], rule: Rule) -> str:
-    """Choice of the published rule (nearest to the mean box and volume), as the end of a sentence; empty without one."""
+    """Choice of the published rule (nearest to the mean box and volume), as a sentence after another; empty without one."""
     if len(allowed) < 3 or rule == "mean":
         return ""
     from_mean = _oddness(candidates, allowed, "mean")
     theirs = min(allowed, key=lambda i: (round(float(from_mean[i]), 12), i))
     taken = "takes it too" if theirs == best else f"would take {candidates[theirs].candidate_id}"
-    return f"; the paper's rule (nearest to the mean box and volume) {taken}"
+    return f" The paper's rule (nearest to the mean box and volume) {taken}."
 
 
 def _reason(
     candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray], rule: Rule
 ) -> str:
-    """One sentence for the reviewer: how well the candidate fits, why its rival lost, and what the paper's rule takes."""
+    """How well the candidate fits, why its rival lost, its figures, and what the paper's rule takes."""
     chosen, count = candidates[best], len(allowed)
-    passed_over = len(candidates) - count
-    skipped = f" ({passed_over} rejected)" if passed_over else ""
+    skipped = f" ({len(candidates) - count} rejected)" if len(candidates) > count else ""
     if count == 1:
         return f"{chosen.candidate_id} is the only candidate left{skipped}."
     name = f"{chosen.candidate_id} ({chosen.assumes})" if chosen.assumes else chosen.candidate_id
     middle = "mean" if rule == "mean" else "others"
     counted = not chosen.assumes or rule == "mean"  # candidates with a stated hypothesis are odd on purpose
-    shape = f"its proportions differ {100 * costs['oddness'][best]:.1f} % from the {middle}, " if counted else ""
+    shape = f"its proportions differ {100 * costs['oddness'][best]:.1f} % from the {middle}; " if counted else ""
     beside = _papers_choice(candidates, best, allowed, rule)
     if "mask_iou" not in chosen.metrics:
-        return f"{name}: {shape}one of {count}{skipped}; its fit to masks and depth is known only after alignment{beside}."
+        return f"{name}: {shape}one of {count}{skipped}, its fit to masks and depth is known only after alignment.{beside}"
     place = 1 + sum(1 for i in allowed if costs["fit"][i] < costs["fit"][best] - 1e-12)
     depth = chosen.metrics.get("depth_residual_m")
     but = _passed_over(candidates, best, allowed, costs)
-    residual = f" and its surface within {1000 * depth:.0f} mm of the measured depth" if depth is not None else ""
-    agrees = f"its outline agrees {100 * chosen.metrics['mask_iou']:.0f} % with the masks{residual}"
-    return f"{name}: {shape}{agrees}, rank {place} of {count} by fit to both{skipped}{but}{beside}."
+    fit = f"its fit to masks and depth is {'the best' if place == 1 else f'number {place}'} of {count}{skipped}{but}"
+    outline = f"Its outline agrees {100 * chosen.metrics['mask_iou']:.0f} % with the masks"
+    residual = f", its surface is within {1000 * depth:.0f} mm of the measured depth" if depth is not None else ""
+    return f"{name}: {shape}{fit}. {outline}{residual}.{beside}"
 
 
 def _passed_over(candidates: Sequence[MeshAsset], best: int, allowed: Sequence[int], costs: dict[str, np.ndarray]) -> str:

@@ -256,8 +256,8 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
     yield Contradiction(
         rule="edge-unsure",
         objects=(track.name,),
-        message=f"{track.name} is {100 * sure:.0f} % sure at {100 * front.width_m:.0f} x {100 * front.height_m:.0f} cm"
-        f"{': ' * bool(doubts)}{', and '.join(doubts)}",
+        message=f"{track.name} is {100 * front.width_m:.0f} x {100 * front.height_m:.0f} cm if its edges are right "
+        f"({100 * sure:.0f} %){': ' * bool(doubts)}{', and '.join(doubts)}",
         mend="click beside it, off it, to move an edge there; or draw it in the elevation",
     )
 

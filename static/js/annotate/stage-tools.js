@@ -17,8 +17,8 @@ const PAINTS = [
 ];
 /** @type {[string, string, string, string][]} action, icon, label, tooltip */
 const HERE = [
-  ["keep", "check", "Keep", "Its mask in this frame is right: keep it (W)"],
-  ["absent", "eye-off", "Not here", "It is not visible in this frame; again restores its mask (A)"],
+  ["keep", "check", "Mask is right", "Its mask in this frame is right: keep it (W)"],
+  ["absent", "eye-off", "Not visible", "It is not visible in this frame; again restores its mask (A)"],
 ];
 
 export class StageTools extends EventTarget {

@@ -3,7 +3,7 @@
 import { ApiError, getFigures, getReview, getSystem, stepReview } from "../api.js";
 import { h, LiveElement, renew } from "../dom.js";
 import { Answers } from "../lib/answers.js";
-import { ago, duration } from "../lib/format.js";
+import { ago, counted, duration } from "../lib/format.js";
 import { live } from "../live.js";
 import { outbox } from "../outbox.js";
 import { stateChip } from "../state-chip.js";
@@ -123,7 +123,7 @@ function asksWhy({ unmet, needs_reason }) {
 
 /** @param {Figures} figures */
 function cost(figures) {
-  const clicks = !figures.clicks_per_object ? "" : `${figures.clicks_per_object.toFixed(1)} clicks an object`;
+  const clicks = figures.clicks ? `Clicks and edits: ${figures.clicks}, for ${counted(figures.objects, "object")}` : "";
   const time =
     figures.upload_to_approval_s === null
       ? ""

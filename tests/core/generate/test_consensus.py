@@ -171,7 +171,7 @@ def test_the_reason_gives_proportions_only_where_they_decide():
 def test_the_reason_gives_only_the_rank_where_the_fit_decides():
     """The rank is that of the fit alone, without the unseen side."""
     reason = choose_candidate(guesses({"unseen_error_m": 0.01}, {"mask_iou": 0.8})).reason
-    assert "rank 1 of 2 by fit" in reason
+    assert "its fit to masks and depth is the best of 2." in reason
     assert "but" not in reason
 
 
