@@ -23,6 +23,13 @@ STOPPED = [
     '"Disagreement"',
     "fronts cut on an",
     "of the generator served",
+    "by fit to both",
+    "% of the longest`",
+    "no other one fits",
+    "only outlines constrain",
+    "warned of in",
+    "Least travel reached",
+    '"Not here"',
 ]
 
 

@@ -1,6 +1,7 @@
 /** Tables of a finished scene, shared by the run and download pages. */
 
 import { h } from "../dom.js";
+import { byPlace } from "../lib/findings.js";
 import { centimetres, counted, jointValue } from "../lib/format.js";
 import { motionOf } from "../lib/joints.js";
 import { sourceChip, sourceWord } from "../source-chip.js";
@@ -92,9 +93,11 @@ function said(joint) {
  * @param {Certificate["findings"]} findings
  */
 export function findingList(findings) {
-  const lines = findings.map(({ severity, where, message }) =>
-    h("li", { class: severity === "error" ? "bad" : "warn", title: severity }, h("strong", {}, where), ` ${message}`),
-  );
+  const lines = byPlace(findings).map(({ severity, where, messages }) => {
+    const [only = ""] = messages;
+    const said = messages.length === 1 ? ` ${only}` : h("ul", {}, ...messages.map((message) => h("li", {}, message)));
+    return h("li", { class: severity === "error" ? "bad" : "warn", title: severity }, h("strong", {}, where), said);
+  });
   return h("ul", { class: "findings", "aria-label": "Findings of the certificate" }, ...lines);
 }
 
@@ -118,8 +121,8 @@ export function certificateCard(certificate) {
   const facts = [
     ["Deepest contact at rest", `${(1000 * certificate.rest_penetration_m).toFixed(2)} mm`],
     ["Deepest contact while opening", `${(1000 * sweep).toFixed(2)} mm`],
-    ["Least travel reached", `${(100 * travel).toFixed(0)} % of ${counted(joints.length, "joint")}`],
-    ["Drift in five seconds", `${(1000 * certificate.drift_m).toFixed(2)} mm`],
+    ["Joints open at least", `${(100 * travel).toFixed(0)} % of their range (${counted(joints.length, "joint")})`],
+    ["Drift at rest in 5 s", `${(1000 * certificate.drift_m).toFixed(2)} mm`],
     ["Speed", `${certificate.realtime_factor.toFixed(0)} × real time`],
   ];
   return h(
