@@ -16,6 +16,7 @@ class SceneJoint(Shape):
     lower: float
     upper: float
     sources: dict[str, str]
+    handle: list[float] | None  # centre, in the object frame, of the handle that was seen on it; None without one
 
 
 class SceneItem(Shape):

@@ -19,7 +19,7 @@ from app.jobs.plain import plain
 from app.services import views
 from app.services.candidates import changed_since, override_shape
 from app.services.context import Context
-from r2c2r_core.model.scene import ArticulatedScene
+from r2c2r_core.model.scene import ArticulatedScene, Link
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.workspace import Workspace
 
@@ -85,7 +85,16 @@ def _scene_facts(scene: ArticulatedScene) -> dict[str, Any]:
     objects = [{key: plain(getattr(item, key)) for key in kept} for item in scene.objects]
     for told, item in zip(objects, scene.objects, strict=True):
         told["colour"] = list(item.links[0].colour)
+        leaves = {link.name: link for link in item.links}
+        for joint in told["joints"]:
+            joint["handle"] = _handle_seen(leaves[joint["child"]])
     return {"objects": objects, "warnings": plain(scene.warnings), "scale": scene.scale}
+
+
+def _handle_seen(leaf: Link) -> list[float] | None:
+    """Centre of a leaf's handle in the object frame; None without one, or for one that was made up."""
+    seen = [box for box in leaf.of_role("handle") if box.sources.get("place", "default") != "default"]
+    return [float(x) for x in leaf.object_from_link.apply(seen[0].link_from_box.translation)] if seen else None
 
 
 def _mask_count(track: MaskTrack) -> int:
@@ -137,6 +146,7 @@ def _joint(joint: dict[str, Any]) -> schemas.SceneJoint:
         lower=joint["lower"],
         upper=joint["upper"],
         sources=sources_of(joint),
+        handle=joint["handle"],
     )
 
 

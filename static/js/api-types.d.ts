@@ -1249,6 +1249,7 @@ export interface SceneJoint {
   lower: number;
   upper: number;
   sources: Record<string, string>;
+  handle: number[] | null;
 }
 
 /** One annotated object. */

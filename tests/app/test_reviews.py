@@ -4,11 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.serve import register_finished
 from r2c2r_core.generate.candidates import select_candidate
+from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.inputs import ObjectOverride
+from r2c2r_core.model.scene import Box
 from r2c2r_core.workspace import Workspace
 from tests.app.conftest import Running
 from tests.app.finished import copy_finished
@@ -368,6 +371,22 @@ def test_a_rename_keeps_masks_candidates_verdicts_and_scene_objects(reviewed: Re
     web.job(run(web, project), "done")
     finish(web.settings.data_dir / "projects" / project / "work", "cutlery")
     assert [(group["name"], group["run_name"]) for group in web.get(f"{at}/candidates")] == [("cutlery", "cutlery")]
+
+
+def test_the_scene_tells_where_a_handle_was_seen_but_not_one_made_up(reviewed: Reviewed) -> None:
+    web, project, _ = reviewed
+    made = scene("drawer_1")
+    (drawer,) = made.objects
+    base, front = drawer.links
+    work = Workspace(web.settings.data_dir / "projects" / project / "work")
+    for source, told in (("measured", [0.2, -0.3, 0.05]), ("default", None)):
+        place = Rigid3(np.eye(3), np.array([0.2, 0.0, 0.05]))
+        knob = Box(name="knob", role="handle", size_m=np.full(3, 0.02), link_from_box=place, sources={"place": source})
+        leaf = replace(front, boxes=(knob,), object_from_link=Rigid3(np.eye(3), np.array([0.0, -0.3, 0.0])))
+        work.save(
+            "warp", "scene", replace(made, objects=(replace(drawer, links=(base, leaf)),)), {"key": source, "seconds": 1.0}
+        )
+        assert web.get(f"/api/projects/{project}/scene")["items"][0]["joints"][0]["handle"] == told
 
 
 def test_objects_without_clicks_are_corrected_and_left_out_by_name(reviewed: Reviewed) -> None:

@@ -127,7 +127,8 @@ export class ReviewPage extends LiveElement {
     const state = JSON.stringify([group, item, certificate, candidate, movable]);
     if (state === this.#drawn) return;
     const same = this.#panel.dataset.object === String(group?.object);
-    const correcting = same && Boolean(this.#panel.querySelector("details")?.open);
+    const open = /** @type {HTMLElement[]} */ ([...this.#panel.querySelectorAll("details[open] > summary")]);
+    const unfolded = new Set(same ? open.map(({ dataset }) => dataset.at ?? "") : []);
     this.#drawn = state;
     this.#panel.dataset.object = String(group?.object);
     const asked = {
@@ -135,7 +136,7 @@ export class ReviewPage extends LiveElement {
       move: movable ? () => this.#centre.bar.move(true) : null,
       comment: () => this.#comment(),
     };
-    renew(this.#panel, ...panel(this.#objects, this.#decisions, asked, correcting));
+    renew(this.#panel, ...panel(this.#objects, this.#decisions, asked, unfolded));
   }
 
   /** @param {Candidate} candidate */

@@ -19,20 +19,10 @@ export function cards(group, current, told) {
   return ranked(group).map((candidate) => card(group, candidate, current, told));
 }
 
-/**
- * Reason for the candidate in use, and the runner-up.
- * @param {CandidateGroup} group
- */
+/** Reason for the candidate in use. @param {CandidateGroup} group */
 export function choice(group) {
-  const second = runnerUp(group);
   const how = group.chosen_by === "person" ? "Chosen by a person: " : "Chosen automatically: ";
-  return h(
-    "p",
-    { class: "why" },
-    group.chosen ? how : "None is used: ",
-    h("span", { class: "muted" }, group.reason),
-    second ? h("span", { class: "muted" }, ` Runner-up: ${second}.`) : "",
-  );
+  return h("p", { class: "why" }, group.chosen ? how : "None is used: ", h("span", { class: "muted" }, group.reason));
 }
 
 /** Next best candidate that is not rejected. @param {CandidateGroup} group */
@@ -79,7 +69,7 @@ function card(group, candidate, current, told) {
         second ? h("span", { class: "chip" }, "runner-up") : "",
       ),
       candidate.assumes ? h("div", { class: "assumes" }, candidate.assumes) : "",
-      evidence(candidate),
+      doubts(candidate),
       said ? h("div", { class: "muted" }, said) : "",
       ...candidate.warnings.map((warning) => h("div", { class: "muted" }, warning)),
       h("div", { class: "verdicts" }, verdict(candidate, "accepted", told), verdict(candidate, "rejected", told)),
@@ -87,33 +77,28 @@ function card(group, candidate, current, told) {
   );
 }
 
-/** Line of figures; doubtful ones are highlighted. @param {Candidate} candidate */
-export function evidence({ metrics, watertight, faces, generator }) {
-  /** @type {[string, boolean][]} text, and whether it is a warning */
-  const figures = [];
-  if (metrics.mask_iou !== undefined)
-    figures.push([`mask ${(100 * metrics.mask_iou).toFixed(0)} %`, metrics.mask_iou < 0.8]);
-  if (metrics.depth_residual_m !== undefined) {
-    figures.push([`depth ${(1000 * metrics.depth_residual_m).toFixed(0)} mm`, metrics.depth_residual_m > 0.02]);
-  }
-  if (metrics.seen_fraction !== undefined) figures.push([`seen ${(100 * metrics.seen_fraction).toFixed(0)} %`, false]);
-  if (metrics.extent_middle !== undefined && metrics.extent_short !== undefined) {
-    const [middle, short] = [metrics.extent_middle, metrics.extent_short].map((side) => Math.round(100 * side));
-    figures.push([`sides 100 %, ${middle} %, ${short} % of the longest`, false]);
-  }
-  figures.push(
-    [watertight ? "watertight" : "not watertight", !watertight],
-    [counted(faces, "face"), false],
-    [generator, false],
-  );
-  const fine = figures.filter(([, bad]) => !bad).map(([text]) => text);
-  const doubtful = figures.filter(([, bad]) => bad).map(([text]) => h("span", { class: "chip warn" }, text));
-  return h(
-    "div",
-    { class: "figures" },
-    h("p", { class: "muted" }, fine.join(" · ")),
-    doubtful.length ? h("div", { class: "chips" }, ...doubtful) : "",
-  );
+/** Figures that are not in doubt, and those that are. @param {Candidate} candidate @returns {[string[], string[]]} */
+function judged({ metrics, watertight, faces, generator }) {
+  const { mask_iou: iou, depth_residual_m: off, seen_fraction: seen } = metrics;
+  /** @type {[string, boolean][]} text, and whether it is in doubt */
+  const all = [];
+  if (iou !== undefined) all.push([`outline ${(100 * iou).toFixed(0)} % in the masks`, iou < 0.8]);
+  if (off !== undefined) all.push([`${(1000 * off).toFixed(0)} mm from the depth`, off > 0.02]);
+  if (seen !== undefined) all.push([`${(100 * seen).toFixed(0)} % of its surface seen`, false]);
+  all.push([watertight ? "watertight" : "not watertight", !watertight]);
+  all.push([counted(faces, "face"), false], [`made by ${generator}`, false]);
+  return [all.filter(([, bad]) => !bad).map(([text]) => text), all.filter(([, bad]) => bad).map(([text]) => text)];
+}
+
+/** Line of the figures that are not in doubt. @param {Candidate} candidate */
+export const figures = (candidate) => judged(candidate)[0].join(" · ");
+
+/** Chips of the figures in doubt. @param {Candidate} candidate */
+export function doubts(candidate) {
+  const [, doubtful] = judged(candidate);
+  return doubtful.length
+    ? h("div", { class: "chips" }, ...doubtful.map((text) => h("span", { class: "chip warn" }, text)))
+    : "";
 }
 
 /**

@@ -9,7 +9,7 @@ import { sayError } from "../elements/toasts.js";
 import { Answers } from "../lib/answers.js";
 import { sheetOf } from "../lib/crop-view.js";
 import { differs, TURNS, turnedBy } from "../lib/turntable.js";
-import { evidence, ranked, verdict } from "./candidates.js";
+import { doubts, figures, ranked, verdict } from "./candidates.js";
 
 /** @typedef {import("../api-types").Candidate} Candidate */
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
@@ -171,7 +171,8 @@ export class CandidateCompare extends LiveElement {
         { class: "off" },
         id === this.#against ? "The others are compared with this one." : found ? differs(found, this.#found) : "…",
       ),
-      evidence(candidate),
+      h("p", { class: "muted" }, figures(candidate)),
+      doubts(candidate),
       h("div", { class: "verdicts" }, verdict(candidate, "accepted", told), verdict(candidate, "rejected", told)),
     );
   }

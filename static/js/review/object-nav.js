@@ -24,9 +24,13 @@ export function objectNav(objects, bringBack, copy) {
     button.dataset.at = `object:${group.object}`;
     button.append(h("span", { class: "name" }, group.name), text ? h("span", { class: `chip ${tone}` }, text) : "");
     if (group.assignee) button.append(h("span", { class: "chip", title: "assigned to" }, `@${group.assignee}`));
-    const why = objects.byRisk ? objects.risks.get(group.object)?.why : "";
+    const decide = group.accepted ? [] : (objects.risks.get(group.object)?.decide ?? []);
     const when = group.changed ? "before its last change: " : "";
-    if (why) button.append(h("span", { class: "risk muted" }, `${when}${why}`));
+    if (decide[0]) {
+      const line = { class: "risk muted", title: decide.join("\n"), "aria-hidden": "true" }; // read as the description
+      button.append(h("span", line, `${when}${decide[0]}`));
+      button.setAttribute("aria-description", decide.join("; "));
+    }
     button.addEventListener("click", (event) => press(objects, group.object, event));
     button.addEventListener("keydown", (event) => {
       if (event.key !== "Enter" || !(event.ctrlKey || event.metaKey)) return;

@@ -1,15 +1,16 @@
-/** Right panel of the review page: the chosen object, its evidence, candidates and corrections. */
+/** Right panel of the review page: the chosen object, what to decide about it, its evidence, candidates and corrections. */
 
 import { h, icon } from "../dom.js";
 import { counted } from "../lib/format.js";
-import { cards, choice } from "./candidates.js";
+import { cards, choice, figures } from "./candidates.js";
 import { corrections } from "./corrections.js";
 import { REVIEWERS } from "./decisions.js";
-import { findingsOf, placement } from "./evidence.js";
+import { decisions as toDecide, findingsOf, placement } from "./evidence.js";
 import { madePanel } from "./made-panel.js";
 
 /** @typedef {import("../api-types").Candidate} Candidate */
 /** @typedef {import("../api-types").CandidateGroup} CandidateGroup */
+/** @typedef {import("../api-types").SceneItem} SceneItem */
 /** @typedef {import("./decisions.js").Decisions} Decisions */
 /** @typedef {import("./objects.js").ReviewObjects} ReviewObjects */
 /**
@@ -19,14 +20,16 @@ import { madePanel } from "./made-panel.js";
  * @property {() => void} comment
  */
 
+const WHY = "why:";
+
 /**
  * @param {ReviewObjects} objects
  * @param {Decisions} decisions
  * @param {Asked} asked
- * @param {boolean} correcting whether the corrections are unfolded
+ * @param {Set<string>} unfolded `data-at` of the summaries whose details are open
  * @returns {(Node | string)[]}
  */
-export function panel(objects, decisions, asked, correcting) {
+export function panel(objects, decisions, asked, unfolded) {
   const { group, item, groups, certificate, candidate, madeName } = objects;
   if (madeName && item) return madePanel(item, objects.judges, (patch) => decisions.correctMade(item, patch));
   if (!group) return [h("p", { class: "muted" }, groups.length ? "Choose an object." : "")];
@@ -39,17 +42,17 @@ export function panel(objects, decisions, asked, correcting) {
     heading(group, decisions, judges),
     judges ? "" : h("p", { class: "muted" }, REVIEWERS),
     used ?? "",
-    choice(group),
     old && h("p", { class: "chip warn", role: "status" }, `Below: ${old}`),
-    group.placement ? placement(group.placement, item, old !== "") : h("p", { class: "chip warn" }, "not placed"),
+    ...toDecide(group, item, objects.risks.get(group.object)?.decide ?? [], old !== ""),
     certificate && !certificate.current ? stale(certificate) : "",
     findingsOf(certificate, group.run_name, names, old !== ""),
+    why(group, item, old !== "", unfolded.has(WHY)),
     corrections(
       group,
       item,
       {
         move: asked.move,
-        open: correcting,
+        open: unfolded.has("correct:"),
         judges,
         categories: objects.categories,
         categorise: (category) => decisions.categorise(category),
@@ -61,6 +64,27 @@ export function panel(objects, decisions, asked, correcting) {
     ...rest,
     others(group, decisions, asked, judges),
   ];
+}
+
+/**
+ * Reason for the mesh in use and its figures, folded.
+ * @param {CandidateGroup} group
+ * @param {SceneItem | undefined} item
+ * @param {boolean} old
+ * @param {boolean} open
+ */
+function why(group, item, old, open) {
+  const summary = h("summary", {}, "Why this one");
+  summary.dataset.at = WHY;
+  const used = group.candidates.find(({ id }) => id === group.chosen);
+  return h(
+    "details",
+    { open },
+    summary,
+    choice(group),
+    used ? h("p", { class: "muted" }, figures(used)) : "",
+    group.placement ? placement(group.placement, item, old) : "",
+  );
 }
 
 /** What makes the figures below older than what was said since; empty if nothing does. @param {CandidateGroup} group */
