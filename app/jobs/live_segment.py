@@ -26,7 +26,7 @@ from typing import Any
 
 from app.errors import told
 from app.jobs.disputes import Again, Disputes, others_line, read_prompt
-from app.jobs.doubts import doubts_about
+from app.jobs.doubts import doubts_about, suggested_category
 from app.jobs.elevation_files import write_elevations
 from app.jobs.front_wire import front_line
 from app.jobs.mask_wire import mask_bits
@@ -262,7 +262,10 @@ class Desk:
         box = self.session.thing_box(prompt) if panel is None else None
         measured = panel is not None or box is not None
         doubts = doubts_about(prompt, panel, box, self.capture) if measured else []
-        said = {"end": "done", "front": self._line(prompt, panel), "others": others_line(prompt.others), "doubts": doubts}
+        front = self._line(prompt, panel)
+        if panel is not None and front is not None:
+            front["suggested"] = suggested_category(prompt, panel, self.capture)
+        said = {"end": "done", "front": front, "others": others_line(prompt.others), "doubts": doubts}
         return said | {"motions": motion_lines(self.session.motions(prompt))}
 
     def _front(self, prompt: ObjectPrompt) -> dict[str, Any] | None:

@@ -46,6 +46,7 @@ class FoundFront(Shape):
     corners_m: list[list[float]]  # as in prompts.json
     handle: PromptsFileHandle | None
     certainty: float | None = None  # probability that it is right, 0..1; None in files of older versions
+    suggested: str = ""  # category that its size suggests, if that is unlikely for the object's own
     edges: list[float] = Field(
         default_factory=list
     )  # seam probability of the left, right, top and bottom edge; empty if drawn by a user

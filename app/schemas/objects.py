@@ -106,6 +106,7 @@ class SceneObject(Shape):
     notices: list[str]
     doubts: list[str]  # about its front: implausible size or position for its category, weak edges
     certainty: float | None  # probability that its front is right, 0..1; None without a front
+    suggested: str  # category that its front suggests, if its size is unlikely for its own; empty otherwise
     saved: float  # time of the last stored change
 
 

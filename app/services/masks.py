@@ -167,13 +167,14 @@ def resume(context: Context) -> None:
 
 
 class MasksState(NamedTuple):
-    """State of the object's masks: progress, number of frames, errors, doubts, and the certainty of its front."""
+    """State of the object's masks: progress, frames, errors, doubts, certainty and suggested category of its front."""
 
     state: schemas.SegmentState
     frames: int = 0
     notices: Sequence[str] = ()
     doubts: Sequence[str] = ()
     certainty: float | None = None
+    suggested: str = ""
 
 
 def state_of(context: Context, project: Project, item: SceneObject, places: Places | None = None) -> MasksState:
@@ -183,8 +184,9 @@ def state_of(context: Context, project: Project, item: SceneObject, places: Plac
         return MasksState("none")
     error = found.masks.error
     notices = [f"{error['message']}; {error['hint']}".rstrip("; ")] if error else []
-    certainty = (found.masks.front or {}).get("certainty")  # files of older versions have none
-    return MasksState(found.state, len(found.masks), notices, found.masks.doubts, certainty)
+    front = found.masks.front or {}
+    certainty, suggested = front.get("certainty"), front.get("suggested", "")  # files of older versions have none
+    return MasksState(found.state, len(found.masks), notices, found.masks.doubts, certainty, suggested)
 
 
 def state_after_follow(context: Context, project: Project, item: SceneObject) -> MasksState:

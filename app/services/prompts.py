@@ -330,6 +330,7 @@ def _shape(
         notices=[],
         doubts=[],
         certainty=None,
+        suggested="",
         saved=saved,
     )
     return _with_masks(shape, project, masks.state_of(context, project, item, places))
@@ -338,7 +339,7 @@ def _shape(
 def _with_masks(shape: schemas.SceneObject, project: Project, now: masks.MasksState) -> schemas.SceneObject:
     """The schema with the given mask state."""
     told: dict[str, object] = {"segment": now.state, "mask_frames": now.frames, "doubts": [*now.doubts]}
-    told |= {"certainty": now.certainty, "mask_backend": project.segmenter if now.frames else ""}
+    told |= {"certainty": now.certainty, "suggested": now.suggested, "mask_backend": project.segmenter if now.frames else ""}
     return shape.model_copy(update=told | {"notices": [*now.notices, *_category_notice(shape.category)]})
 
 

@@ -424,6 +424,7 @@ export interface FoundFront {
   corners_m: number[][];
   handle: PromptsFileHandle | null;
   certainty: number | null;
+  suggested: string;
   edges: number[];
 }
 
@@ -1275,6 +1276,7 @@ export interface SceneObject {
   notices: string[];
   doubts: string[];
   certainty: number | null;
+  suggested: string;
   saved: number;
 }
 

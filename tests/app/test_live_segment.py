@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 from app.jobs import live_segment
+from app.jobs.doubts import suggested_category
 from app.jobs.live_segment import Desk
 from app.jobs.mask_wire import mask_bits
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.masks import PackedMask, pack_mask
-from r2c2r_core.model.inputs import ObjectPrompt
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
+from r2c2r_core.model.track import FrontPanel
 from tests.waiting import PATIENCE_S, until
 
 CAMERA = Intrinsics(fx=50.0, fy=50.0, cx=20.0, cy=15.0, width=40, height=30)
@@ -163,6 +166,21 @@ def test_an_object_with_a_failing_first_mask_fails_alone(desk: Any, said: list[d
     desk.session.glimpse = look
     desk.put(click(2, 10.0))
     until(lambda: said[-1].get("end") == "done")
+
+
+def test_a_front_of_a_size_unlikely_for_its_category_suggests_another() -> None:
+    kitchen: Any = SimpleNamespace(room=SimpleNamespace(floor_found=True, walls=()))
+    point = PromptPoint(frame=0, x=1.0, y=1.0, label=1)
+
+    def suggested(category: str, height_m: float, centre_m: float) -> str:
+        pose = Rigid3(np.eye(3), np.array([0.0, 0.0, centre_m]))
+        panel = FrontPanel(world_from_front=pose, width_m=0.45, height_m=height_m, handle=None, confidence=0.9)
+        return suggested_category(ObjectPrompt(name="front_1", category=category, points=(point,)), panel, kitchen)
+
+    assert suggested("drawer", 0.57, 1.7) == "wall_cabinet"
+    assert suggested("drawer", 0.7, 0.5) == "cabinet"
+    assert suggested("drawer", 0.15, 0.7) == ""  # usual
+    assert suggested("drawer", 3.0, 1.5) == ""  # usual for nothing
 
 
 def test_a_cancelled_object_reports_cancelled_as_its_last_message(desk: Any, said: list[dict[str, Any]]) -> None:

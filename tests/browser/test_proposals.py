@@ -91,3 +91,7 @@ def test_an_object_takes_the_category_of_the_proposal_clicked_unless_one_is_type
     click_frame(page, 62, 58)
     expect(rows(page)).to_have_count(4)
     expect(rows(page).last).to_contain_text("oven")
+    make = page.get_by_role("button", name=re.compile("^Make it a wall cabinet: oven"))  # its size is one of those
+    make.click()
+    expect(page.get_by_label("Category of oven")).to_have_value("wall_cabinet")
+    expect(make).to_have_count(0)

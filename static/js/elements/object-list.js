@@ -8,7 +8,7 @@
 import { h, icon, LiveElement, renew, reveal } from "../dom.js";
 import { usedFirst } from "../lib/categories.js";
 import { inkOn } from "../lib/colour.js";
-import { counted, usableName } from "../lib/format.js";
+import { counted, usableName, withArticle } from "../lib/format.js";
 import { isComing, listed, OF_PEOPLE, ORDERS, span, STATES } from "../lib/listing.js";
 import { SelectionBar } from "./selection-bar.js";
 
@@ -230,6 +230,7 @@ export class ObjectList extends LiveElement {
       current && !locked ? this.#fields(object) : null,
       ...said.map((one) => h("div", { class: "contradicted", role: "status" }, one.text, this.#merge(one, name))),
       ...object.doubts.map((text) => h("div", { class: "contradicted doubt", role: "status", title: text }, text)),
+      locked ? null : this.#recategorise(object),
       ...notices.map((notice) => h("div", { class: "muted" }, notice)),
     );
     item.style.setProperty("--swatch", colour);
@@ -245,6 +246,17 @@ export class ObjectList extends LiveElement {
     merge.dataset.at = `merge:${object}:${other}`;
     merge.addEventListener("click", () => this.emit("merge", { id: object, other }));
     return merge;
+  }
+
+  /** Button for the category that the object's size suggests. @param {SceneObject} object */
+  #recategorise(object) {
+    const { id, name, category, suggested } = object;
+    if (!suggested || suggested === category) return null;
+    const text = `Make it ${withArticle(suggested.replaceAll("_", " "))}`;
+    const change = h("button", { type: "button", class: "merge", "aria-label": `${text}: ${name}` }, text);
+    change.dataset.at = `recategorise:${id}`;
+    change.addEventListener("click", () => this.emit("categorise", { seen: object, category: suggested }));
+    return change;
   }
 
   /** @param {SceneObject} object */

@@ -127,6 +127,8 @@ def main() -> None:
         front = {"corners_m": prompt["front"]["corners_m"], "handle": None} if "front" in prompt else None
         if front is None and prompt["category"] == "cabinet":
             front = {"corners_m": FOUND, "handle": None, "edges": [0.9, 0.1, 0.9, 0.2]}
+        if front is None and prompt["category"] == "oven":
+            front = {"corners_m": FOUND, "handle": None, "suggested": "wall_cabinet"}
         if point["label"] == 0:
             say(
                 object=number,
