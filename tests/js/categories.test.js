@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { byOpening, usedFirst } from "../../static/js/lib/categories.js";
+import { byOpening, synonyms, usedFirst } from "../../static/js/lib/categories.js";
 
 const category = (/** @type {string} */ name, /** @type {string} */ label, /** @type {string} */ joint) => ({
   name,
@@ -28,4 +28,11 @@ test("categories are grouped by how they open, and synonyms are listed once", ()
 test("the categories used most in the kitchen come first, synonyms last", () => {
   const names = usedFirst(ALL, ["mug", "door", "mug"]).map(({ name }) => name);
   assert.deepEqual(names, ["mug", "door", "drawer", "cabinet", "pull_out"]);
+});
+
+test("a synonym is listed with the category that it stands for", () => {
+  assert.deepEqual(synonyms(ALL), [
+    { name: "drawer", label: "pull out: drawer" },
+    { name: "cabinet", label: "door: cabinet" },
+  ]);
 });

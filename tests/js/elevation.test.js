@@ -13,7 +13,9 @@ import {
   overlap,
   profileOf,
   rectOf,
+  resized,
   sameFront,
+  seenAfter,
   SMALLEST_M,
   snapped,
   split,
@@ -182,4 +184,28 @@ test("an edge among equally clear lines stays in place, and a near line wins ove
   assert.ok(Math.abs(snapped(0.501, 0.012, [], wide) - 0.501) < 0.002); // within a cell: lines are at the centres of cells
   const two = at((i) => (i === 200 ? 0.8 : i === 204 ? 1 : 0));
   assert.ok(Math.abs(snapped(0.502, 0.012, [], two) - 200.5 * cell) < 1e-9);
+});
+
+test("a typed size moves the chosen edge, else the less certain one, else one without a neighbour", () => {
+  const front = { left: 1, right: 1.6, top: 0.1, bottom: 0.8 };
+  const beside = { left: 1.6, right: 2, top: 0.1, bottom: 0.8 };
+  /** @type {(chosen: import("../../static/js/lib/elevation.js").Side | null, sure: number[], others?: typeof front[]) => number[]} */
+  const ends = (chosen, sure, others = []) => {
+    const { left, right } = resized(front, "width", 0.5, { chosen, sure, others });
+    return [left, right].map((at) => Math.round(1000 * at) / 1000);
+  };
+  assert.deepEqual(ends(null, []), [1, 1.5]);
+  assert.deepEqual(ends(null, [0.2, 0.9, 0.9, 0.9]), [1.1, 1.6]);
+  assert.deepEqual(ends("right", [0.2, 0.9, 0.9, 0.9]), [1, 1.5]);
+  assert.deepEqual(ends(null, [], [beside]), [1.1, 1.6]);
+  assert.deepEqual(ends(null, [], [{ ...beside, top: 0.8, bottom: 1.4 }]), [1, 1.5]); // below it, not beside it
+  const high = resized(front, "height", 0.5, { chosen: null, sure: [0.9, 0.9, 0.1, 0.9], others: [] });
+  assert.deepEqual([high.top.toFixed(2), high.bottom], ["0.30", 0.8]);
+});
+
+test("a detected handle stays where the photo shows it when its front is moved, and is gone where it is off the front", () => {
+  const box = { left_m: 0.2, right_m: 0.22, bottom_m: 0.1, top_m: 0.26 };
+  const right = { ...RECT, left: RECT.left + 0.05, right: RECT.right + 0.05 };
+  assert.deepEqual(seenAfter(box, RECT, right), { ...box, left_m: 0.15, right_m: 0.17 });
+  assert.equal(seenAfter(box, RECT, { ...RECT, right: 0.71 }), null);
 });

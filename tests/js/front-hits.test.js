@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { carried, drawn, heldAt, settled, smallestAt } from "../../static/js/lib/front-hits.js";
-import { edgeMiddle, edgeOf, hingeLine, slideArrow } from "../../static/js/lib/front-marks.js";
+import { edgeMiddle, edgeOf, hingeLine, labelCorner, slideArrow } from "../../static/js/lib/front-marks.js";
 
 /** @typedef {import("../../static/js/lib/elevation.js").Rect} Rect */
 
@@ -77,4 +77,11 @@ test("the marks of a front are its edges, a triangle that points to the hinge an
   ]);
   assert.deepEqual(upper?.[1], [47, 34]);
   assert.deepEqual(lower?.[1], [47, 46]);
+});
+
+test("the label of a front is in the first corner where it covers no handle", () => {
+  const [front, size] = [{ left: 0, right: 100, top: 0, bottom: 80 }, { width: 40, height: 20 }];
+  assert.deepEqual(labelCorner(front, size, null), { x: 0, y: 0 });
+  assert.deepEqual(labelCorner(front, size, { left: 10, right: 14, top: 5, bottom: 40 }), { x: 60, y: 0 });
+  assert.deepEqual(labelCorner(front, size, { left: 10, right: 90, top: 5, bottom: 10 }), { x: 60, y: 60 });
 });

@@ -5,9 +5,9 @@
  */
 
 import { h, LiveElement, wire } from "../dom.js";
-import { heightOf, middleOf, widthOf } from "../lib/elevation.js";
+import { heightOf, middleOf, seenAfter, widthOf } from "../lib/elevation.js";
 import { carried, drawn, heldAt, isLarge, settled, smallestAt } from "../lib/front-hits.js";
-import { edgeMiddle, edgeOf, hingeLine, slideArrow } from "../lib/front-marks.js";
+import { edgeMiddle, edgeOf, hingeLine, labelCorner, slideArrow } from "../lib/front-marks.js";
 import { Gestures } from "../lib/gestures.js";
 import { fit, pinch, toImage, toScreen, zoom } from "../lib/view.js";
 
@@ -18,7 +18,7 @@ import { fit, pinch, toImage, toScreen, zoom } from "../lib/view.js";
 /**
  * @typedef {{
  *   key: string, rect: Rect, name: string, paint: string, chosen: boolean, drawn: boolean,
- *   handle: Box | null, hinge: Side | null, slides: boolean, overlaps: boolean, asked: Side[],
+ *   handle: Box | null, detected: boolean, hinge: Side | null, slides: boolean, overlaps: boolean, asked: Side[],
  * }} Shown
  */
 /** @typedef {import("../lib/front-hits.js").Held} Held */
@@ -29,6 +29,7 @@ const STILL_TOUCH_PX = 10;
 const EDGE_PX = 7; // hit distance of an edge
 const SNAP_PX = 9;
 const ASKED_PX = 9;
+const LOW_PX = 80; // height of a front up to which its label is one line
 
 export class ElevationCanvas extends LiveElement {
   #canvas = h("canvas", { tabIndex: 0, role: "img", "aria-label": "Elevation" });
@@ -156,13 +157,14 @@ export class ElevationCanvas extends LiveElement {
       front.chosen ? 3 : 2,
       front.drawn ? [] : [8, 4],
     );
-    if (front.handle) this.#drawHandle(context, rect, front.handle, front.paint);
+    const handle = front.handle && front.detected ? seenAfter(front.handle, front.rect, rect) : front.handle;
+    const covered = handle && this.#drawHandle(context, rect, handle, front.paint);
     if (front.hinge && front.slides)
       this.#stroke(context, slideArrow(this.#onScreen(rect), front.hinge), 2.5, front.paint);
     else if (front.hinge) this.#drawHinge(context, rect, front.hinge, front.paint);
     if (front.chosen && this.edge) this.#stroke(context, [edgeOf(this.#onScreen(rect), this.edge)], 6, "#ffffff");
     for (const side of front.asked) this.#drawAsked(context, rect, side);
-    this.#drawLabel(context, rect, front.name);
+    this.#drawLabel(context, rect, front.name, covered);
   }
 
   /** Draw the question mark of an edge. @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side */
@@ -199,14 +201,21 @@ export class ElevationCanvas extends LiveElement {
     context.setLineDash([]);
   }
 
-  /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Box} box @param {string} colour */
+  /**
+   * Draw a handle and return its rectangle on the screen.
+   * @param {CanvasRenderingContext2D} context
+   * @param {Rect} rect
+   * @param {Box} box
+   * @param {string} colour
+   */
   #drawHandle(context, rect, box, colour) {
     const { x, y } = middleOf(rect);
     const at = { left: x + box.left_m, right: x + box.right_m, top: y - box.top_m, bottom: y - box.bottom_m };
-    const { left, top, right, bottom } = this.#onScreen(at);
+    const shown = this.#onScreen(at);
     context.fillStyle = colour;
-    context.fillRect(left, top, right - left, bottom - top);
+    context.fillRect(shown.left, shown.top, shown.right - shown.left, shown.bottom - shown.top);
     this.#outline(context, at, "#0d0f12", 1, []);
+    return shown;
   }
 
   /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {Side} side @param {string} colour */
@@ -229,23 +238,32 @@ export class ElevationCanvas extends LiveElement {
   #drawSized(context, rect, colour, name) {
     this.#outline(context, rect, "#0d0f12", 4, []);
     this.#outline(context, rect, colour, 2, []);
-    this.#drawLabel(context, rect, name);
+    this.#drawLabel(context, rect, name, null);
   }
 
-  /** @param {CanvasRenderingContext2D} context @param {Rect} rect @param {string} name */
-  #drawLabel(context, rect, name) {
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {Rect} rect
+   * @param {string} name
+   * @param {Rect | null} handle on the screen
+   */
+  #drawLabel(context, rect, name, handle) {
     const { left, top, right, bottom } = this.#onScreen(rect);
     const lines = [name, `${Math.round(1000 * widthOf(rect))} × ${Math.round(1000 * heightOf(rect))}`].filter(Boolean);
     context.font = "12px system-ui, sans-serif";
     const fits = (/** @type {string} */ line) => context.measureText(line).width + 12 < right - left;
-    const shown = bottom - top > 36 && lines.every(fits) ? lines : lines.slice(-1).filter(fits);
+    const line = lines.join("  ");
+    const low = bottom - top < LOW_PX && fits(line); // two lines would lie over its handle
+    const shown = low ? [line] : bottom - top > 36 && lines.every(fits) ? lines : lines.slice(-1).filter(fits);
+    if (bottom - top < 17 * shown.length + 4) return;
+    const widths = shown.map((line) => context.measureText(line).width + 8);
+    const size = { width: Math.max(...widths) + 8, height: 17 * shown.length + 8 };
+    const { x, y } = labelCorner({ left, top, right, bottom }, size, handle);
     for (const [k, line] of shown.entries()) {
-      const width = context.measureText(line).width + 8;
-      if (bottom - top < 17 * (k + 1) + 4) break;
       context.fillStyle = "rgb(10 12 16 / 78%)";
-      context.fillRect(left + 4, top + 4 + 17 * k, width, 16);
+      context.fillRect(x + 4, y + 4 + 17 * k, widths[k] ?? 0, 16);
       context.fillStyle = "#f2f5fa";
-      context.fillText(line, left + 8, top + 16 + 17 * k);
+      context.fillText(line, x + 8, y + 16 + 17 * k);
     }
   }
 

@@ -56,6 +56,7 @@ export class FrontEdits {
     this.#fronts.choose(key);
     const handle = plane.handleAfter(front.handle ?? null, before, rect);
     const corners_m = plane.cornersOf(elevation, rect);
+    front.seen = front.seen && plane.seenAfter(front.seen, before, rect); // until it is detected again
     this.#fronts.do({ change: [{ front, wanted: { front: { ...drawnOf(front), corners_m, handle } } }] });
   }
 
@@ -68,13 +69,13 @@ export class FrontEdits {
     if (change.length) this.#fronts.do({ change });
   }
 
-  /** Resize the leading front; its left or top edge stays in place. @param {"width" | "height"} side @param {number} metres */
+  /** Resize the leading front at its chosen edge, or at the one that is less certain. @param {"width" | "height"} side @param {number} metres */
   resize(side, metres) {
     const front = this.#view.leading();
     if (!front || !(metres >= plane.SMALLEST_M)) return;
-    const { left, top } = front.rect;
-    const rect = side === "width" ? { ...front.rect, right: left + metres } : { ...front.rect, bottom: top + metres };
-    this.place(front.key, rect);
+    const others = this.#view.here.filter(({ key }) => key !== front.key).map(({ rect }) => rect);
+    const sure = front.drawn ? [] : front.edges;
+    this.place(front.key, plane.resized(front.rect, side, metres, { chosen: this.#canvas.edge, sure, others }));
   }
 
   /** @param {Way} way @param {{ x: number, y: number }} [at] */

@@ -5,7 +5,7 @@
  */
 
 import { h, renew } from "../dom.js";
-import { byOpening } from "../lib/categories.js";
+import { byOpening, synonyms } from "../lib/categories.js";
 import { heightOf, widthOf } from "../lib/elevation.js";
 import { usableName } from "../lib/format.js";
 import { inOrder } from "../lib/front-rows.js";
@@ -26,8 +26,8 @@ export class FrontPane extends EventTarget {
   #name = h("input", { type: "text", spellcheck: false });
   #width = h("input", { type: "number", min: "20", max: "10000", step: "1" });
   #height = h("input", { type: "number", min: "20", max: "10000", step: "1" });
-  #across = h("input", { type: "text", inputMode: "numeric", placeholder: "3, or 600 450 600" });
-  #down = h("input", { type: "text", inputMode: "numeric", placeholder: "3, or 140 280 280" });
+  #across = h("input", { type: "text", inputMode: "numeric", placeholder: "3 or 600 450" });
+  #down = h("input", { type: "text", inputMode: "numeric", placeholder: "3 or 140 280" });
   #category = h("select");
   #side = h("span", { class: "muted" }, "Hinge");
   /** Categories that slide along their front; the hinge side is then the side they slide to. @type {Set<string>} */
@@ -57,6 +57,7 @@ export class FrontPane extends EventTarget {
 
   constructor() {
     super();
+    this.#width.title = this.#height.title = "The edge chosen with E moves; without one, the less certain edge";
     this.#field(this.#width, () => this.#size(this.#width, "width"));
     this.#field(this.#height, () => this.#size(this.#height, "height"));
     this.#field(this.#name, () => {
@@ -102,12 +103,14 @@ export class FrontPane extends EventTarget {
   /** @param {Category[]} categories */
   setCategories(categories) {
     this.#sideways = new Set(categories.filter(({ sideways }) => sideways).map(({ name }) => name));
-    const option = (/** @type {Category} */ { name, label }) => h("option", { value: name }, label);
+    const option = (/** @type {{ name: string, label: string }} */ { name, label }) =>
+      h("option", { value: name }, label);
     this.#category.replaceChildren(
       ...QUICK.map((name, k) => h("option", { value: name }, `${k + 1}  ${name}`)),
       ...byOpening(categories).map(({ text, of }) =>
         h("optgroup", { label: text }, ...of.filter(({ name }) => !QUICK.includes(name)).map(option)),
       ),
+      h("optgroup", { label: "other names" }, ...synonyms(categories).map(option)),
     );
   }
 

@@ -16,6 +16,18 @@ export function byOpening(categories) {
 }
 
 /**
+ * Other names of categories, each with the category it stands for, as somebody may look for them.
+ * @param {Category[]} categories
+ * @returns {{ name: string, label: string }[]}
+ */
+export function synonyms(categories) {
+  const first = new Map(categories.toReversed().map(({ name, label }) => [label, name]));
+  return categories
+    .filter(({ name, label }) => first.get(label) !== name)
+    .map(({ name, label }) => ({ name: first.get(label) ?? name, label: `${name.replaceAll("_", " ")}: ${label}` }));
+}
+
+/**
  * Categories used in this kitchen first, most used at the top; then all others, synonyms last.
  * @param {Category[]} categories
  * @param {string[]} used one for each object

@@ -155,6 +155,34 @@ export function withEdge(rect, side, at) {
 }
 
 /**
+ * Rectangle of a typed width or height. The chosen edge moves; else the less certain one; of equal ones, one without a neighbour,
+ * else the right or the lower one.
+ * @param {Rect} rect
+ * @param {"width" | "height"} size
+ * @param {number} metres
+ * @param {{ chosen: Side | null, sure: number[], others: Rect[] }} about `sure`: of left, right, top and bottom; empty: unknown
+ * @returns {Rect}
+ */
+export function resized(rect, size, metres, { chosen, sure, others }) {
+  const [low, high] = size === "width" ? SIDES_ACROSS : SIDES_DOWN;
+  const held = (/** @type {Side} */ side) => sure[SURE.indexOf(side)] ?? Number(isBeside(rect, side, others));
+  const moves = chosen === low || chosen === high ? chosen : held(low) < held(high) ? low : high;
+  return withEdge(rect, moves, moves === low ? rect[high] - metres : rect[low] + metres);
+}
+
+const SIDES_ACROSS = /** @type {const} */ (["left", "right"]);
+const SIDES_DOWN = /** @type {const} */ (["top", "bottom"]);
+/** @type {Side[]} */
+const SURE = [...SIDES_ACROSS, ...SIDES_DOWN];
+
+/** Whether another rectangle ends at a side. @param {Rect} rect @param {Side} side @param {Rect[]} others */
+function isBeside(rect, side, others) {
+  const opposite = /** @type {const} */ ({ left: "right", right: "left", top: "bottom", bottom: "top" })[side];
+  const reaching = withEdge(rect, side, rect[side] + (side === "left" || side === "top" ? -1 : 1));
+  return others.some((other) => Math.abs(other[opposite] - rect[side]) < SMALLEST_M && overlap(other, reaching));
+}
+
+/**
  * @param {Rect} rect
  * @param {number} dx
  * @param {number} dy
@@ -264,7 +292,18 @@ export function handleAt(rect, at) {
 export function handleAfter(handle, before, after) {
   if (handle === null || handle === "none") return handle;
   const box = /** @type {Box} */ (handle);
-  const stays = sameSize(before, after) ? box : shifted(box, middleOf(before), middleOf(after));
+  if (!sameSize(before, after)) return seenAfter(box, before, after);
+  return isOn(after, box) ? box : null;
+}
+
+/**
+ * Detected handle after its front changed: it stays where the photo shows it; null where it is no longer on the front.
+ * @param {Box} box
+ * @param {Rect} before
+ * @param {Rect} after
+ */
+export function seenAfter(box, before, after) {
+  const stays = shifted(box, middleOf(before), middleOf(after));
   return isOn(after, stays) ? stays : null;
 }
 

@@ -21,6 +21,30 @@ export function edgeOf({ left, top, right, bottom }, side) {
       ];
 }
 
+/**
+ * Upper left corner of a label within a front: in the first corner, from the upper left clockwise, where it covers no handle.
+ * @param {Rect} rect
+ * @param {{ width: number, height: number }} size
+ * @param {Rect | null} handle
+ * @returns {{ x: number, y: number }}
+ */
+export function labelCorner(rect, { width, height }, handle) {
+  const [x, right, y, bottom] = [rect.left, rect.right - width, rect.top, rect.bottom - height];
+  const corners = [
+    { x, y },
+    { x: right, y },
+    { x: right, y: bottom },
+    { x, y: bottom },
+  ];
+  const covers = (/** @type {{ x: number, y: number }} */ at) =>
+    handle !== null &&
+    at.x < handle.right &&
+    at.x + width > handle.left &&
+    at.y < handle.bottom &&
+    at.y + height > handle.top;
+  return corners.find((at) => !covers(at)) ?? { x, y };
+}
+
 /** The middle of an edge. @param {Rect} rect @param {Side} side @returns {Point} */
 export function edgeMiddle(rect, side) {
   const [[x1, y1], [x2, y2]] = edgeOf(rect, side);

@@ -196,6 +196,7 @@ export class ElevationPage extends LiveElement {
       paint: this.#paint(front),
       chosen: chosen.has(front.key),
       handle: front.handle === "none" ? null : (front.handle ?? front.seen),
+      detected: !front.handle,
       hinge: front.hinge ?? null,
       slides: this.#pane.slides(front.category),
       asked: open.filter(({ key }) => key === front.key).map(({ side }) => side),
