@@ -249,6 +249,8 @@ def test_the_header_of_a_project_fits_a_phone_screen(new_context: NewContext, se
     page.get_by_role("link", name="Elevation").click()
     expect(page.locator(".planes li")).to_have_count(1)
     assert page.evaluate("document.documentElement.scrollWidth") <= 420
+    page.goto(page.url.replace("/elevation", "/download"))
+    expect(page.locator(".tabs [aria-current]")).to_be_in_viewport(ratio=0.9)
     for name in ("Keyboard and mouse help", "Dark or light"):
         box = box_of(page.get_by_role("button", name=name))
         assert box["x"] + box["width"] <= 420

@@ -15,6 +15,8 @@ def test_tagged_archived_duplicated_and_deleted_projects_are_recoverable(new_con
         post(page, "/api/projects/sample", {"name": name})
     names = page.locator(".cards h2 a")
     expect(page.get_by_text("annotating")).to_have_count(2)
+    expect(page.get_by_role("button", name="Tags: Cellar")).to_be_hidden()
+    page.get_by_role("button", name="More: Cellar").click()
     page.get_by_role("button", name="Tags: Cellar").click()
     say(page, "Keep", "oak, Flat 3")
     page.get_by_role("button", name="oak", exact=True).click()
@@ -35,6 +37,7 @@ def test_tagged_archived_duplicated_and_deleted_projects_are_recoverable(new_con
     expect(names.filter(has_text="Cellar (copy)")).to_have_count(1)
     expect(page.locator(".tag", has_text="oak")).to_have_count(2)
 
+    page.get_by_role("button", name="More: Attic").click()
     page.get_by_role("button", name="Archive: Attic").click()
     expect(names).to_have_count(2)
     page.get_by_label("Which projects").select_option("Archived")
@@ -46,6 +49,7 @@ def test_tagged_archived_duplicated_and_deleted_projects_are_recoverable(new_con
     picture(page, "projects-tagged")
     assert serious(page, "projects") == []
 
+    page.get_by_role("button", name="More: Cellar", exact=True).click()
     page.get_by_role("button", name="Delete: Cellar", exact=True).click()
     deleted = page.locator(".toast", has_text="in the trash")
     deleted.hover()  # a hovered toast does not disappear

@@ -44,6 +44,7 @@ def test_a_project_is_exported_and_imported_as_one_file(new_context: NewContext,
     expect(dialog).to_have_count(0)
 
     page.goto(server.address)
+    page.get_by_role("button", name="More: Kitchen").press("Enter")
     page.get_by_role("button", name="Export: Kitchen").press("Enter")
     page.get_by_label("With the recording").press("Space")
     light = downloaded(page, tmp_path)

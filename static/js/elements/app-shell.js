@@ -125,6 +125,8 @@ export class AppShell extends LiveElement {
         return link;
       }),
     );
+    const here = this.#tabs.querySelector("[aria-current]");
+    if (here instanceof HTMLElement) this.#tabs.scrollLeft = here.offsetLeft - this.#tabs.offsetLeft; // on a phone, where the tabs scroll
     this.#drawProject(route);
   }
 

@@ -6,20 +6,32 @@ import { stateChip as stateOf } from "../state-chip.js";
 
 /** @typedef {import("../api-types").ProjectSummary} Project */
 /** @typedef {"rename" | "tag" | "duplicate" | "export" | "archive" | "delete"} Act */
+/**
+ * @typedef {object} How
+ * @property {boolean} admin
+ * @property {boolean} open whether its actions are shown
+ * @property {() => void} more show or hide them
+ * @property {(act: Act) => void} act
+ * @property {(tag: string) => void} find
+ */
 
 /**
  * @param {Project} project
- * @param {{ admin: boolean, act: (act: Act) => void, find: (tag: string) => void }} how
+ * @param {How} how
  */
-export function projectCard(project, { admin, act, find }) {
+export function projectCard(project, { admin, open, more, act, find }) {
   const { counts, job } = project;
-  /** @type {(what: Act, text: string) => HTMLElement} */
-  const button = (what, text) => {
+  /** @type {(what: string, text: string, press: () => void) => HTMLElement} */
+  const button = (what, text, press) => {
     const made = h("button", { type: "button", class: "quiet", "aria-label": `${text}: ${project.name}` }, text);
     made.dataset.at = `${what}:${project.id}`;
-    made.addEventListener("click", () => act(what));
+    made.addEventListener("click", press);
     return made;
   };
+  /** @type {(what: Act, text: string) => HTMLElement} */
+  const action = (what, text) => button(what, text, () => act(what));
+  const menu = button("more", "More", more);
+  menu.setAttribute("aria-expanded", String(open));
   /** @type {(tag: string) => HTMLElement} */
   const tagged = (tag) =>
     h("button", { type: "button", class: "chip tag", title: `Projects with ${tag}`, onClick: () => find(tag) }, tag);
@@ -42,15 +54,16 @@ export function projectCard(project, { admin, act, find }) {
       busy ? h("progress", { value: busy.progress, max: 1, "aria-label": `${busy.kind} ${project.name}` }) : null,
       h("div", { class: "muted" }, what.filter(Boolean).join(" · "), h("br"), line.filter(Boolean).join(" · ")),
       project.tags.length ? h("div", { class: "row tags" }, ...project.tags.map(tagged)) : null,
+      h("div", { class: "row acts" }, menu),
       h(
         "div",
-        { class: "row acts" },
-        button("rename", "Rename"),
-        button("tag", "Tags"),
-        button("duplicate", "Duplicate"),
-        project.status === "ready" ? button("export", "Export") : null,
-        button("archive", project.archived ? "Unarchive" : "Archive"),
-        admin ? button("delete", "Delete") : null,
+        { class: "row acts", hidden: !open },
+        action("rename", "Rename"),
+        action("tag", "Tags"),
+        action("duplicate", "Duplicate"),
+        project.status === "ready" ? action("export", "Export") : null,
+        action("archive", project.archived ? "Unarchive" : "Archive"),
+        admin ? action("delete", "Delete") : null,
       ),
     ),
   );

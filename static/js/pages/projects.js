@@ -71,6 +71,7 @@ export class ProjectsPage extends LiveElement {
   #templates = h("label", { class: "row", hidden: true }, "Objects to click", this.#template);
   #browse = h("button", { type: "button", onClick: () => this.#folders.open() }, "From this machine…");
   #admin = true;
+  #opened = ""; // id of the project whose actions are shown
 
   connected() {
     this.replaceChildren(
@@ -179,10 +180,18 @@ export class ProjectsPage extends LiveElement {
     const card = (/** @type {Project} */ project) =>
       projectCard(project, {
         admin: this.#admin,
+        open: this.#opened === project.id,
+        more: () => this.#unfold(project.id),
         act: (act) => this.#act(act, project),
         find: (tag) => this.#look(tag),
       });
     renew(this.#cards, ...(here.length || set ? sorted.map(card) : []), ...(here.length ? [] : [nothing]));
+  }
+
+  /** Show a project's actions, or hide those shown. @param {string} id */
+  #unfold(id) {
+    this.#opened = this.#opened === id ? "" : id;
+    this.#show(this.#projects);
   }
 
   /** @param {string} typed */
