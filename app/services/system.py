@@ -15,12 +15,12 @@ from r2c2r_core.registry import Backend, Registry
 from r2c2r_core.robot.arms import ARMS
 from r2c2r_core.segment.stage import SEGMENTERS
 
-PALETTE = [  # Okabe-Ito first, then tones that keep 3:1 against them on light and dark frames
-    "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00",
-    "#cc79a7", "#9467bd", "#8c564b", "#17becf", "#bcbd22", "#7f7f7f",
-    # then, greedily, the sRGB colour farthest in OKLab from all previous ones (at least 0.14), for 24 distinct objects
-    "#ff00ff", "#0000ff", "#ffc3e1", "#00ff00", "#6900b4", "#006900",
-    "#c30078", "#a500ff", "#78f0c3", "#ff87ff", "#00c300", "#5a5aff",
+PALETTE = [  # Okabe-Ito and tones that keep 3:1 against them; at least 0.14 apart in OKLab, for 24 distinct objects
+    # ordered so that objects clicked in turn, which are neighbours, differ most under their masks
+    "#e69f00", "#56b4e9", "#cc79a7", "#ff00ff", "#d55e00", "#17becf",
+    "#9467bd", "#f0e442", "#c30078", "#009e73", "#0072b2", "#ffc3e1",
+    "#a500ff", "#5a5aff", "#006900", "#7f7f7f", "#00ff00", "#0000ff",
+    "#bcbd22", "#ff87ff", "#8c564b", "#78f0c3", "#00c300", "#6900b4",
 ]  # fmt: skip
 
 

@@ -54,6 +54,7 @@ def test_a_scan_is_imported_clicked_run_reviewed_and_downloaded(page: Page, addr
 
     # Annotate: click, mask, name; a wrong click is undone
     page.get_by_role("link", name="Annotate").click()
+    expect(page.get_by_text("Each object gets a lane here")).to_be_visible()
     page.locator(".chip", has_text=re.compile("^ready$")).wait_for(timeout=LONG_MS)
     frame, x, y = click_of(sample, "drawer")
     seek(page, frame)

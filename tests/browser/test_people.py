@@ -37,14 +37,15 @@ def test_an_added_account_signs_in_and_a_removed_one_is_signed_out(new_context: 
 
     carl = signed_in(contexts[1], server, "carl", "a password of carl")
     me = carl.locator("r2c2r-who").get_by_role("link", name="carl")
-    expect(me).to_have_attribute("title", "annotator: accounts and your password")
+    expect(me).to_have_attribute("title", "annotator: your account")
     me.click()
     expect(carl.get_by_role("heading", name="Your own password")).to_be_visible()
+    expect(carl.get_by_role("heading", name="Your account")).to_be_visible()
     expect(carl.get_by_role("heading", name="Accounts")).to_be_hidden()
 
     ann.get_by_label("Role of carl").select_option("reviewer")
     wait_for_toast(ann, "carl is reviewer now")
-    expect(me).to_have_attribute("title", "reviewer: accounts and your password")  # updated without reload
+    expect(me).to_have_attribute("title", "reviewer: your account")  # updated without reload
     ann.reload()
     record = ann.locator("r2c2r-audit-record")
     expect(record.get_by_role("row", name="role annotator → reviewer carl ann")).to_be_visible()

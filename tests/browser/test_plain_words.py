@@ -18,6 +18,8 @@ def test_stages_models_and_roles_have_plain_names(new_context: NewContext, serve
     folder = server.data / "projects" / project.split("/p/")[1]
     (folder / "behave.json").write_text(json.dumps({"warp": "hang"}))
     page.goto(f"{project}/run")
+    expect(page.get_by_text("Nothing is computed yet")).to_be_visible()
+    expect(page.get_by_text("several meshes of each object, of which the best is chosen")).to_be_visible()
     page.get_by_role("button", name="Run", exact=True).click()
     stages = page.locator("r2c2r-job .stages li")
     expect(stages.nth(4)).to_contain_text("running")

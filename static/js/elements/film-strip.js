@@ -4,7 +4,7 @@
  */
 
 import { h, icon, LiveElement, renew } from "../dom.js";
-import { jointValue } from "../lib/format.js";
+import { counted, jointValue } from "../lib/format.js";
 import { drawLane } from "../lib/lane-view.js";
 import { drawOpening } from "../lib/opening-view.js";
 import { stateSaid } from "../lib/openings.js";
@@ -16,6 +16,7 @@ import { sourceChip, sourceWord } from "../source-chip.js";
 /** @typedef {{ opening: Opening, colour: string, state: HTMLElement }} OpeningView */
 
 const THUMBS = 18;
+const NO_LANES = "Each object gets a lane here: the frames that show it, and its clicks.";
 
 export class FilmStrip extends LiveElement {
   /** @type {FrameInfo[]} */
@@ -159,8 +160,9 @@ export class FilmStrip extends LiveElement {
     const opened = new Map();
     renew(
       this.#lanes,
+      ...(lanes.length ? [] : [h("p", { class: "muted" }, NO_LANES)]),
       ...lanes.map((lane) => {
-        const label = `${lane.name}: seen in ${lane.frames.size} frames`;
+        const label = `${lane.name}: seen in ${counted(lane.frames.size, "frame")}`;
         const canvas = h("canvas", { role: "img", "aria-label": label, title: label });
         drawn.set(canvas, lane);
         for (const type of ["pointerdown", "pointermove"])

@@ -2,6 +2,7 @@
 
 import { getMasks } from "../api.js";
 import { h, LiveElement } from "../dom.js";
+import { counted } from "../lib/format.js";
 import { worstFirst } from "../lib/lanes.js";
 import { decodeBox, paintBox, rgbOf } from "../lib/masks.js";
 
@@ -38,7 +39,7 @@ export class FrameMosaic extends LiveElement {
       h(
         "div",
         { class: "row" },
-        h("h2", { class: "grow" }, `${object.name} on ${object.lane.size} frames, worst first`),
+        h("h2", { class: "grow" }, `${object.name} on ${counted(object.lane.size, "frame")}, worst first`),
         close,
       ),
       tiles.length ? h("div", { class: "tiles" }, ...tiles) : h("p", { class: "muted" }, "No mask yet."),

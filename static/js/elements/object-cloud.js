@@ -3,6 +3,7 @@
 import { getObjectPoints } from "../api.js";
 import { h, LiveElement } from "../dom.js";
 import { Answers } from "../lib/answers.js";
+import { counted } from "../lib/format.js";
 import { decodePoints, project } from "../lib/points.js";
 import { sayError } from "./toasts.js";
 
@@ -70,7 +71,7 @@ export class ObjectCloud extends LiveElement {
         if (object !== this.#object) return;
         this.#cloud = found.count ? decodePoints(found) : null;
         this.#text.textContent = found.count
-          ? `${found.size_m.map((side) => (100 * side).toFixed(0)).join(" × ")} cm, from ${found.frames} frames`
+          ? `${found.size_m.map((side) => (100 * side).toFixed(0)).join(" × ")} cm, from ${counted(found.frames, "frame")}`
           : "No points yet.";
         this.#draw();
       });

@@ -25,7 +25,7 @@ export class WhoIsIn extends LiveElement {
       const leave = h("button", { type: "button", class: "quiet", onClick: () => this.#leave(sign_out) }, "Sign out");
       this.replaceChildren(
         this.#inbox,
-        h("a", { href: "/people", title: `${role}: accounts and your password` }, user),
+        h("a", { href: "/people", title: `${role}: ${role === "admin" ? "people and " : ""}your account` }, user),
         sign_out ? leave : "",
       );
       this.#count();

@@ -1,4 +1,7 @@
-/** People page: accounts, which an admin adds, changes and removes; the user's own password; and the seats that run jobs. */
+/**
+ * People page: accounts, which an admin adds, changes and removes; the user's own password; and the seats that run jobs. For
+ * others it is the page of their own account.
+ */
 
 import { addAccount, changeAccount, changePassword, getSystem, listAccounts, removeAccount } from "../api.js";
 import { h, icon, LiveElement } from "../dom.js";
@@ -21,6 +24,7 @@ const SHORTEST = 10;
 
 export class PeoplePage extends LiveElement {
   #answers = new Answers();
+  #title = h("h1");
   #own = h("section", { class: "card stack", hidden: true });
   #all = h("section", { class: "card stack", hidden: true });
   #record = h("section", { class: "card stack", hidden: true });
@@ -32,7 +36,7 @@ export class PeoplePage extends LiveElement {
       h(
         "div",
         { class: "page people" },
-        h("header", {}, h("h1", {}, "People"), h("a", { class: "button quiet", href: "/webhooks" }, "Webhooks")),
+        h("header", {}, this.#title, h("a", { class: "button quiet", href: "/webhooks" }, "Webhooks")),
         this.#all,
         this.#own,
         this.#honeypots,
@@ -45,6 +49,7 @@ export class PeoplePage extends LiveElement {
 
   /** @param {SystemInfo} system */
   #draw({ account, role }) {
+    this.#title.textContent = role === "admin" ? "People" : "Your account";
     this.#own.hidden = !account;
     this.#own.replaceChildren(h("h2", {}, "Your own password"), this.#passwordForm());
     this.#all.hidden = role !== "admin";

@@ -69,6 +69,7 @@ export class ProjectsPage extends LiveElement {
   #find = h("div", { class: "row find-projects", hidden: true }, this.#place, this.#search, this.#sort, this.#count);
   #template = h("select", {});
   #templates = h("label", { class: "row", hidden: true }, "Objects to click", this.#template);
+  #people = h("a", { class: "button quiet", href: "/people" }, "People");
   #browse = h("button", { type: "button", onClick: () => this.#folders.open() }, "From this machine…");
   #admin = true;
   #opened = ""; // id of the project whose actions are shown
@@ -82,7 +83,7 @@ export class ProjectsPage extends LiveElement {
           "header",
           {},
           h("h1", {}, "Projects"),
-          h("a", { class: "button quiet", href: "/people" }, "People"),
+          this.#people,
           h("a", { class: "button quiet", href: "/templates" }, "Templates"),
           this.#templates,
           h("button", { type: "button", onClick: () => this.#sample() }, "Sample kitchen"),
@@ -146,6 +147,7 @@ export class ProjectsPage extends LiveElement {
     this.#upload.limit = system.max_upload_bytes;
     this.#admin = system.role === "admin";
     this.#browse.hidden = !this.#admin;
+    this.#people.textContent = this.#admin ? "People" : "Your account";
     this.#load();
     if (!this.#admin) return;
     this.#unknown.load();

@@ -7,6 +7,7 @@ import { JobPanel } from "../elements/job-panel.js";
 import { certificateCard, sceneTable } from "../elements/results.js";
 import { sayError } from "../elements/toasts.js";
 import { counted } from "../lib/format.js";
+import { RUN, stageWord } from "../lib/words.js";
 import { live } from "../live.js";
 
 /** @typedef {import("../api-types").Job} Job */
@@ -14,7 +15,7 @@ import { live } from "../live.js";
 const SOON_MS = 500;
 /** Text about a run's work, by the state of the result. */
 const WORK = {
-  none: "Everything will be computed.",
+  none: "Nothing is computed yet: a run computes everything, in some minutes.",
   current: "The result is up to date: running again does no work.",
   stale: "Only what changed will be computed.",
 };
@@ -64,6 +65,7 @@ export class RunPage extends LiveElement {
         ? `${objects}. ${WORK[project.result]}`
         : "Click at least one object on the Annotate page first.";
       if (project.result !== "none") await this.#drawResult(project.result);
+      else this.#result.replaceChildren(job ? "" : stages());
       if (project.status === "ready") await this.#before.look(this.project, this.signal);
     } catch (error) {
       sayError(error);
@@ -127,4 +129,14 @@ export class RunPage extends LiveElement {
       certificate ? certificateCard(certificate) : "",
     );
   }
+}
+
+/** What a run does, before the first one. */
+function stages() {
+  return h(
+    "section",
+    { class: "card" },
+    h("h2", {}, "What a run does"),
+    h("dl", { class: "facts" }, ...RUN.flatMap(([stage, text]) => [h("dt", {}, stageWord(stage)), h("dd", {}, text)])),
+  );
 }
