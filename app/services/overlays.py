@@ -16,7 +16,7 @@ from app.services import masks, media, openings, views
 from app.services.cameras import pinhole
 from app.services.context import Context
 from r2c2r_core.arrays import Points
-from r2c2r_core.geometry.camera import Intrinsics, unproject
+from r2c2r_core.geometry.camera import Intrinsics, ray_slopes, unproject
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.raster import rasterize, sample_texture
 from r2c2r_core.geometry.transforms import Rigid3, joint_transform
@@ -34,10 +34,9 @@ PHOTOS = 12
 _AT_BORDER = 0.01  # fraction of the image: closer to its edge, an object may be cut off
 FAR_M = 0.03  # residual with full colour
 _FAINT = 0.25  # opacity factor of occluded parts
-_OUTLINE = (77, 225, 255)  # BGR
-_EDGE = (
-    0.0002  # threshold of the inverse depth's Laplacian over its maximum for edges between faces; flat faces are below 0.0001
-)
+_OUTLINE, _BORDER = np.array([77, 225, 255]), np.array([26, 19, 16])  # BGR
+_CREASE = np.cos(np.radians(30.0))  # between faces that meet at an edge; those of a round body meet at less
+_SOFT_PX = 0.7  # standard deviation of the blur of lines, which is smooth when zoomed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -205,7 +204,7 @@ def _drawn(files: ProjectFiles, index: int, look: schemas.OverlayLook, parts: li
         image = cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_NEAREST)
     else:
         colours, depth = _render(parts, camera, camera_from_world)
-        image = _outline(depth) if look == "outline" else np.dstack([colours, (depth > 0).astype(np.uint8) * 255])
+        image = _outline(depth, camera) if look == "outline" else np.dstack([colours, (depth > 0).astype(np.uint8) * 255])
         image[..., 3] = np.where(_covered(files, index, depth), _FAINT * image[..., 3], image[..., 3]).astype(np.uint8)
     return cv2.imencode(".png", image)[1].tobytes()
 
@@ -250,23 +249,38 @@ def _render(parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) ->
     return colours, depth
 
 
-def _outline(depth: np.ndarray) -> np.ndarray:
-    """BGRA: silhouette and inner edges, with dark borders for visibility on any photo.
-
-    The inverse depth of a plane is affine in the pixels: its Laplacian is zero on every face, however oblique.
-    """
+def _outline(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
+    """BGRA: silhouette and inner edges, with dark borders for visibility on any photo."""
     width_px = round(depth.shape[1] / _LINE_OF)
-    inverse = np.where(depth > 0, 1.0 / np.maximum(depth, 1e-3), 0.0).astype(np.float32)
-    bend = np.abs(cv2.Laplacian(inverse, cv2.CV_32F)) / max(float(inverse.max()), 1e-6)
-    rim = _widened(bend > _EDGE, width_px)
-    image = np.zeros((*depth.shape, 4), np.uint8)
-    image[_widened(rim, 1 + 2 * width_px)] = (26, 19, 16, 200)
-    image[rim] = (*_OUTLINE, 255)
-    return image
+    rim = _widened(edges_of(depth, camera), width_px)
+    line, border = _softened(rim), _softened(_widened(rim, 1 + 2 * width_px))
+    colour = _BORDER + line[..., None] * (_OUTLINE - _BORDER)
+    return np.dstack([colour, np.maximum(255 * line, 200 * border)]).astype(np.uint8)
+
+
+def edges_of(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
+    """Pixels of the silhouette, and those between which the surface turns by more than a crease, or jumps."""
+    seen = depth > 0
+    inverse = np.where(seen, 1.0 / np.maximum(depth, 1e-3), 0.0).astype(np.float32)  # of a plane, affine in the pixels
+    across, down = np.zeros_like(inverse), np.zeros_like(inverse)
+    across[:, :-1], down[:-1] = np.diff(inverse, axis=1) * camera.fx, np.diff(inverse, axis=0) * camera.fy
+    x, y = (slope.astype(np.float32) for slope in ray_slopes(np.arange(camera.width), np.arange(camera.height), camera))
+    normals = np.dstack([across, down, inverse - across * x - down * y[:, None]])
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
+    flat = seen & np.roll(seen, -1, 0) & np.roll(seen, -1, 1)
+    edges = cv2.morphologyEx(seen.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)) > 0
+    for axis in (0, 1):
+        turns = (normals * np.roll(normals, -2, axis)).sum(axis=-1) < _CREASE
+        edges |= np.roll(turns & flat & np.roll(flat, -2, axis), 1, axis)
+    return np.asarray(edges)
 
 
 def _widened(line: np.ndarray, width_px: int) -> np.ndarray:
     return np.asarray(cv2.dilate(line.astype(np.uint8), np.ones((width_px, width_px), np.uint8)) > 0)
+
+
+def _softened(line: np.ndarray) -> np.ndarray:
+    return np.asarray(cv2.GaussianBlur(line.astype(np.float32), (0, 0), _SOFT_PX))
 
 
 def _residual(files: ProjectFiles, index: int, parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) -> np.ndarray:

@@ -10,8 +10,10 @@ import pytest
 
 from app.db.engine import reading
 from app.db.queries import project_row
-from app.services.overlays import parts_of
+from app.services.overlays import edges_of, parts_of
 from app.services.views import frames_folder
+from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.depth import encode_depth
 from r2c2r_core.ingest.store import depth_path
@@ -159,3 +161,18 @@ def test_a_leaf_without_observed_motion_can_be_marked(reviewed: Reviewed) -> Non
     assert web.get(f"{address}/photos")["leaves"][0]["opening"]["source"] == "person"
     (lane,) = [one for one in web.get(f"/api/projects/{project}/openings") if one["object"] == number]
     assert (lane["source"], lane["states"]) == ("person", [{"frame": 3, "value": 0.2, "sigma": None}])
+
+
+@pytest.mark.parametrize(("sides", "inner"), [(24, False), (4, True)])
+def test_the_outline_shows_edges_of_a_box_but_no_facets_of_a_round_body(sides: int, inner: bool) -> None:
+    camera = Intrinsics(fx=1500.0, fy=1500.0, cx=160.0, cy=120.0, width=320, height=240)
+    angle = np.arange(sides) / sides * 2 * np.pi + np.pi / 4 + 0.1
+    ring = np.column_stack([0.04 * np.cos(angle), np.zeros(sides), 1.0 + 0.04 * np.sin(angle)])
+    half = np.array([0.0, 0.06, 0.0])
+    vertices = np.vstack([ring - half, ring + half])
+    k, after = np.arange(sides), (np.arange(sides) + 1) % sides
+    faces = np.vstack([np.column_stack([k, after, k + sides]), np.column_stack([after, after + sides, k + sides])])
+    depth = rasterize(vertices, faces, np.zeros((2 * sides, 3)), camera, Rigid3()).depth_m
+    within = cv2.erode((depth > 0).astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+    assert within.any()
+    assert (edges_of(depth, camera) & within).any() == inner
