@@ -22,7 +22,8 @@ PAGE_POLICY = (
 )
 # viser's client reconnects only while its document has the focus, which the parent page keeps; its panels are not ours
 INJECTED = (
-    b"<script>document.hasFocus=()=>true</script><style>[data-floating-window],[data-dock-leaf],"
+    b'<script>document.hasFocus=()=>true</script><script src="/static/js/viewer-page.js"></script>'
+    b"<style>[data-floating-window],[data-dock-leaf],"
     b".mantine-Paper-root:has(.mantine-ScrollArea-root){display:none!important}"  # the panel of a narrow window
     b".mantine-Notifications-root{display:none!important}</style>"
 )

@@ -44,7 +44,7 @@ def test_the_viewer_page_is_proxied_with_headers_for_embedding(seen: Running) ->
     session = seen.post(f"/api/projects/{seen.sample()}/viewer")
     assert session["state"] == "ready"
     page = seen.client.get(session["url"])
-    assert page.text.startswith("<html><head><script>document.hasFocus=()=>true</script><style>")
+    assert page.text.startswith("<html><head><script>document.hasFocus=()=>true</script><script src=")
     assert "[data-floating-window]" in page.text
     policy = page.headers["content-security-policy"]
     assert "worker-src blob:" in policy
