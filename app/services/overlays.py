@@ -36,6 +36,7 @@ FAR_M = 0.03  # residual with full colour
 _FAINT = 0.25  # opacity factor of occluded parts
 _OUTLINE, _BORDER = np.array([77, 225, 255]), np.array([26, 19, 16])  # BGR
 _CREASE = np.cos(np.radians(30.0))  # between faces that meet at an edge; those of a round body meet at less
+_DRAWING = 2  # version of how overlays are drawn: browsers and previews keep those of a version
 _SOFT_PX = 0.7  # standard deviation of the blur of lines, which is smooth when zoomed
 
 
@@ -361,4 +362,4 @@ def _version(files: ProjectFiles, name: str, said: openings.States) -> str:
     times = [
         path.stat().st_mtime_ns for stage in ("align", "synthesize", "warp") if (path := _path(files, stage, name)).is_file()
     ]
-    return f"{max(times, default=0):x}" + (f"-{content_key(said)[:12]}" if said else "")
+    return f"{_DRAWING}-{max(times, default=0):x}" + (f"-{content_key(said)[:12]}" if said else "")

@@ -378,6 +378,6 @@ function state({ object, current, sure }) {
   const drawn = h("span", { class: "chip", title: "the segmenter that drew its masks" }, object.mask_backend);
   if (sure === null) return line(`${clicks} · `, frames, " ", current ? drawn : null);
   const share = Math.round(100 * (object.certainty ?? sure));
-  const told = `${object.certainty === null ? "masks" : "edges"} ${share} %`;
-  return line(`${clicks} · ${frames} · `, told, " ", current ? drawn : null);
+  const of = object.certainty === null ? "masks" : "edges";
+  return line(`${clicks} · ${frames} · ${of} `, `${share} %`, " ", current ? drawn : null);
 }
