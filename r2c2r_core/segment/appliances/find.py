@@ -85,7 +85,7 @@ def appliance_front(
     if cell is None:
         return None
     surface = surface_of(run.mosaic, run.relief, run.seams)
-    cell = panel_edges(cell, surface, run.grid.cell_m).panel
+    cell = panel_edges(cell, surface, run.grid.cell_m)
     handle = None if glimpse else find_handle(run.odds, run.relief, _above(cell, support_row, run.grid.cell_m))
     front = Front(run, cell, handle, kind.depth.usual)
     wall = depth_behind(front, prepared.scene.capture.room, kind).wall_m

@@ -19,14 +19,10 @@ from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid, joined
-from r2c2r_core.segment.mosaics.strips import clear_of_strips
 from r2c2r_core.segment.occlusion import Facet, visible_mask
-from r2c2r_core.segment.runs.alignment import aligned
-from r2c2r_core.segment.runs.contrast import Contrast, edge_changes
-from r2c2r_core.segment.runs.face_frames import clear_of_rails
+from r2c2r_core.segment.runs.contrast import edge_changes
 from r2c2r_core.segment.runs.parting import parted
 from r2c2r_core.segment.runs.run import Run
-from r2c2r_core.segment.runs.stiles import evenly_framed
 from r2c2r_core.segment.runs.xy_cut import Line, LineField, halves
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -131,11 +127,7 @@ def find_front(
     handle = next((handle for part in cells if (handle := _handle_on(run, part)) is not None), None)
     surface = surface_of(run.mosaic, run.relief, run.seams)
     cut = _supported(cell, run)
-    contrast, refined = Contrast(surface.lab[..., 0]), panel_edges(cut, surface, run.grid.cell_m)
-    refined = aligned(refined, cut, run.cells, surface, run.grid.cell_m)
-    panel = evenly_framed(contrast, run.relief, refined, run.grid.cell_m)
-    panel = clear_of_rails(contrast, panel, cut, run.cells, run.grid.cell_m)
-    panel = clear_of_strips(panel, surface, run.grid.cell_m)
+    panel = panel_edges(cut, surface, run.grid.cell_m)
     return Front(run, panel, own_handle(handle, panel), 0.0)
 
 

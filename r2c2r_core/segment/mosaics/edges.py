@@ -85,7 +85,6 @@ class Params:
     behind_m: float = param(
         0.006, "m", "Minimum mean distance behind the plane of surface that is not the panel", source="depth of many frames"
     )
-    lip_m: float = param(0.06, "m", "Maximum height of a lip", gt=0, source="worktops are 20-40 mm thick, some 60")
     before_m: float = param(
         0.004, "m", "Minimum mean distance of a lip in front of the plane", source="worktops protrude 1-3 cm over fronts"
     )
@@ -133,34 +132,19 @@ class Profile(NamedTuple):
         )
 
 
-class Refined(NamedTuple):
-    """A panel refined from its cut."""
-
-    panel: Cell
-    lit_top: float  # its upper edge or, where that lies in the shadow of a lip, the lower end of that shadow
-    shown: tuple[bool, bool, bool, bool] = (
-        True,
-        True,
-        True,
-        True,
-    )  # left, right, top, bottom: whether visible, or else at the cut
-
-
-def panel_edges(cell: Cell, surface: Surface, cell_m: float) -> Refined:
+def panel_edges(cell: Cell, surface: Surface, cell_m: float) -> Cell:
     """Panel rectangle refined from its cut."""
     rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
     if rows.stop - rows.start < 12 or columns.stop - columns.start < 12:
-        return Refined(cell, cell.top, shown=(False, False, False, False))
+        return cell
     seen = surface.shows(cell)
-    (left, right), beside = _ends(cell.left, cell.right, seen[:2], _profiles(surface, rows, axis=0), cell_m)
+    left, right = _ends(cell.left, cell.right, seen[:2], _profiles(surface, rows, axis=0), cell_m)
     across, lab = _profiles(surface, columns, axis=1), surface.lab[:, columns]
-    (lit, bottom), upright = _ends(cell.top, cell.bottom, seen[2:], across, cell_m)
-    shown, lit = (*beside, *upright), _under_lip(lit, bottom, across, _rim(surface, rows, columns), cell_m)
-    below = _below_upper_face(lit, bottom, across, lab, cell_m)
-    if below is not None:
-        return Refined(Cell(left, below, right, bottom), below, shown)
-    top = _above_shadow(lit, bottom, lab, cell_m) if _lip_over(lit, across, cell_m) else lit
-    return Refined(Cell(left, top, right, bottom), lit, shown)
+    lit, bottom = _ends(cell.top, cell.bottom, seen[2:], across, cell_m)
+    top = _below_upper_face(lit, bottom, across, lab, cell_m)
+    if top is None:
+        top = _above_shadow(lit, bottom, lab, cell_m) if _lip_over(lit, across, cell_m) else lit
+    return Cell(left, top, right, bottom)
 
 
 def _profiles(surface: Surface, across: slice, axis: int) -> Profile:
@@ -194,15 +178,12 @@ def _middles(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
     )
 
 
-def _ends(
-    low: float, high: float, seen: tuple[bool, bool], profile: Profile, cell_m: float
-) -> tuple[tuple[float, float], tuple[bool, bool]]:
-    """Both edges along an axis, and whether each is visible; `seen` flags those that the network sees at the cut."""
-    count = len(profile.gradient)
+def _ends(low: float, high: float, seen: tuple[bool, bool], profile: Profile, cell_m: float) -> tuple[float, float]:
+    """Both edges along an axis; `seen` flags those that the network sees at the cut."""
     own = _own(low, high, profile)
-    first, begins = _end(low, high, seen[0], profile, own, cell_m)
-    last, ends = _end(count - high, count - low, seen[1], profile.mirrored(), own, cell_m)
-    return (first, count - last), (begins, ends)
+    count = len(profile.gradient)
+    last = _end(count - high, count - low, seen[1], profile.mirrored(), own, cell_m)
+    return _end(low, high, seen[0], profile, own, cell_m), count - last
 
 
 def _own(low: float, high: float, profile: Profile) -> float:
@@ -210,14 +191,14 @@ def _own(low: float, high: float, profile: Profile) -> float:
     return float(np.median(profile.gradient[round(low) + 4 : round(high) - 4]))
 
 
-def _end(low: float, high: float, seen: bool, profile: Profile, own: float, cell_m: float) -> tuple[float, bool]:
-    """Lower edge, in positions where i + 0.5 is the middle of cell i, and whether it is visible or stays at the cut."""
+def _end(low: float, high: float, seen: bool, profile: Profile, own: float, cell_m: float) -> float:
+    """Lower edge, in positions where i + 0.5 is the middle of cell i; at the cut where none is visible."""
     params, (gradient, slope, light, *_) = tuned(Params), profile
     start = low + _dark_from(round(low), round((low + high) / 2), light, cell_m)
     least = max(params.clear * own, params.least_gradient)
     begins = _plane_from(low, high, profile, cell_m)
     if begins is not None:
-        return _step_near(*begins, gradient, least, cell_m), True
+        return _step_near(*begins, gradient, least, cell_m)
     first = max(round(low - params.outside_m / cell_m), 1)
     last = min(round(start + params.inside_m / cell_m) + 1, len(gradient) - 1)
     while last - first > 3 and gradient[last - 1] > gradient[last - 2]:
@@ -227,20 +208,20 @@ def _end(low: float, high: float, seen: bool, profile: Profile, own: float, cell
     if own_gap is not None:
         peaks = [*peaks, own_gap - first]
     if not peaks and seen:
-        return low, True
+        return low
     if not peaks:  # the cut followed depth, which ends before the panel does
         first, last = max(round(low - params.depth_short_m / cell_m), 1), first + 2
         peaks = [i for i in _peaks(gradient[first:last], least) if not _is_behind(first + i, round(low), round(high), profile)]
     if not peaks:
-        return start + (params.half_gap_m / cell_m if start == low else 0.0), False
+        return start + (params.half_gap_m / cell_m if start == low else 0.0)
     i = peaks[-1]  # the innermost
     gap = _gap(slope, first + i, max(first, first + i - round(params.widest_gap_m / cell_m)))
     if gap is not None:
-        return (gap[0] + gap[1]) / 2 + 0.5 + max(params.half_gap_m / cell_m, _dark_width(light, *gap, cell_m) / 2), True
+        return (gap[0] + gap[1]) / 2 + 0.5 + max(params.half_gap_m / cell_m, _dark_width(light, *gap, cell_m) / 2)
     a, b, c = (float(value) for value in gradient[first + i - 1 : first + i + 2])
     bend = a - 2 * b + c
     offset = float(np.clip((a - c) / (2 * bend), -0.5, 0.5)) if bend < -1e-9 else 0.0
-    return first + i + 0.5 + offset, True
+    return first + i + 0.5 + offset
 
 
 def _is_behind(start: int, low: int, high: int, profile: Profile) -> bool:
@@ -325,38 +306,6 @@ def _step_near(earliest: int, latest: int, gradient: np.ndarray, least: float, c
     first, last = earliest - off, latest + off + 1
     peaks = _peaks(gradient[first - 1 : last + 1], least)
     return (first - 1 + peaks[-1] if peaks else first + int(np.argmax(gradient[first:last]))) + 0.5
-
-
-def _rim(surface: Surface, rows: slice, columns: slice) -> float:
-    """Mean height over the plane of a panel's outer eighths at both sides, half way up: the stiles, where it is framed."""
-    quarter, eighth = (rows.stop - rows.start) // 4, (columns.stop - columns.start) // 8
-    rim = np.r_[columns.start : columns.start + eighth, columns.stop - eighth : columns.stop]
-    height, points = (values[rows.start + quarter : rows.stop - quarter, rim] for values in (surface.height_m, surface.points))
-    return float((height * points).sum() / points.sum()) if points.any() else float("-inf")
-
-
-def _under_lip(top: float, bottom: float, profile: Profile, rim_m: float, cell_m: float) -> float:
-    """Upper edge, moved down where a lip of the panel's colour, such as a worktop's, was cut as its upper part.
-
-    Depth shows a lip in front of the panel's plane and of its rim: the upper rail of a frame is as high as its stiles. A raised
-    part of a front, such as a grip along its edge, has another front or a lip above it.
-    """
-    params, start, middle = tuned(Params), round(top), round((top + bottom) / 2)
-    reach, off = round(params.lip_m / cell_m), round(params.depth_off_m / cell_m)
-    height = profile.height - np.fmax(_median_seen(profile.height[start + reach : middle]), rim_m)
-    usual = float(np.median(profile.points[start + reach : middle])) if start + reach < middle else 0.0
-    over = slice(max(start - reach // 2, 0), max(start - off, 0))
-    points = profile.points[over]
-    if points.sum() > params.known * usual * len(points) and np.nansum(height[over] * points) > -params.before_m * points.sum():
-        return top
-    strip = np.nan_to_num(height[start : start + reach])
-    peak = int(np.argmax(strip[: reach // 2])) if len(strip) else 0
-    below = np.flatnonzero(strip[peak:] < strip[peak : peak + 1] / 2)
-    if not len(below) or strip[peak] < params.behind_m:
-        return top
-    least = max(params.clear * _own(top, bottom, profile), params.least_gradient)
-    begins = start + peak + int(below[0])
-    return _step_near(begins, begins, profile.gradient, least, cell_m)
 
 
 def _lip_over(top: float, profile: Profile, cell_m: float) -> bool:

@@ -93,27 +93,6 @@ def is_rail(contrast: Contrast, front: Cell, strip: Cell, axis: int) -> bool:
     return all(_ends(contrast, 1 - axis, at, strip_ends, gap) for at, gap in zip(others, own, strict=True))
 
 
-def clear_of_rails(contrast: Contrast, panel: Cell, cut: Cell, cells: Sequence[Cell], cell_m: float) -> Cell:
-    """Refined panel whose edges return to the cut where they lie past the middle of an adjacent rail."""
-    edges = dict(zip(SIDES, edges_of(panel), strict=True))
-    for other in cells:
-        for axis, end in SIDES:
-            (low, high), border = across(other, axis), across(cut, axis)[end]
-            near, far = (low, high) if end else (high, low)
-            if abs(near - border) > 1 or not _beside(other, cut, axis) or high - low > tuned(Params).widest_m / cell_m:
-                continue
-            beyond = (edges[axis, end] - (near + far) / 2) * (far - near)
-            if beyond > 0 and is_rail(contrast, cut, other, axis):
-                edges[axis, end] = border
-    return Cell(edges[0, 0], edges[1, 0], edges[0, 1], edges[1, 1])
-
-
-def _beside(other: Cell, cell: Cell, axis: int) -> bool:
-    """Whether one cell covers most of another's side."""
-    (start, stop), (low, high) = across(other, 1 - axis), across(cell, 1 - axis)
-    return min(stop, high) - max(start, low) > 0.5 * (high - low)
-
-
 def _inset(contrast: Contrast, field: LineField, cell: Cell, cell_m: float) -> Cell | None:
     """Largest front inset in a cell, framed on the most sides (at most three); None where there is none.
 

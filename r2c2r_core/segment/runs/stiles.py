@@ -5,13 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from r2c2r_core.segment.mosaics.edges import Refined
 from r2c2r_core.segment.mosaics.lines import Evidence
 from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell, joined
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief
-from r2c2r_core.segment.runs.contrast import CORNER, SIDES, Contrast
-from r2c2r_core.segment.runs.face_frames import is_rail, lines_beside, shows
+from r2c2r_core.segment.runs.contrast import CORNER, Contrast
+from r2c2r_core.segment.runs.face_frames import is_rail, shows
 from r2c2r_core.segment.runs.xy_cut import LineField, across
 from r2c2r_core.tuning import param, tuned
 
@@ -52,13 +51,6 @@ class Params:
         lt=1,
     )
     edge: float = param(-1.0, "log", "Minimum log-odds of a frame's outer edge")
-    even_m: float = param(
-        0.01,
-        "m",
-        "Maximum difference between the widths of rails and stiles of one front",
-        gt=0,
-        source="as exactly as their lines are placed",
-    )
     middle: float = param(0.6, "share", "Fraction of a side over whose middle lines count: corners have other lines")
 
 
@@ -92,35 +84,6 @@ def whole_frames(
                 grown = joined([grown, strip])
                 found.append(grown)
     return found
-
-
-def evenly_framed(contrast: Contrast, relief: Relief, refined: Refined, cell_m: float) -> Cell:
-    """Panel with an upper edge in shadow, moved so that its upper rail is as wide as its other rails and stiles.
-
-    The shadow of a worktop covers a front and a face-frame rail above it alike, and hides the gap between them.
-    """
-    params, panel = tuned(Params), refined.panel
-    left, right, top, bottom = (_frame_width(contrast, relief, panel, side, cell_m) for side in SIDES)
-    others = [width for width in (left, right, bottom) if width is not None]
-    if top is None or len(others) < 2 or max(others) - min(others) > params.even_m / cell_m:
-        return panel
-    even = panel.top + top - float(np.mean(others))
-    if abs(even - refined.lit_top) >= abs(even - panel.top):
-        return panel
-    return Cell(panel.left, even, panel.right, panel.bottom)
-
-
-def _frame_width(contrast: Contrast, relief: Relief, panel: Cell, side: tuple[int, int], cell_m: float) -> float | None:
-    """Width of the frame at one edge of a front, in grid cells, from a line or else from depth; None where neither shows it."""
-    params, (axis, end) = tuned(Params), side
-    edge, away = across(panel, axis)[end], -1 if end else 1
-    lines = lines_beside(contrast, panel, side, cell_m)
-    if lines:
-        return abs(lines[0] - edge)
-    widths = np.arange(params.narrowest_m / cell_m, params.widest_m / cell_m, STEP)
-    steps = [_step_at(relief, panel, axis, edge + away * width, away, cell_m) for width in widths]
-    best = int(np.argmax(steps))
-    return float(widths[best]) if steps[best] > params.sunk_m else None
 
 
 def _step_at(relief: Relief, front: Cell, axis: int, at: float, away: int, cell_m: float) -> float:

@@ -1,5 +1,4 @@
 import dataclasses
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +10,8 @@ from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import front_panel, own_handle
 from r2c2r_core.segment.geometric.session import GeometricSession
-from r2c2r_core.segment.mosaics.edges import Refined
 from r2c2r_core.segment.mosaics.handles import GridHandle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, joined
-from r2c2r_core.segment.mosaics.relief import Relief
-from r2c2r_core.segment.runs.contrast import Contrast
 from r2c2r_core.segment.stage import open_session
 from tests.core.segment.conftest import Truth
 from tests.core.segment.scenes import BOTTOM_M, DOORS, DRAWERS, FRONT_Y, POST, TOP_M, click_on, prompt
@@ -36,33 +32,6 @@ def test_one_click_measures_a_door_within_3_mm(session: GeometricSession, boxes:
     assert panel.handle.is_vertical
     assert panel.handle.protrusion_m == pytest.approx(0.036, abs=6e-3)  # a rod two depth pixels wide
     assert np.sign(panel.handle.centre[0]) == (-1 if name == "door_b" else 1)
-
-
-def test_refined_front_edges_pass_through_clear_of_rails(
-    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def halved(contrast: Contrast, panel: Cell, cut: Cell, cells: Sequence[Cell], cell_m: float) -> Cell:
-        assert cut in cells
-        return Cell(panel.left, panel.top, panel.right, (panel.top + panel.bottom) / 2)
-
-    monkeypatch.setattr("r2c2r_core.segment.fronts.front.clear_of_rails", halved)
-    left, _ = DOORS["door_a"]
-    panel = session.find(prompt("half", "cabinet", click_on(boxes[0], (left + 0.31, FRONT_Y, 0.41), 60))).panel()
-    assert panel is not None
-    assert panel.height_m == pytest.approx((TOP_M - BOTTOM_M) / 2, abs=3e-3)
-
-
-def test_refined_front_edges_pass_through_evenly_framed(
-    session: GeometricSession, boxes: Boxes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def lowered(contrast: Contrast, relief: Relief, refined: Refined, cell_m: float) -> Cell:
-        return dataclasses.replace(refined.panel, top=refined.panel.top + 0.05 / cell_m)
-
-    monkeypatch.setattr("r2c2r_core.segment.fronts.front.evenly_framed", lowered)
-    left, _ = DOORS["door_a"]
-    panel = session.find(prompt("low", "cabinet", click_on(boxes[0], (left + 0.31, FRONT_Y, 0.4), 60))).panel()
-    assert panel is not None
-    assert panel.height_m == pytest.approx(TOP_M - BOTTOM_M - 0.05, abs=3e-3)
 
 
 def test_an_edge_without_colour_contrast_has_low_strength(session: GeometricSession, boxes: Boxes) -> None:

@@ -31,7 +31,7 @@ def edges(image: np.ndarray, cut: Cell, on_plane: Cell, *heights: tuple[Cell, fl
     points[area(on_plane)] = 1
     for cell, height_m in heights:
         height[area(cell)], points[area(cell)] = height_m, 1
-    found = panel_edges(cut, Surface(*as_lab(image), height, points), CELL_M).panel
+    found = panel_edges(cut, Surface(*as_lab(image), height, points), CELL_M)
     return found.left, found.top, found.right, found.bottom
 
 
@@ -50,15 +50,6 @@ def test_a_black_door_ends_at_its_cut_above_an_equally_black_plinth() -> None:
     assert edges(image, cut, cut, (Cell(60, 300, 260, 340), -0.03))[3] == pytest.approx(300, abs=EDGE_CELLS)
 
 
-def test_a_protruding_lip_is_excluded_and_a_grip_edge_is_included() -> None:
-    lip = Cell(40, 52, 280, 60)
-    whole = Cell(PANEL.left, lip.top, PANEL.right, PANEL.bottom)
-    image = mosaic((whole, BLUE), (Cell(60, 59, 260, 60), (62, 92, 121)))
-    assert edges(image, whole, PANEL)[1] == pytest.approx(52, abs=EDGE_CELLS)
-    assert edges(image, whole, PANEL, (lip, 0.014))[1] == pytest.approx(60, abs=EDGE_CELLS)
-    assert edges(image, whole, PANEL, (lip, 0.014), (Cell(40, 0, 280, 52), 0.0))[1] == pytest.approx(52, abs=EDGE_CELLS)
-
-
 def test_a_network_edge_is_kept_despite_a_tile_edge_3_cm_beyond() -> None:
     ivory, tile = (235, 234, 230), (Cell(60, 40, 260, 47), (205, 205, 200))
     image = mosaic(tile, background=ivory)
@@ -66,7 +57,7 @@ def test_a_network_edge_is_kept_despite_a_tile_edge_3_cm_beyond() -> None:
     nothing = np.zeros(image.shape[:2])
 
     def top() -> float:
-        return panel_edges(PANEL, Surface(*as_lab(image), nothing, nothing, PanelOdds(*thought)), CELL_M).panel.top
+        return panel_edges(PANEL, Surface(*as_lab(image), nothing, nothing, PanelOdds(*thought)), CELL_M).top
 
     assert top() == pytest.approx(47, abs=EDGE_CELLS)
     thought[1][round(PANEL.top) // STEP] = 2
@@ -181,11 +172,3 @@ def test_a_wall_darker_than_the_front_is_not_taken_for_a_shadow() -> None:
     wall = Cell(0, 0, 320, 60)
     image = mosaic((PANEL, (200, 203, 190)), (wall, (165, 171, 168)), (Cell(60, 50, 260, 60), in_shade((200, 203, 190), 0.7)))
     assert edges(image, PANEL, PANEL, (wall, -0.03))[1] == pytest.approx(60, abs=EDGE_CELLS)
-
-
-def test_a_frame_top_rail_is_kept_and_a_lip_above_is_excluded() -> None:
-    whole = Cell(PANEL.left, 52, PANEL.right, PANEL.bottom)
-    sunk, lip = Cell(whole.left + 24, whole.top + 24, whole.right - 24, whole.bottom - 24), Cell(40, 52, 280, 60)
-    image = mosaic((whole, BLUE), (Cell(60, 75, 260, 76), (62, 92, 121)), (Cell(60, 59, 260, 60), (62, 92, 121)))
-    assert edges(image, whole, whole, (sunk, -0.015))[1] == pytest.approx(52, abs=EDGE_CELLS)
-    assert edges(image, whole, whole, (sunk, -0.015), (lip, 0.014))[1] == pytest.approx(60, abs=EDGE_CELLS)

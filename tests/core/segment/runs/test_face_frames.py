@@ -10,7 +10,7 @@ from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief
 from r2c2r_core.segment.runs.contrast import Contrast
-from r2c2r_core.segment.runs.face_frames import clear_of_rails, inset_fronts, is_rail
+from r2c2r_core.segment.runs.face_frames import inset_fronts, is_rail
 
 CELL_M = 0.0025
 FRONT = Cell(60, 60, 260, 300)
@@ -125,12 +125,3 @@ def test_gaps_stop_at_a_face_frame_rail_but_continue_beside_an_own_rail() -> Non
     assert is_rail(mosaic(FRONT), FRONT, strip, axis=1)
     assert not is_rail(mosaic(FRONT, grown(top=8)), FRONT, strip, axis=1)
     assert not is_rail(mosaic(), FRONT, strip, axis=1)  # nothing is visible
-
-
-def test_an_edge_refined_past_a_face_frame_rail_is_reset_to_its_cut() -> None:
-    refined = grown(top=7)
-    assert edges(clear_of_rails(mosaic(FRONT), refined, FRONT, strips(FRONT), CELL_M)) == edges(FRONT)
-    near = grown(top=2)
-    assert edges(clear_of_rails(mosaic(FRONT), near, FRONT, strips(FRONT), CELL_M)) == edges(near)
-    own = mosaic(FRONT, grown(top=8))  # the front's borders continue: its frame's inner line was cut
-    assert edges(clear_of_rails(own, refined, FRONT, strips(FRONT), CELL_M)) == edges(refined)

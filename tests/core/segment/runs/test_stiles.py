@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from r2c2r_core.segment.geometric.session import GeometricSession
-from r2c2r_core.segment.mosaics.edges import Refined
 from r2c2r_core.segment.mosaics.lines import Evidence
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief
 from r2c2r_core.segment.runs.contrast import Contrast
 from r2c2r_core.segment.runs.run import Run, make_run
-from r2c2r_core.segment.runs.stiles import evenly_framed, whole_frames
+from r2c2r_core.segment.runs.stiles import whole_frames
 
 CELL_M, BLOCK = 0.0025, 20
 DOOR, PANEL = Cell(80, 20, 280, 320), Cell(110, 50, 250, 290)
@@ -111,27 +110,6 @@ def test_wood_grain_on_a_recessed_panel_does_not_separate_its_stile() -> None:
         80, abs=2
     )
     assert door_of(whole_frames(odds(110), [CUT, BESIDE], CELL_M, grain, Contrast(light), FLAT)) == CUT
-
-
-@pytest.mark.parametrize(("rail", "found"), [(30, 30), (15, 22)])
-def test_a_shadowed_edge_is_placed_at_the_common_frame_width(rail: int, found: float) -> None:
-    """The shadow ends at row 30, and the edge was followed up to row 22. All other stiles and rails are 30 cells wide."""
-    sunk = Cell(110, 30 + rail, 250, 290)
-    light = np.full((340, 320), 170, np.float32)
-    cv2.rectangle(light, (round(sunk.left), round(sunk.top)), (round(sunk.right), round(sunk.bottom)), 120, 1)
-    followed = Refined(Cell(80, 22, 280, 320), lit_top=30)
-    contrast = Contrast(cv2.GaussianBlur(light, (0, 0), 0.8))
-    assert evenly_framed(contrast, FLAT, followed, CELL_M).top == pytest.approx(found, abs=2)
-
-
-@pytest.mark.parametrize(("sunk_m", "found"), [(0.007, 30), (0.0, 22)])
-def test_a_shadowed_edge_is_placed_from_a_panel_recessed_only_in_depth(sunk_m: float, found: float) -> None:
-    """Only the upper line of the panel is visible, in light from above."""
-    light, level = np.full((340, 320), 170, np.float32), np.zeros((170, 160))
-    light[60, 110:250], level[30:145, 55:125] = 120, -sunk_m
-    followed = Refined(Cell(80, 22, 280, 320), lit_top=30)
-    contrast, relief = Contrast(cv2.GaussianBlur(light, (0, 0), 0.8)), replace(FLAT, level_m=level)
-    assert evenly_framed(contrast, relief, followed, CELL_M).top == pytest.approx(found, abs=3)
 
 
 def test_an_adjacent_door_is_not_joined_as_a_stile() -> None:
