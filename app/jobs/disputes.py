@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 from r2c2r_core.errors import R2C2RError
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.segment.corrected import as_found
 from r2c2r_core.segment.prompts import parse_prompts
 from r2c2r_core.segment.protocol import SegmentSession
 from r2c2r_core.segment.stage import find_disputed
@@ -75,7 +74,7 @@ def told_objects(lines: Iterable[dict[str, Any]]) -> list[Told]:
     for line in lines:
         others = None if line["others"] is None else _read_others(line["others"])
         with contextlib.suppress(R2C2RError):
-            prompt = as_found(read_prompt(line["prompt"]))
+            prompt = read_prompt(line["prompt"])
             told.append(Told(int(line["object"]), str(line["key"]), prompt, others))
     return told
 

@@ -39,7 +39,7 @@ from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt
 from r2c2r_core.model.proposal import Proposal
 from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.progress import Progress
-from r2c2r_core.segment.corrected import as_found, corrected_stream
+from r2c2r_core.segment.corrected import corrected_stream
 from r2c2r_core.segment.prompts import check_prompt
 from r2c2r_core.segment.protocol import Glimpse, SegmentSession
 from r2c2r_core.segment.stage import SEGMENTERS, open_session
@@ -159,7 +159,7 @@ class Desk:
         try:
             prompt = read_prompt(document)
             check_prompt(self.capture, prompt)
-            asked = replace(as_found(prompt), others=self._disputes.drawn_with(number, key) or ())
+            asked = replace(prompt, others=self._disputes.drawn_with(number, key) or ())
             glimpsed = self.session.glimpse(asked) if not prompt.frames else None  # the preview may be of a corrected frame
             first = self._shown(glimpsed) if glimpsed is not None else None
         except Exception as error:

@@ -334,6 +334,7 @@ _APPLIANCES = (
         width=Size(0.40, 0.60, 1.25, _HOODS),
         depth=Size(0.25, 0.45, 0.70, _HOODS),
         height=Size(0.05, 0.30, 1.0, _HOODS),
+        no_front=True,
         material=materials.HOOD,
     ),
 )

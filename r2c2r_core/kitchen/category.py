@@ -106,6 +106,7 @@ class Category:
     fixture: str | None = None  # its builder: "module" or "module:NAME" of synthesize/fixtures or of a plug-in
     hinge: HingeSide | None = None  # default side of a single door's hinge, or towards which a sliding door goes
     hinge_share: float = 0.5  # fraction sold with the hinge on that side, always below 1
+    no_front: bool = False  # an appliance of several faces, such as a hood's slopes and chimney
     one_front: bool = False  # a machine, or a stack: one front, regardless of the lines on it
     several_fronts: bool = False  # several fronts are one object, separated by their handles
     stands: bool = False  # rests on a support; a wall cabinet and a built-in front do not

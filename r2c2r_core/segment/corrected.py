@@ -1,4 +1,4 @@
-"""A person's corrections of single frames, which override the masks of any segmenter."""
+"""A person's corrections of single frames, which override the masks of any segmenter there."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -6,16 +6,23 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
+from r2c2r_core.arrays import Mask
 from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
-from r2c2r_core.model.inputs import FrameSaid, ObjectPrompt
+from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.inputs import FrameSaid
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.segment.protocol import Glimpse
 
 
-def as_found(prompt: ObjectPrompt) -> ObjectPrompt:
-    """Prompt without single-frame corrections: they do not affect segmentation, and changing them must not rerun it."""
-    return replace(prompt, frames=())
+def painted_masks(said: tuple[FrameSaid, ...], capture: Capture) -> dict[int, Mask]:
+    """Masks that a person painted, at the size of their frames, by frame."""
+    cameras = {one.frame: capture.frame(one.frame).rgb_camera for one in said if one.mask is not None}
+    return {
+        one.frame: _resized(one.mask, cameras[one.frame].width, cameras[one.frame].height)
+        for one in said
+        if one.mask is not None
+    }
 
 
 def corrected_track(track: MaskTrack, said: tuple[FrameSaid, ...]) -> MaskTrack:
@@ -56,6 +63,9 @@ def _at_size(mask: PackedMask, size: PackedMask) -> PackedMask:
     """Mask resized to the frames' size."""
     if (mask.width, mask.height) == (size.width, size.height):
         return mask
+    return pack_mask(_resized(mask, size.width, size.height))
+
+
+def _resized(mask: PackedMask, width: int, height: int) -> Mask:
     pixels = unpack_mask(mask).astype(np.uint8)
-    grown = cv2.resize(pixels, (size.width, size.height), interpolation=cv2.INTER_NEAREST)
-    return pack_mask(grown > 0)
+    return cv2.resize(pixels, (width, height), interpolation=cv2.INTER_NEAREST) > 0

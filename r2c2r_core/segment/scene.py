@@ -181,10 +181,10 @@ class Scene:
         if measured is not None:
             return measured
         fused = _value_near(self.surface_depth(frame_index, drawn_size(camera)), camera, x_px, y_px)
-        level = self._level_depth(frame_index, x_px, y_px)
+        level = self.level_depth(frame_index, x_px, y_px)
         return level if fused is None or (level is not None and level < fused) else fused
 
-    def _level_depth(self, frame_index: int, x_px: float, y_px: float) -> float | None:
+    def level_depth(self, frame_index: int, x_px: float, y_px: float) -> float | None:
         """Depth, at a pixel without any, of the level surface that contains most of the hole's rim, on all sides of the pixel.
 
         None where there is no such surface, or where other frames look through it. No frame has depth on a glass hob, and the

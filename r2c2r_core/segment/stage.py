@@ -8,7 +8,7 @@ from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
 from r2c2r_core.model.track import MaskTrack
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.registry import Backend, Registry, Weights
-from r2c2r_core.segment.corrected import as_found, corrected_track
+from r2c2r_core.segment.corrected import corrected_track
 from r2c2r_core.segment.protocol import SegmentConfig, Segmenter, SegmentSession
 
 __all__ = ["SEGMENTERS", "SegmentConfig", "find_disputed", "open_session", "track_object"]
@@ -72,9 +72,9 @@ def find_disputed(
     session: SegmentSession, prompts: Sequence[ObjectPrompt], *, progress: Progress = SILENT
 ) -> dict[str, tuple[PromptPoint, ...]]:
     """Clicks of other objects that hit an object, by its name: between two names there is a seam."""
-    return session.disputed([as_found(prompt) for prompt in prompts])
+    return session.disputed(prompts)
 
 
 def track_object(session: SegmentSession, prompt: ObjectPrompt, *, progress: Progress = SILENT) -> MaskTrack:
     """Mask track of the object over all frames that see it, with a person's corrections; raises ObjectNotSeen, PromptError."""
-    return corrected_track(session.track(as_found(prompt), progress=progress), prompt.frames)
+    return corrected_track(session.track(prompt, progress=progress), prompt.frames)

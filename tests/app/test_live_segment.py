@@ -34,6 +34,7 @@ class Session:
     def __init__(self) -> None:
         self.gate = threading.Event()
         self.looked: list[float] = []
+        self.painted: list[int] = []  # frames with a painted mask, of the objects streamed
         self.begun = threading.Event()
 
     def glimpse(self, prompt: ObjectPrompt) -> tuple[int, PackedMask, float]:
@@ -42,6 +43,7 @@ class Session:
 
     def stream(self, prompt: ObjectPrompt) -> Iterator[tuple[int, PackedMask, float]]:
         self.begun.set()
+        self.painted += [one.frame for one in prompt.frames]
         assert self.gate.wait(PATIENCE_S)
         for frame in range(4):
             yield frame, mask(int(prompt.points[-1].x)), 0.5
@@ -99,6 +101,17 @@ def test_the_clicked_frame_is_sent_first_and_again_if_its_mask_changes(desk: Any
     desk.put(click(2, 20.0, "bottle"))
     until(lambda: said and said[-1].get("end") == "done")
     assert [line.get("frame") for line in said] == [0, 0, 1, 2, 3, None]
+
+
+def test_a_painted_mask_reaches_the_session_as_evidence_for_the_other_frames(desk: Any, said: list[dict[str, Any]]) -> None:
+    desk.session.gate.set()
+    desk.start()
+    command = click(1, 20.0)
+    command["prompt"]["frames"] = [{"frame": 2, "mask": {"width": 40, "height": 30, "runs": [100, 1100]}}]
+    desk.put(command)
+    until(lambda: said and said[-1].get("end") == "done")
+    assert desk.session.painted == [2]
+    assert [line.get("frame") for line in said] == [2, 0, 1, 3, None]
 
 
 def test_a_click_is_answered_while_another_object_is_being_segmented(desk: Any, said: list[dict[str, Any]]) -> None:

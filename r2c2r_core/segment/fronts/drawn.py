@@ -2,10 +2,13 @@
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
+from r2c2r_core.arrays import Mask
 from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
+from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import DrawnFront, DrawnHandle
 from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.model.track import FrontPanel
@@ -22,6 +25,8 @@ from r2c2r_core.segment.scene import Scene
 
 _AROUND_M = 0.08  # margin around the rectangle: its neighbours' lines show the frames' pose errors
 _SUPPORT_M = 0.02  # side of the region's cells
+_TRIM = 0.05  # share of a painted outline beyond each edge: its corners are rounded, and hands tremble
+_FILLED = 0.85  # share of its rectangle that a painted front fills at least; handles and plants cut off some
 
 
 def drawn_front(drawn: DrawnFront, scene: Scene, config: SegmentConfig) -> Front:
@@ -31,6 +36,21 @@ def drawn_front(drawn: DrawnFront, scene: Scene, config: SegmentConfig) -> Front
     run = _run_of(grid, cell, scene, config.mosaic_frames)
     handle = _handle_on(drawn.handle, cell, grid.cell_m) if drawn.handle is not None else run.handles[0]
     return Front(run, cell, handle, 0.0)
+
+
+def painted_front(mask: Mask, grid: PlaneGrid, frame: Frame, world_from_capture: Rigid3) -> DrawnFront | None:
+    """Rectangle on a plane that a mask painted in a frame fills; None for another shape, and for one the image cuts off."""
+    found, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outline = max((part[:, 0] for part in found), key=cv2.contourArea, default=np.zeros((0, 2), int))
+    if len(outline) < 4 or (outline.min(axis=0) <= 0).any() or (outline.max(axis=0) >= np.array(mask.shape[::-1]) - 1).any():
+        return None
+    pixel_from_cell = grid.pixel_from_cell(frame, frame.rgb_camera)
+    cells = cv2.perspectiveTransform((outline + 0.5)[None].astype(np.float64), np.linalg.inv(pixel_from_cell))[0]
+    (left, top), (right, bottom) = np.quantile(cells, [_TRIM, 1 - _TRIM], axis=0)
+    if cv2.contourArea(cells.astype(np.float32)) < _FILLED * (right - left) * (bottom - top):
+        return None
+    corners = grid.rectangle(Cell(left, top, right, bottom)).corners
+    return DrawnFront(corners_capture=tuple(map(tuple, world_from_capture.inverse.apply(corners).tolist())))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,13 +1,15 @@
 """Clicks to an object: the method of the category first (front, appliance, free-standing), then the one the scan suggests."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2c2r_core.arrays import Points, Vector3
+from r2c2r_core.arrays import Mask, Points, Vector3
 from r2c2r_core.errors import ObjectNotSeen
+from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import DrawnFront, ObjectPrompt, PromptPoint
 from r2c2r_core.segment.appliances.find import appliance_front
 from r2c2r_core.segment.appliances.fit import FittedBox, fit_box
@@ -16,7 +18,7 @@ from r2c2r_core.segment.found import Found
 from r2c2r_core.segment.fronts.clicked_dark import best_frames, dark_beyond, dark_frames, dark_place
 from r2c2r_core.segment.fronts.clicked_open import closed_place, was_moved
 from r2c2r_core.segment.fronts.drawer_at import drawer_at
-from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front
+from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front, painted_front
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, find_front, seen_sides
 from r2c2r_core.segment.fronts.sliding import sliding_chance
@@ -25,6 +27,7 @@ from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
 from r2c2r_core.segment.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.found import FoundCarried, FoundStanding, FoundThing
+from r2c2r_core.segment.things.painted import find_painted, level_holes, may_hold, with_clicked_parts
 from r2c2r_core.segment.things.revolution import Sight, find_round
 from r2c2r_core.segment.things.standing import find_standing
 from r2c2r_core.segment.things.standing_mask import standing_colours
@@ -38,6 +41,13 @@ class Params:
     """Tuned parameters of the choice of method."""
 
     small_m: float = param(0.25, "m", "Radius below which objects are carved by silhouettes")
+    as_painted: float = param(
+        0.85,
+        "share",
+        "Minimum overlap of the clicked object's mask with a painted one that only corrects its frame",
+        ge=0,
+        le=1,
+    )
 
 
 def find_object(
@@ -53,7 +63,7 @@ def find_object(
         found = _front(prepared, category, np.array(closed), negatives.points, others, dark_in)
         if found is not None:
             return found
-    if category.kind == "appliance":
+    if category.kind == "appliance" and not category.no_front:
         appliance = _appliance(prepared, prompt, category, negatives.points, others)
         if appliance is not None:
             return appliance
@@ -94,11 +104,35 @@ def find_drawn(prepared: PreparedCapture, prompt: ObjectPrompt, drawn: DrawnFron
     return FoundDrawn(replace(front, sides=seen_sides(front, scene)), scene, category)
 
 
+def find_painted_object(
+    prepared: PreparedCapture, prompt: ObjectPrompt, positives: Points, clicked: Found | None, masks: Mapping[int, Mask]
+) -> Found | None:
+    """Object under masks that a person painted (by frame); `clicked`, the one under the clicks, where they agree with it.
+
+    A mask beside all clicks and one of a leaf that was filmed moving hold for their frames alone. None where neither shows any.
+    """
+    scene, category, least = prepared.scene, category_of(prompt.category), tuned(Params).as_painted
+    painted = {index: mask for index, mask in masks.items() if may_hold(mask, scene, scene.frame(index), positives)}
+    if clicked is not None:
+        seen = {index: clicked.see(scene.frame(index)).mask for index in painted}
+        if clicked.motions() or all(mask_iou(mask, seen[index]) >= least for index, mask in painted.items()):
+            return clicked
+    if isinstance(clicked, FoundFront | FoundAppliance):
+        for index, mask in painted.items():
+            drawn = painted_front(mask, clicked.front.run.grid, scene.frame(index), scene.capture.world_from_capture)
+            if drawn is not None:
+                return find_drawn(prepared, prompt, drawn, category)
+        if category.kind == "front":
+            return clicked
+    thing = find_painted(scene, painted, sized_as(category)) if painted else None
+    return FoundThing(thing, scene, round=category.round) if thing is not None else clicked
+
+
 def glimpse_object(
     prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, positives: Hits, negatives: Hits
 ) -> Found | None:
     """Preview, from depth alone, of slow objects: small ones and appliances. None for the rest, which are found at once."""
-    if category.kind == "appliance":
+    if category.kind == "appliance" and not category.no_front:
         return _appliance(prepared, prompt, category, negatives.points, glimpse=True)
     config = sized_as(category)
     if category.kind != "thing" or config.radius_m >= tuned(Params).small_m or not positives.clicks:
@@ -218,6 +252,9 @@ def _thing(
     scene: Scene, structure: tuple[PlaneRegion, ...], prompt: ObjectPrompt, config: ThingConfig, hits: Hits, negatives: Points
 ) -> FoundThing | FoundStanding | None:
     """Object under the clicks; `structure` are flat parts that it may touch but does not contain."""
+    if glass := level_holes(scene, hits.clicks):
+        hob = find_painted(scene, glass, config)
+        return FoundThing(hob, scene) if hob is not None else None
     positives = _on_thing(scene, hits, config)
     if config.on_floor:
         standing = find_standing(scene, positives, negatives, config, structure)
@@ -229,7 +266,7 @@ def _thing(
     if thing is not None:
         return thing
     cut_out = find_thing(scene, positives, negatives, config)
-    return FoundThing(cut_out, scene) if cut_out is not None else None
+    return FoundThing(with_clicked_parts(cut_out, scene, hits.clicks), scene) if cut_out is not None else None
 
 
 def _small_thing(

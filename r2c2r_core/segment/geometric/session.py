@@ -24,6 +24,7 @@ from r2c2r_core.model.track import FrontPanel, MaskTrack, ThingBox
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.appliances.find import appliance_margins
 from r2c2r_core.segment.appliances.found import FoundAppliance
+from r2c2r_core.segment.corrected import painted_masks
 from r2c2r_core.segment.cropped import cropped, world_crop
 from r2c2r_core.segment.elevations import elevations
 from r2c2r_core.segment.found import Found, View
@@ -31,7 +32,7 @@ from r2c2r_core.segment.fronts.clicked_dark import dark_place
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import holds
 from r2c2r_core.segment.geometric.cache import kept
-from r2c2r_core.segment.geometric.finders import find_drawn, find_object, glimpse_object
+from r2c2r_core.segment.geometric.finders import find_drawn, find_object, find_painted_object, glimpse_object
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
 from r2c2r_core.segment.prepared import Hits
@@ -166,8 +167,19 @@ class GeometricSession:
         hint, positives, negatives = self._clicked(prompt)
         if prompt.crop is not None:  # moving the crop box does not change the segmentation
             return self._within(self.find(replace(prompt, crop=None)), prompt)
+        if prompt.frames:
+            return self._as_painted(prompt, positives)
         others = np.array([point for click in prompt.others if (point := self._hit(click)) is not None]).reshape(-1, 3)
         return find_object(self, prompt, hint, positives, negatives, others)
+
+    def _as_painted(self, prompt: ObjectPrompt, positives: Hits) -> Found:
+        """Object under the clicks and the masks painted in single frames, which are evidence for the other frames."""
+        by_clicks, clicked = replace(prompt, frames=()), None
+        with contextlib.suppress(ObjectNotSeen):
+            clicked = self.find(by_clicks)
+        masks = painted_masks(prompt.frames, self.scene.capture)
+        found = find_painted_object(self, prompt, positives.points, clicked, masks)
+        return found if found is not None else self.find(by_clicks)
 
     def _within(self, found: Found, prompt: ObjectPrompt) -> Found:
         """Part of an object in the prompt's crop box; the whole object without one."""

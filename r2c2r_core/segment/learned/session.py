@@ -234,7 +234,7 @@ class LearnedSession:
 
     def _of(self, prompt: ObjectPrompt) -> "_Followed":
         """Tracking state of the object, reused from earlier requests."""
-        prompt = replace(prompt, crop=None)  # moving the crop box does not rerun the model
+        prompt = replace(prompt, crop=None, frames=())  # neither a crop box nor a frame's correction reruns the model
         if prompt not in self._followed:
             check_prompt(self.capture, prompt)
             while len(self._followed) >= _KEPT_OBJECTS:

@@ -1,5 +1,6 @@
 """Min-cut over surface voxels: the part of a surface that the clicks select, cut along creases and colour edges."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -10,6 +11,11 @@ from r2c2r_core.tuning import param, tuned
 
 _CAPACITY_SCALE = 1000.0
 _LARGE = 1e5
+_ASKED = 100  # places between two parts that are asked about
+_FILLED = 0.25  # share of them that must be solid: 0.4 to 1 within hoods, 0 between a hood and the cabinet beside
+
+Solid = Callable[[Points], np.ndarray]
+"""Mask of the places (n, 3) that may be solid: no frame sees through them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,13 +82,14 @@ def cut(
     background: np.ndarray,
     *,
     gap_m: float = 0.0,
+    solid: Solid | None = None,
     upright: bool = False,
 ) -> tuple[np.ndarray, float]:
     """Min-cut of the voxels joined to the positive ones, and its cost per square root of area (lower is a cleaner cut).
 
     `background` marks voxels of structure (floor, worktop, walls). The prior of a voxel falls with distance, on the scale of
     `radius_m`; for `upright` objects (chairs), which extend down to the floor, only plan distance counts. Parts up to `gap_m`
-    from each other count as joined: scans lose dark and thin pieces.
+    from each other count as joined: scans lose dark and thin pieces; with `solid`, those with solid between them.
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import breadth_first_order, maximum_flow
@@ -111,27 +118,49 @@ def cut(
     residual.eliminate_zeros()
     inside = np.zeros(count + 2, bool)
     inside[breadth_first_order(residual, count, return_predecessors=False)] = True
-    chosen = connected_to(graph, inside[:count], positive, gap_m)
+    chosen = connected_to(graph, inside[:count], positive, gap_m, solid)
     crossing = capacity[chosen[a] != chosen[b]].sum()
     return chosen, float(crossing / np.sqrt(max(graph.area_m2[chosen].sum() * 1e4, 1e-6)))
 
 
-def connected_to(graph: VoxelGraph, inside: np.ndarray, seeds: list[int], gap_m: float = 0.0) -> np.ndarray:
-    """Mask of the voxels of `inside` that are connected to a seed within it, across gaps of up to `gap_m`."""
+def connected_to(
+    graph: VoxelGraph, inside: np.ndarray, seeds: list[int], gap_m: float = 0.0, solid: Solid | None = None
+) -> np.ndarray:
+    """Mask of the voxels of `inside` that are connected to a seed within it, across gaps of up to `gap_m` (if solid)."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
+    def parts(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        both = inside[a] & inside[b]
+        links = coo_matrix((np.ones(int(both.sum())), (a[both], b[both])), shape=(len(inside), len(inside)))
+        return np.asarray(connected_components(links, directed=False)[1])
+
     a, b = graph.edges.T
     if gap_m > 0:
         members = np.flatnonzero(inside)
-        near = cKDTree(graph.positions[members]).query_pairs(gap_m, output_type="ndarray")
-        a, b = np.concatenate([a, members[near[:, 0]]]), np.concatenate([b, members[near[:, 1]]])
-    both = inside[a] & inside[b]
-    count = len(inside)
-    links = coo_matrix((np.ones(int(both.sum())), (a[both], b[both])), shape=(count, count))
-    _, labels = connected_components(links, directed=False)
+        near = members[cKDTree(graph.positions[members]).query_pairs(gap_m, output_type="ndarray")]
+        if solid is not None:
+            near = _across_solid(graph.positions, near, parts(a, b), solid)
+        a, b = np.concatenate([a, near[:, 0]]), np.concatenate([b, near[:, 1]])
+    labels = parts(a, b)
     return np.asarray(inside & np.isin(labels, labels[seeds]))
+
+
+def _across_solid(positions: Points, pairs: np.ndarray, part: np.ndarray, solid: Solid) -> np.ndarray:
+    """Pairs of voxels of different parts between which enough places are solid."""
+    ends = np.sort(part[pairs], axis=1)
+    pairs, ends = pairs[ends[:, 0] != ends[:, 1]], ends[ends[:, 0] != ends[:, 1]]
+    if not len(pairs):
+        return pairs
+    _, gap, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(gap.ravel(), kind="stable")
+    gap = gap.ravel()[order]
+    rank = np.arange(len(gap)) - (np.cumsum(count) - count)[gap]
+    some = rank % -(-count // _ASKED)[gap] == 0
+    pairs, gap = pairs[order][some], gap[some]
+    filled = np.bincount(gap, solid(positions[pairs].mean(axis=1))) / np.bincount(gap)
+    return np.asarray(pairs[filled[gap] > _FILLED])
 
 
 def _capacities(graph: VoxelGraph) -> np.ndarray:

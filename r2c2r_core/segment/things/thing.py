@@ -1,6 +1,7 @@
 """Free-standing objects: min-cut of the fused surface above its support at the clicks, and masks of the result."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from r2c2r_core.arrays import Colours, Faces, Mask, Points, Vector3
 from r2c2r_core.geometry.camera import project, ray_slopes
 from r2c2r_core.geometry.fusion import DepthView, fuse_depth
 from r2c2r_core.geometry.raster import rasterize
+from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import PromptPoint
@@ -37,6 +39,7 @@ class Params:
     furniture_gap_m: float = param(
         0.08, "m", "Maximum gap between parts of an object on the floor: scans lose parts of legs and seats"
     )
+    canopy_m: float = param(0.2, "m", "Maximum gap between parts of a hood, whose canopy's top is too high to be seen")
     level_cos: float = param(0.92, "cosine", "Minimum cosine between a face normal and up for a support")
     level_area_m2: float = param(0.0005, "m²", "Minimum level area in one direction for a support to continue there")
     support_m2: float = param(0.005, "m²", "Minimum level area at one height for a support")
@@ -80,7 +83,9 @@ class ThingConfig:
     handled: bool = False  # may have a handle
     on_floor: bool = False
     flat_top: bool = False
+    solid_gap_m: float = 0.0  # between parts that count as joined where nothing is seen between them
     tallest_m: float = 1.1
+    stands: bool = True  # on a support; else it hangs, or is built in
     support_z_m: float | None = None  # height of its support (world), where that is known
 
 
@@ -92,6 +97,8 @@ def sized_as(category: Category) -> ThingConfig:
         round=category.round,
         handled=category.open_vessel,
         on_floor=category.on_floor,
+        stands=category.stands,
+        solid_gap_m=tuned(Params).canopy_m if category.no_front else 0.0,
         flat_top=category.flat_top,
         tallest_m=category.height.high,
     )
@@ -123,7 +130,7 @@ def find_thing(
     """Min-cut of the surface at the clicks (world points); None when there is none within reach."""
     params = tuned(Params)
     reach = params.surface_reach * config.radius_m + params.surface_margin_m
-    vertices, faces, colours = _local_surface(scene, positives, reach, voxel_m)
+    vertices, faces, colours = local_surface(scene, positives, reach, voxel_m)
     if len(faces) < 20:
         return None
     support = support_height(scene, positives, config)
@@ -141,10 +148,12 @@ def find_thing(
         return None
     refused = [graph.nearest(point) for point in negatives]
     refused = [voxel for voxel in refused if voxel not in seeds]
-    gap_m = params.furniture_gap_m if config.on_floor else 0.0
-    structure = _structure(graph, seeds)
-    chosen, _ = cut(graph, seeds, refused, config.radius_m, structure, gap_m=gap_m, upright=config.on_floor)
-    return _extract(vertices, faces, chosen[graph.voxel_of_face], support)
+    gap_m = params.furniture_gap_m if config.on_floor else config.solid_gap_m
+    around_m = config.radius_m * (2 if config.solid_gap_m else 1)  # a part may be as far as the whole is long
+    solid = partial(_solid, scene) if config.solid_gap_m else None
+    structure = structure_of(graph, seeds)
+    chosen, _ = cut(graph, seeds, refused, around_m, structure, gap_m=gap_m, solid=solid, upright=config.on_floor)
+    return extract(vertices, faces, chosen[graph.voxel_of_face], support)
 
 
 def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True) -> tuple[Mask, float]:
@@ -199,6 +208,8 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
     params = tuned(Params)
     if config.support_z_m is not None:
         return config.support_z_m
+    if not config.stands:
+        return None
     if config.on_floor:
         return 0.0 if scene.capture.room.floor_found else None
     lowest = positives[np.argmin(positives[:, 2])]
@@ -227,6 +238,15 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
     return float(np.average(centres[chosen, 2], weights=areas[chosen]))
 
 
+def _solid(scene: Scene, points: Points) -> np.ndarray:
+    """Mask of the points that no frame sees through."""
+    empty = np.zeros(len(points), bool)
+    for frame in scene.frames:
+        z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
+        empty |= scene.noise.seen_through(seen, z, 0.03)
+    return ~empty
+
+
 def _level_faces(scene: Scene, point: Vector3, reach_m: float) -> tuple[Points, np.ndarray]:
     """Centres and areas of the surface's level faces around a point, in plan."""
     parts = scene.parts
@@ -242,7 +262,7 @@ def _over_bins(profile: np.ndarray) -> np.ndarray:
     return np.asarray(sum(padded[k : k + len(profile)] for k in range(5)))
 
 
-def _structure(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
+def structure_of(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
     """Mask of the voxels on large flat parts (walls, worktops, table tops) without a click."""
     params, background = tuned(Params), np.zeros(len(graph.positions), bool)
     for axis in ("level", "upright"):
@@ -266,7 +286,7 @@ def _structure(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
     return background
 
 
-def _local_surface(scene: Scene, positives: Points, reach_m: float, voxel_m: float | None) -> tuple[Points, Faces, Colours]:
+def local_surface(scene: Scene, positives: Points, reach_m: float, voxel_m: float | None) -> tuple[Points, Faces, Colours]:
     """Fused scan around the clicks; fused again with finer voxels on request."""
     centre = positives.mean(axis=0)
     reach = reach_m + float(np.linalg.norm(positives - centre, axis=1).max())
@@ -320,7 +340,7 @@ def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> 
     return views
 
 
-def _extract(vertices: Points, faces: Faces, chosen: np.ndarray, support: float | None) -> Thing | None:
+def extract(vertices: Points, faces: Faces, chosen: np.ndarray, support: float | None) -> Thing | None:
     kept = faces[chosen]
     if len(kept) < 8:
         return None

@@ -145,6 +145,26 @@ def dining() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
     return _filmed("dining", poses, [_packed(boxes, ["table", "carton", "chair"])] * len(poses), ())
 
 
+HOOD_CHIMNEY, HOOD_CANOPY = (0.0, -0.13, 1.85), (0.0, -0.24, 1.65)
+"""Points on the front of the chimney and of the canopy, which reaches 11 cm further into the room."""
+
+
+@cache
+def hood() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
+    """A chimney hood on a wall, seen from below, beside a wall cabinet of its colour, and its true masks."""
+    steel = (150, 154, 158)
+    boxes: list[Named] = [
+        ((-1.2, 0.0, 0.9), (1.2, 0.02, 2.4), (214, 208, 190), None),  # wall
+        ((-0.3, HOOD_CANOPY[1], 1.60), (0.3, 0.0, 1.70), steel, "hood"),
+        ((-0.12, HOOD_CHIMNEY[1], 1.70), (0.12, 0.0, 2.10), steel, "hood"),
+        ((-0.75, -0.35, 1.45), (-0.42, 0.0, 2.15), steel, "cabinet"),
+    ]
+    eyes = [np.array([x, -1.7, 1.45]) for x in np.linspace(-0.7, 0.8, 8)]
+    poses = [look_at(eye, np.array([-0.1, 0.0, 1.8])) for eye in eyes]
+    wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=2.0)
+    return _filmed("hood", poses, [_packed(boxes, ["hood", "cabinet"])] * len(poses), (wall,))
+
+
 BOTTLE = (0.10, -0.35)
 """Plan of the bottle's axis."""
 BOTTLE_PROFILE = ((0.04, 0.0), (0.04, 0.16), (0.014, 0.19), (0.014, 0.215))
