@@ -8,13 +8,14 @@ import pytest
 from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.geometry.visibility import DepthNoise
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things import visual_hull
 from r2c2r_core.segment.things.silhouettes import small_mask, usual_shift
 from r2c2r_core.segment.things.support import support_offset
-from r2c2r_core.segment.things.thing import Thing, ThingConfig, find_thing, support_height, thing_mask
+from r2c2r_core.segment.things.thing import Thing, ThingConfig, find_thing, sized_as, support_height, thing_mask
 from r2c2r_core.segment.things.visual_hull import find_small, glimpse_small
 from tests.core.segment.conftest import Truth
 
@@ -95,6 +96,11 @@ def test_a_thing_stands_on_the_level_surface_below_it_or_on_the_floor(scene: Sce
     assert support_height(scene, ON_IT, dataclasses.replace(CARTON, on_floor=True)) == 0.0
     below_the_floor = np.array([[1.06, -0.36, -0.5]])
     assert support_height(scene, below_the_floor, CARTON) is None
+
+
+def test_a_shelf_or_worktop_hangs_and_stands_on_nothing_below(scene: Scene) -> None:
+    for name in ("shelf", "worktop", "hood"):
+        assert support_height(scene, ON_IT, sized_as(category_of(name))) is None
 
 
 def test_the_surface_and_mask_found_are_those_of_the_carton(scene: Scene, boxes: Boxes) -> None:
