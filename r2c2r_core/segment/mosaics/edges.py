@@ -63,16 +63,6 @@ class Params:
     channel_m: float = param(
         0.02, "m", "Maximum height of the dark part of a channel above a front", source="worktops are 20-40 mm thick"
     )
-    open_gap_m: float = param(
-        0.004, "m", "Minimum width of a gap wide enough to see into", source="gaps between fronts are 2-4 mm"
-    )
-    open_dark: float = param(
-        0.5,
-        "share",
-        "Minimum fraction of light missing in such a gap",
-        gt=0,
-        source="development kitchens: 0.2 to 0.4 in shadows of worktops on equally white fronts",
-    )
     known: float = param(
         0.3, "share", "Minimum depth points per cell, relative to the panel's median, for a cell to count as observed"
     )
@@ -141,9 +131,7 @@ def panel_edges(cell: Cell, surface: Surface, cell_m: float) -> Cell:
     left, right = _ends(cell.left, cell.right, seen[:2], _profiles(surface, rows, axis=0), cell_m)
     across, lab = _profiles(surface, columns, axis=1), surface.lab[:, columns]
     lit, bottom = _ends(cell.top, cell.bottom, seen[2:], across, cell_m)
-    top = _below_upper_face(lit, bottom, across, lab, cell_m)
-    if top is None:
-        top = _above_shadow(lit, bottom, lab, cell_m) if _lip_over(lit, across, cell_m) else lit
+    top = _above_shadow(lit, bottom, lab, cell_m) if _lip_over(lit, across, cell_m) else lit
     return Cell(left, top, right, bottom)
 
 
@@ -326,7 +314,7 @@ def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> 
     start, reach = round(top), round(params.shadow_m / cell_m)
     below = slice(start + reach // 2, max(round((top + bottom) / 2), start + reach // 2 + 1))
     rows = np.median(middle[max(start - reach, 0) : start + reach // 2 + 1], axis=1)
-    shade, unevenness = shading(rows, np.median(middle[below].reshape(-1, 3), axis=0))
+    shade, unevenness = _shading(rows, np.median(middle[below].reshape(-1, 3), axis=0))
     even = unevenness < params.even_shade
     first = k = start - max(start - reach, 0)
     while k > 0 and even[k - 1] and params.darkest_shade < shade[k - 1] < shade[k] - 0.005:
@@ -356,7 +344,7 @@ def _half_way(shade: np.ndarray) -> float | None:
     return back - 1 + (half - lower) / (upper - lower)
 
 
-def shading(lab: np.ndarray, usual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _shading(lab: np.ndarray, usual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Light of colours (n, 3) relative to a reference colour (3,), and its unevenness over red, green and blue.
 
     A shadow darkens a surface by one factor in all channels: its unevenness is 0.
@@ -394,44 +382,6 @@ def _dark_width(light: np.ndarray, outer: int, inner: int, cell_m: float) -> flo
     low, high = max(outer - around, 0), inner + around + 1
     beside = min(float(np.nanmax(side, initial=1e-3)) for side in (light[low : outer + 1], light[inner:high]))
     return float(np.nansum(np.clip(1 - light[low:high] / beside, 0, None)))
-
-
-def _below_upper_face(top: float, bottom: float, profile: Profile, lab: np.ndarray, cell_m: float) -> float | None:
-    """Upper edge of a panel below an open gap to another panel of its colour; None where there is no such gap.
-
-    From above, a camera sees through such a gap (mostly a recessed channel) the upper face of the front, of the same colour in
-    different light; the front begins where that light changes. Under another colour the same may be a lip's shadow.
-    """
-    params, light, gradient = tuned(Params), profile.light, profile.gradient
-    start, reach = round(top), round(params.upper_face_m / cell_m)
-    low, panel = max(start - 2 * reach, 0), slice(start + reach, max(round((top + bottom) / 2), start + reach + 1))
-    darkness = np.nan_to_num(1 - light[low : start + reach] / _median_seen(light[panel])).clip(0)
-    half_dark = np.flatnonzero(darkness > darkness.max() / 2)
-    if (
-        darkness.max() < params.open_dark
-        or not params.open_gap_m < darkness[half_dark].sum() * cell_m
-        or len(half_dark) * cell_m > params.channel_m
-    ):
-        return None
-    middle = low + int(np.argmax(darkness))
-    over = max(middle - reach, 0) + int(np.argmax(gradient[max(middle - reach, 0) : middle + 1]))
-    if not _same_colour(lab[max(over - reach // 2, 0) : max(over - 1, 1)], lab[panel]):
-        return None
-    flank = middle + int(np.argmax(gradient[middle : middle + reach]))
-    least = max(params.clear * _own(top, bottom, profile), params.least_gradient)
-    window = gradient[flank : flank + reach + 2]
-    steps = [
-        i for i in range(1, len(window) - 1) if window[i] >= least and window[i] >= window[i - 1] and window[i] > window[i + 1]
-    ]
-    return flank + steps[-1] + 0.5 if steps else top
-
-
-def _same_colour(first: np.ndarray, second: np.ndarray) -> bool:
-    """Whether two patches of CIELAB colours may be of one material in nearly the same light."""
-    params = tuned(Params)
-    one, other = (np.median(patch.reshape(-1, 3), axis=0) for patch in (first, second))
-    (shade,), (unevenness,) = shading(one[None], other)
-    return bool(unevenness < params.even_shade and params.least_shade < shade < 1 / params.least_shade)
 
 
 def _luminance(lightness: np.ndarray) -> np.ndarray:

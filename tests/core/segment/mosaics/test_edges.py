@@ -114,13 +114,6 @@ def test_a_blurred_shadow_ends_at_half_the_brightness_of_the_worktop(stone: tupl
     assert edges(image, PANEL, PANEL)[1] == pytest.approx(60, abs=1.2)
 
 
-def test_the_top_face_of_a_panel_below_a_wide_gap_is_excluded() -> None:
-    upper, gap, face = Cell(60, 10, 260, 49), Cell(60, 49, 260, 54), Cell(60, 54, 260, 60)
-    image = mosaic((PANEL, BLUE), (upper, BLUE), (gap, in_shade(BLUE, 0.02)), (face, in_shade(BLUE, 0.75)))
-    for cut in (52, 54, 60):
-        assert edges(image, Cell(60, cut, 260, 300), PANEL)[1] == pytest.approx(60, abs=1.0)
-
-
 def test_a_shadow_under_a_white_worktop_is_not_taken_for_a_gap() -> None:
     """The shadow fades from 5 to 30 mm below the worktop, as under room light."""
     white, shade = (178, 178, 172), np.interp(np.arange(20), [2, 12], [0.66, 1.0])
