@@ -8,6 +8,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Mask
 from r2c2r_core.errors import ObjectNotSeen
+from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.masks import PackedMask, pack_mask, unpack_mask
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import FrameSaid
@@ -17,12 +18,7 @@ from r2c2r_core.segment.protocol import Glimpse
 
 def painted_masks(said: tuple[FrameSaid, ...], capture: Capture) -> dict[int, Mask]:
     """Masks that a person painted, at the size of their frames, by frame."""
-    cameras = {one.frame: capture.frame(one.frame).rgb_camera for one in said if one.mask is not None}
-    return {
-        one.frame: _resized(one.mask, cameras[one.frame].width, cameras[one.frame].height)
-        for one in said
-        if one.mask is not None
-    }
+    return {one.frame: _resized(one.mask, capture.frame(one.frame).rgb_camera) for one in said if one.mask is not None}
 
 
 def corrected_track(track: MaskTrack, said: tuple[FrameSaid, ...]) -> MaskTrack:
@@ -63,9 +59,9 @@ def _at_size(mask: PackedMask, size: PackedMask) -> PackedMask:
     """Mask resized to the frames' size."""
     if (mask.width, mask.height) == (size.width, size.height):
         return mask
-    return pack_mask(_resized(mask, size.width, size.height))
+    return pack_mask(_resized(mask, size))
 
 
-def _resized(mask: PackedMask, width: int, height: int) -> Mask:
+def _resized(mask: PackedMask, size: PackedMask | Intrinsics) -> Mask:
     pixels = unpack_mask(mask).astype(np.uint8)
-    return cv2.resize(pixels, (width, height), interpolation=cv2.INTER_NEAREST) > 0
+    return cv2.resize(pixels, (size.width, size.height), interpolation=cv2.INTER_NEAREST) > 0

@@ -42,11 +42,7 @@ class Params:
 
     small_m: float = param(0.25, "m", "Radius below which objects are carved by silhouettes")
     as_painted: float = param(
-        0.85,
-        "share",
-        "Minimum overlap of the clicked object's mask with a painted one that only corrects its frame",
-        ge=0,
-        le=1,
+        0.92, "share", "Minimum overlap with the clicked object of a painted mask that only corrects its frame", ge=0, le=1
     )
 
 
@@ -254,7 +250,8 @@ def _thing(
     """Object under the clicks; `structure` are flat parts that it may touch but does not contain."""
     if glass := level_holes(scene, hits.clicks):
         hob = find_painted(scene, glass, config)
-        return FoundThing(hob, scene) if hob is not None else None
+        if hob is not None:
+            return FoundThing(hob, scene)
     positives = _on_thing(scene, hits, config)
     if config.on_floor:
         standing = find_standing(scene, positives, negatives, config, structure)

@@ -16,7 +16,16 @@ from r2c2r_core.segment.scene import Params as SceneParams
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.min_cut import build_graph, cut
 from r2c2r_core.segment.things.thing import Params as ThingParams
-from r2c2r_core.segment.things.thing import Thing, ThingConfig, extract, local_surface, structure_of, support_height, thing_mask
+from r2c2r_core.segment.things.thing import (
+    Thing,
+    ThingConfig,
+    closed_below,
+    extract,
+    local_surface,
+    structure_of,
+    support_height,
+    thing_mask,
+)
 from r2c2r_core.tuning import param, tuned
 
 
@@ -48,7 +57,8 @@ def find_painted(scene: Scene, painted: Mapping[int, Mask], config: ThingConfig)
         chosen, _ = cut(graph, inside, outside, params.around_m, structure, gap_m=found.furniture_gap_m)
         parts.append((vertices, faces[chosen[graph.voxel_of_face]]))
     vertices, faces = _joined(parts)
-    return extract(vertices, faces, np.full(len(faces), fill_value=True), support_height(scene, own[0], config))
+    thing = extract(vertices, faces, np.full(len(faces), fill_value=True), support_height(scene, own[0], config))
+    return closed_below(thing, scene, config) if thing is not None and config.solid_gap_m else thing
 
 
 def may_hold(mask: Mask, scene: Scene, frame: Frame, points: Points) -> bool:
@@ -64,7 +74,8 @@ def level_holes(scene: Scene, clicks: Sequence[PromptPoint]) -> dict[int, Mask]:
     found = {}
     for click in clicks:
         hole = find_hole(scene.frame(click.frame), scene.depth(click.frame), click.x, click.y)
-        if hole is not None and scene.level_depth(click.frame, click.x, click.y) is not None:
+        from_above = scene.ray(click.frame, click.x, click.y)[1][2] < 0
+        if hole is not None and from_above and scene.level_depth(click.frame, click.x, click.y) is not None:
             found[click.frame] = hole
     return found
 

@@ -1,23 +1,28 @@
 """Free-standing objects: min-cut of the fused surface above its support at the clicks, and masks of the result."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 
 from r2c2r_core.arrays import Colours, Faces, Mask, Points, Vector3
 from r2c2r_core.geometry.camera import project, ray_slopes
 from r2c2r_core.geometry.fusion import DepthView, fuse_depth
-from r2c2r_core.geometry.raster import rasterize
+from r2c2r_core.geometry.raster import rasterize, subdivide_long_edges
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.kitchen.category import Category
+from r2c2r_core.kitchen.walls import distances_behind
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import PromptPoint
 from r2c2r_core.segment.occlusion import refine_border
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.boxes import box_of
 from r2c2r_core.segment.things.min_cut import VoxelGraph, build_graph, cut
 from r2c2r_core.segment.things.pixel_cut import ColourModel
 from r2c2r_core.tuning import param, tuned
+
+_UNDERSIDE_M = 0.05  # longest edge of the triangles of an underside that was not seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +158,22 @@ def find_thing(
     solid = partial(_solid, scene) if config.solid_gap_m else None
     structure = structure_of(graph, seeds)
     chosen, _ = cut(graph, seeds, refused, around_m, structure, gap_m=gap_m, solid=solid, upright=config.on_floor)
-    return extract(vertices, faces, chosen[graph.voxel_of_face], support)
+    thing = extract(vertices, faces, chosen[graph.voxel_of_face], support)
+    return closed_below(thing, scene, config) if thing is not None and config.solid_gap_m else thing
+
+
+def closed_below(thing: Thing, scene: Scene, config: ThingConfig) -> Thing:
+    """Hood with its underside, from its front to the wall behind: it is dark, and depth seldom shows it."""
+    room, cameras = scene.capture.room, [frame.world_from_camera.translation for frame in scene.frames]
+    box = box_of(thing.points, None, room.manhattan_yaw_rad, np.mean(cameras, axis=0))
+    (width, depth, height), place = box.dimensions_m, box.world_from_object
+    front = place.apply(np.array([[0.0, -depth / 2, 0.0]]))[0]
+    walls = [behind for behind in distances_behind(room.walls, front, -place.rotation[:, 1]) if 0 < behind < config.radius_m]
+    back = max([*walls[:1], depth]) - depth / 2
+    corners = np.array([[x, y, -height / 2] for x, y in product((-width / 2, width / 2), (-depth / 2, back))])
+    below, faces, _ = subdivide_long_edges(place.apply(corners), np.array([[0, 1, 2], [1, 3, 2]]), corners, _UNDERSIDE_M)
+    vertices = np.concatenate([thing.vertices, below])
+    return replace(thing, vertices=vertices, faces=np.concatenate([thing.faces, faces + len(thing.vertices)]))
 
 
 def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True) -> tuple[Mask, float]:
