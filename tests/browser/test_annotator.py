@@ -38,6 +38,10 @@ def test_an_annotator_sees_disabled_review_buttons_and_can_comment(new_context: 
             expect(part).to_be_hidden()  # one view, and no heap of parts
     picture(page, "review-loading")
     page.unroute("**/candidates")
+    page.route("**/api/projects", lambda route: held.append(route))
+    page.goto(project.split("/p/")[0])
+    expect(page.get_by_text("Loading the projects…")).to_be_visible()
+    page.unroute("**/api/projects")
     page.goto(f"{project}/review")
     expect(page.get_by_text("A reviewer accepts, rejects and corrects; you can comment.")).to_be_visible()
     for name in ("Accept", "Reject", "More candidates", "Upload a mesh…"):

@@ -13,7 +13,7 @@ import {
   restoreProject,
   setChecklist,
 } from "../api.js";
-import { detailOf, h, icon, LiveElement, renew } from "../dom.js";
+import { detailOf, h, icon, LiveElement, renew, spinner } from "../dom.js";
 import { matches } from "../lib/filter.js";
 import { FolderDialog } from "../elements/folder-dialog.js";
 import { askForText } from "../elements/ask-dialog.js";
@@ -105,6 +105,7 @@ export class ProjectsPage extends LiveElement {
       this.#picker,
       this.#folders,
     );
+    this.#cards.replaceChildren(h("li", { class: "none" }, spinner("Loading the projects…")));
     const { signal } = this;
     this.#picker.addEventListener("change", () => this.#send(this.#picker.files?.[0]), { signal });
     this.#folders.addEventListener("imported", (event) => this.#made(detailOf(event)), { signal });
