@@ -112,8 +112,7 @@ def _part_at(thing: Thing, scene: Scene, frame: Frame, click: PromptPoint) -> Ma
 
 def _on_depth(mask: Mask, frame: Frame) -> Mask:
     """Mask of a frame, at any size, at its depth image's pixels."""
-    camera = frame.rgb_camera.resized(mask.shape[1], mask.shape[0])
-    values, inside = sample_through(mask, camera, frame.depth_camera)
+    values, inside = sample_through(mask, frame.rgb_camera.resized(*mask.shape[::-1]), frame.depth_camera)
     return values & inside
 
 

@@ -44,6 +44,7 @@ class Params:
     furniture_gap_m: float = param(
         0.08, "m", "Maximum gap between parts of an object on the floor: scans lose parts of legs and seats"
     )
+    solid_m: float = param(0.03, "m", "Minimum distance of measured depth behind a place that is empty, beyond the noise", gt=0)
     canopy_m: float = param(0.2, "m", "Maximum gap between parts of a hood, whose canopy's top is too high to be seen")
     level_cos: float = param(0.92, "cosine", "Minimum cosine between a face normal and up for a support")
     level_area_m2: float = param(0.0005, "m²", "Minimum level area in one direction for a support to continue there")
@@ -263,7 +264,7 @@ def _solid(scene: Scene, points: Points) -> np.ndarray:
     empty = np.zeros(len(points), bool)
     for frame in scene.frames:
         z, seen, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
-        empty |= scene.noise.seen_through(seen, z, 0.03)
+        empty |= scene.noise.seen_through(seen, z, tuned(Params).solid_m)
     return ~empty
 
 
@@ -361,6 +362,7 @@ def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> 
 
 
 def extract(vertices: Points, faces: Faces, chosen: np.ndarray, support: float | None) -> Thing | None:
+    """Object of the chosen faces, with its support's height; None for fewer than 8."""
     kept = faces[chosen]
     if len(kept) < 8:
         return None

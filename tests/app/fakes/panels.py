@@ -24,7 +24,7 @@ CAMERA = Intrinsics(fx=100.0, fy=100.0, cx=80.0, cy=60.0, width=160, height=120)
 CAPTURE: Any = SimpleNamespace(
     frames=tuple(SimpleNamespace(index=index, rgb_camera=CAMERA) for index in (0, 3, 7)),
     world_from_capture=Rigid3(),
-    room=SimpleNamespace(walls=()),
+    room=SimpleNamespace(walls=(), floor_found=False),
 )
 
 
