@@ -95,7 +95,7 @@ def test_a_click_in_the_scene_selects_an_object_and_keeps_the_scene(new_context:
     scene = page.get_by_role("button", name="Scene", exact=True)
     for name in ("cabinet_1", "double_1", "counter_1"):
         chosen = page.locator(".review nav button[aria-pressed=true]")
-        expect(clicked(page, name)).to_have_text(name)
+        expect(clicked(page, name)).to_contain_text(name)
         expect(chosen).to_have_count(1)
         expect(scene).to_have_attribute("aria-pressed", "true")
     page.keyboard.press("0")

@@ -8,7 +8,7 @@
 import { h, icon, LiveElement, renew, reveal } from "../dom.js";
 import { usedFirst } from "../lib/categories.js";
 import { inkOn } from "../lib/colour.js";
-import { counted, usableName, withArticle } from "../lib/format.js";
+import { counted, usableName } from "../lib/format.js";
 import { isComing, listed, OF_PEOPLE, ORDERS, span, STATES } from "../lib/listing.js";
 import { SelectionBar } from "./selection-bar.js";
 
@@ -381,3 +381,6 @@ function state({ object, current, sure }) {
   const of = object.certainty === null ? "masks" : "edges";
   return line(`${clicks} · ${frames} · ${of} `, `${share} %`, " ", current ? drawn : null);
 }
+
+/** @param {string} noun */
+const withArticle = (noun) => `${/^[aeiou]/.test(noun) ? "an" : "a"} ${noun}`;

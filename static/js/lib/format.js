@@ -39,9 +39,6 @@ export function counted(count, noun) {
   return `${count} ${noun}${count === 1 ? "" : "s"}`;
 }
 
-/** @param {string} noun */
-export const withArticle = (noun) => `${/^[aeiou]/.test(noun) ? "an" : "a"} ${noun}`;
-
 /** Side lengths of a box as text. @param {number[]} lengths */
 export function sides(lengths) {
   return lengths.map((length) => String(Number(length.toPrecision(3)))).join(" × ");
