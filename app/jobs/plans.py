@@ -164,8 +164,9 @@ def _import(job: Job, project: Project, files: ProjectFiles, commands: Commands)
 
 def _sample(job: Job, project: Project, files: ProjectFiles, commands: Commands) -> list[Step]:
     wish = job.payload
+    name = Path(project.source_path or "").stem
     options = ("--seed", str(wish["seed"]), "--frames", str(wish["frames"]), "--size", f"{wish['width']}x{wish['height']}")
-    command = (*commands.sample, str(files.source), *options, "--picture", str(files.arriving))
+    command = (*commands.sample, str(files.source), "--name", name, *options, "--picture", str(files.arriving))
     return [Step("sample", command, 60.0), _ingest(job, files, commands)]
 
 

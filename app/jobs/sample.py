@@ -1,4 +1,4 @@
-"""A synthetic kitchen as a job: `python -m app.jobs.sample FOLDER --seed 0 --frames 90 --size 960x720 --picture FILE`."""
+"""A synthetic kitchen as a job: `python -m app.jobs.sample FOLDER --name NAME --frames 90 --size 960x720 --picture FILE`."""
 
 import argparse
 import sys
@@ -20,6 +20,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Write the recording unless it exists."""
     parser = argparse.ArgumentParser(prog="app.jobs.sample", description=__doc__)
     parser.add_argument("folder", type=Path)
+    parser.add_argument("--name", required=True, help="the recording's, and so its bundles' title")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--frames", type=int, default=90)
     parser.add_argument("--size", default="960x720")
@@ -38,6 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
                 seed=options.seed,
                 frames=options.frames,
                 size=(width, height),
+                name=options.name,
                 progress=progress,
                 show=partial(write_picture, options.picture),
             )

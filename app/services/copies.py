@@ -9,7 +9,9 @@ import secrets
 import shutil
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from sqlmodel import Session, col, select
 
@@ -22,7 +24,8 @@ from app.errors import Conflict
 from app.files import ProjectFiles, delete_folder, project_files, require_free
 from app.services import adopting, crossing, imports, projects, quotas
 from app.services.context import Context
-from r2c2r_core.workspace import write_atomically
+from r2c2r_core.codec import decode_noun, encode_noun
+from r2c2r_core.workspace import noun_path, write_atomically
 
 _NEVER_WRITTEN = (
     "source",
@@ -40,11 +43,13 @@ def duplicate(
     *,
     recording_only: bool = False,
     name: str | None = None,
+    file_name: str | None = None,
     mark: Callable[[Session, Project], None] = lambda session, made: None,
 ) -> schemas.Project:
     """Duplicate a project, or its recording, as a draft; raises Conflict while a job writes its files.
 
-    `mark` sets further fields of the copy in the same transaction, so that a repeated request gets the same answer.
+    `file_name` renames the recording. `mark` sets further fields of the copy in the same transaction, so that a repeated
+    request gets the same answer.
     """
     with reading(context.engine) as session:
         row = queries.project_row(session, project_id)
@@ -65,6 +70,8 @@ def duplicate(
     description.project |= {"name": name or f"{description.project['name']} (copy)", "created": time.time(), "work_path": None}
     try:
         _copy_files(files, copy, recording_only)
+        if file_name is not None:
+            _rename_recording(copy, description.project, file_name)
         context.store.keep(description.id)
         bundles = adopting.bundles_in(copy, description)
         with writing(context.engine) as session:
@@ -103,6 +110,20 @@ def _copy_files(files: ProjectFiles, copy: ProjectFiles, recording_only: bool) -
         source = Path(facts["source"] or "")
         if source.is_relative_to(files.root):
             facts["source"] = str(copy.root / source.relative_to(files.root))
+            write_atomically(copy.facts, json.dumps(facts).encode())
+
+
+def _rename_recording(copy: ProjectFiles, project: dict[str, Any], name: str) -> None:
+    """Rename the copied recording, also in the nouns read from it, from which bundles take their title."""
+    for path in (noun_path(copy.work, "ingest", noun) for noun in ("recording", "scene")):
+        if path.is_file():
+            noun, header = decode_noun(path.read_bytes())
+            write_atomically(path, encode_noun(replace(noun, name=Path(name).stem), header))
+    recording = copy.root / (project["source_path"] or "")
+    if recording.parent == copy.source and recording.exists():
+        project["source_path"] = recording.rename(copy.source / name).relative_to(copy.root).as_posix()
+        if copy.facts.is_file():
+            facts = json.loads(copy.facts.read_text()) | {"source": str(copy.source / name)}
             write_atomically(copy.facts, json.dumps(facts).encode())
 
 

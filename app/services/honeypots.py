@@ -23,7 +23,7 @@ from r2c2r_core.geometry.masks import pack_mask
 MOST_FRAMES = 30  # each has a mask image per object
 FOUND_IOU = 0.5
 TRUTH, MASKS = "truth.json", "truth_masks"
-SOURCE_NAME = "scan.r3d"  # displayed name, like an uploaded recording
+SOURCE_NAME = "scan.r3d"  # like an uploaded recording
 
 
 def listed(context: Context) -> list[schemas.Honeypot]:
@@ -48,7 +48,7 @@ def slip(context: Context, project_id: str, body: schemas.HoneypotIn) -> schemas
         session.add(row)
         audit.note(session, "honeypot", account=person.name, who=context.who, detail=body.name)
 
-    made = copies.duplicate(context, project_id, recording_only=True, name=body.name, mark=mark)
+    made = copies.duplicate(context, project_id, recording_only=True, name=body.name, file_name=SOURCE_NAME, mark=mark)
     with reading(context.engine) as session:
         return _shape(session, queries.project_row(session, made.id))
 

@@ -17,6 +17,7 @@ from app.services.context import Context
 from app.services.system import allowed_path
 from r2c2r_core.errors import CaptureError, InputError
 
+_SAMPLE = "Sample kitchen"  # name of the project and of the recording, from which the bundle takes its title
 _SAYS_NOTHING = {"capture", "data", "frames", "recording", "scan"}  # names of recordings, lower case
 _LONGEST = 100  # characters of a name before its number
 
@@ -101,9 +102,9 @@ def from_sample(context: Context, body: schemas.SampleRequest) -> schemas.Projec
     with writing(context.engine) as session:
         quotas.check_project(context, session, sample=True)
         project = projects.new_project(
-            session, body.name or "Sample kitchen", quotas.SAMPLE, None, owner_id=account_of(context, session)
+            session, body.name or _SAMPLE, quotas.SAMPLE, None, owner_id=account_of(context, session)
         )
-        scan = project_files(context.settings.data_dir, project.id).source / "scan.r3d"
+        scan = project_files(context.settings.data_dir, project.id).source / f"{_SAMPLE}.r3d"
         project.source_path = str(scan)
         session.add(project)
         job = queue_job(context, session, project, "sample", body.model_dump(exclude={"name"}))

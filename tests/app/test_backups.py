@@ -27,7 +27,6 @@ def kept(start: Start, tmp_path: Path) -> tuple[Path, str]:
         project = web.sample()
         web.job(web.post(f"/api/projects/{project}/run", {}, 202)["id"], "done")
     data = tmp_path / "data"
-    (data / "projects" / project / "source" / "scan.r3d").touch()  # the stand-in for the sample's job writes no recording
     for path in (data, *data.glob("r2c2r.db*")):
         path.chmod(0o700 if path.is_dir() else 0o600)
     return data, project
@@ -107,7 +106,7 @@ def test_check_data_reports_missing_unknown_damaged_and_exposed_files(
     shutil.copy(folder / "bundles" / "v1.zip", folder / "bundles" / "v7.zip")
     (folder / "bundles" / "v1.zip").write_bytes(b"other")
     (folder / "frames.json").unlink()
-    (folder / "source" / "scan.r3d").unlink()
+    (folder / "source" / "Sample kitchen.r3d").unlink()
     (data / "projects" / "0123456789ab").mkdir()
     (data / "unknown").mkdir()
     for path in (data / "uploads" / "stray.part", data / "unknown" / "x"):
@@ -123,7 +122,7 @@ def test_check_data_reports_missing_unknown_damaged_and_exposed_files(
         ("unknown", "v7.zip"),
         ("damaged", "v1.zip"),
         ("missing", "frames.json"),
-        ("missing", "scan.r3d"),
+        ("missing", "Sample kitchen.r3d"),
         ("unknown", "0123456789ab"),
         ("unknown", "stray.part"),
         ("unknown", "x"),

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,11 @@ import numpy as np
 import pytest
 from sqlalchemy import event
 
+from app.db.engine import reading
+from app.db.tables import Project
 from app.store.protocol import Folder
+from r2c2r_core.workspace import Workspace
+from tests.app.nouns import capture
 from tests.app.test_opinions import click
 from tests.app.test_project_members import Kept, kept
 
@@ -53,6 +58,22 @@ def test_a_honeypot_looks_like_any_assigned_project(kept: Kept, slipped: str) ->
     (row,) = kept.of["root"].get("/api/honeypots").json()
     assert (row["project"], row["person"], row["review_state"]) == (slipped, "alice", "draft")
     assert kept.of["root"].get("/api/audit").json()["entries"][0]["action"] == "honeypot"
+
+
+def test_the_recording_of_a_honeypot_and_so_its_bundle_are_not_named_after_the_sample(kept: Kept) -> None:
+    projects = kept.web.settings.data_dir / "projects"
+    write_truth(projects / kept.project / "source")
+    work = Workspace(projects / kept.project / "work")
+    work.save("ingest", "scene", replace(capture(), name="Sample kitchen"), {"key": "k", "seconds": 1.0})
+    body = {"person": "alice", "name": "Flat 7"}
+    made = kept.of["root"].post(f"/api/projects/{kept.project}/honeypot", json=body).json()["project"]
+    assert [path.name for path in (projects / made / "source").glob("*.r3d")] == ["scan.r3d"]
+    with reading(kept.web.context.engine) as session:
+        assert session.get_one(Project, made).source_path == str(projects / made / "source" / "scan.r3d")
+    titles = {one: Workspace(projects / one / "work").load_bare("ingest", "scene").name for one in (made, kept.project)}
+    assert titles == {made: "scan", kept.project: "Sample kitchen"}
+    told = [path.read_text().lower() for path in (projects / made).glob("*.json")]
+    assert not any("sample kitchen" in text for text in told)
 
 
 def test_only_admins_create_and_see_honeypots(kept: Kept, slipped: str) -> None:

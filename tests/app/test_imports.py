@@ -41,6 +41,12 @@ def test_an_upload_becomes_a_ready_project_with_its_frames(web: Running) -> None
     assert [f["index"] for f in web.get(f"/api/projects/{project['id']}/frames")] == [0, 3, 7]
 
 
+def test_the_recording_of_a_sample_has_the_name_of_its_project_as_bundles_are_titled_by_it(web: Running) -> None:
+    project = web.sample()
+    (recording,) = (web.settings.data_dir / "projects" / project / "source").glob("*.r3d")
+    assert (recording.stem, web.get(f"/api/projects/{project}")["name"]) == ("Sample kitchen", "Sample kitchen")
+
+
 def test_capture_facts_of_an_older_version_do_not_hide_a_project(web: Running) -> None:
     project = upload(web, R3D, "My kitchen.r3d")["id"]
     web.until(lambda: web.get(f"/api/projects/{project}")["status"] == "ready")

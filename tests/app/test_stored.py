@@ -47,7 +47,7 @@ def test_results_of_one_server_are_shown_and_downloaded_at_another(two: tuple[Ru
     assert sent.status_code == 200
     assert sent.content == (first.settings.data_dir / f"projects/{project}/bundles/v1.zip").read_bytes()
     assert second.client.get(f"/api/jobs/{job['id']}/log").status_code == 200
-    assert not (second.settings.data_dir / f"projects/{project}/source/scan.r3d").exists()  # no page needs it
+    assert not (second.settings.data_dir / f"projects/{project}/source/Sample kitchen.r3d").exists()  # no page needs it
 
 
 def test_results_of_a_run_are_in_the_store_before_the_row_is_committed(

@@ -275,7 +275,7 @@ def test_changes_are_written_to_the_description_and_read_back_unchanged(web: Run
         row = session.get(Project, project)
         assert row is not None
         assert describe(session, row, files) == read_description(files.description)
-    assert json.loads(files.description.read_text())["project"]["source_path"] == "source/scan.r3d"
+    assert json.loads(files.description.read_text())["project"]["source_path"] == "source/Sample kitchen.r3d"
 
 
 def test_descriptions_without_true_lengths_are_rewritten_at_start(start: Start) -> None:

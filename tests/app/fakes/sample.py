@@ -1,4 +1,4 @@
-"""Stand-in for the sample's job, which writes only a prompts file: `sample.py FOLDER --seed …`."""
+"""Stand-in for the sample's job, which writes only a prompts file: `sample.py FOLDER --name NAME --seed …`."""
 
 import json
 import sys
@@ -12,6 +12,6 @@ objects = [
     {"name": "mug_1", "category": "mug", "points": [other]},
 ]
 (folder / "prompts.json").write_text(json.dumps({"version": 1, "objects": objects}))
-(folder / "scan.r3d").write_bytes(b"PK")
+(folder / f"{sys.argv[3]}.r3d").write_bytes(b"PK")
 sys.stdout.write(json.dumps({"stage": "sample", "fraction": 0.5, "text": "rendering"}) + "\n")
 sys.stdout.write(json.dumps({"done": "sample"}) + "\n")
