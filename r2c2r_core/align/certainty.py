@@ -124,7 +124,7 @@ def loose_ends(spread: Spread, front: FrontPanel | None) -> tuple[str, ...]:
     limits = np.array([params.loose_deg, params.loose_m, params.loose_scale])
     figures = np.array([spread.turn_deg, spread.shift_m, spread.scale])
     texts = (
-        (_turn_in_words(spread.turn_axis_world), f"{params.sigmas * spread.turn_deg:.1f} degrees"),
+        (_turn_in_words(spread.turn_axis_world), f"{params.sigmas * spread.turn_deg:.1f}°"),
         (_shift_in_words(spread.shift_axis_world, front), f"{1000 * params.sigmas * spread.shift_m:.0f} mm"),
         ("its size", f"{100 * params.sigmas * spread.scale:.0f} %"),
     )

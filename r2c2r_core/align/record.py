@@ -81,7 +81,7 @@ def _doubts(best: Trial, rival: Trial | None, other_size: Trial | None, spread: 
     lines = []
     if rival is not None and ties(best.judgement, rival.judgement):
         turn = angle_deg(best.pose, rival.pose)
-        lines.append(f"another orientation ({turn:.0f} degrees) fits about as well: check which side is the front")
+        lines.append(f"another orientation ({turn:.0f}°) fits about as well: check which side is the front")
     if other_size is not None and ties(best.judgement, other_size.judgement):
         share = other_size.pose.scale / best.pose.scale - 1.0
         lines.append(f"{abs(share):.0%} {'larger' if share > 0 else 'smaller'} it fits about as well: check its size")
@@ -106,5 +106,5 @@ def _warnings(pose: Similarity3, rms_m: float, condition: float, case: Case) -> 
         lines.append("only 2 frames show the object")
     lean = lean_deg(pose, case)
     if lean > 0:
-        lines.append(f"it is tilted by {lean:.0f} degrees from every stable pose")
+        lines.append(f"it is tilted by {lean:.0f}° from every stable pose")
     return tuple(lines)

@@ -126,7 +126,7 @@ def _from_file(planes: Sequence[Plane], file_up: Vector3, params: Params) -> Up:
     believed = off_deg <= params.few_planes_deg and level_m2 >= params.level_m2
     if off_deg <= params.least_correction_deg or not (believed or _many(planes, found[0], params)):
         return Up(file_up, "file", file_off_deg=off_deg)
-    notice = f"the recording's gravity was corrected by {off_deg:.1f} deg to fit its level and upright planes"
+    notice = f"the recording's gravity was corrected by {off_deg:.1f}° to fit its level and upright planes"
     source: Literal["file", "floor"] = "file" if off_deg <= params.few_planes_deg else "floor"
     return Up(found[0], source, (notice,), off_deg, corrected=True)
 

@@ -28,7 +28,7 @@ def upright(recording: Recording) -> Recording:
     turns = needed_turns(recording.frames, recording.up_capture)
     if turns == 0 or any(needed_turns(recording.frames, up) != turns for up in recording.other_ups):
         return recording  # upright, or it is not known yet which of its readings the scan supports
-    told = f"images were turned by {(90, 180, -90)[turns - 1]} deg counter-clockwise to stand upright"
+    told = f"images were turned by {(90, 180, -90)[turns - 1]}° counter-clockwise to stand upright"
     original = {frame.index: frame for frame in recording.frames}
 
     def colour_of(frame: RawFrame) -> Colour:

@@ -214,4 +214,4 @@ def _corners(boxes: Boxes) -> np.ndarray:
 
 
 def _amount(joint: Joint, position: float) -> str:
-    return f"{np.rad2deg(position):.0f} deg" if joint.type == "revolute" else f"{position:.2f} m"
+    return f"{np.rad2deg(position):.0f}°" if joint.type == "revolute" else f"{position:.2f} m"

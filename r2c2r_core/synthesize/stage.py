@@ -382,5 +382,5 @@ def _open_ended(joint: Joint) -> str | None:
     if joint.motion is None or joint.sources["limits"] != "at_least":
         return None
     seen = joint.motion.largest
-    amount = f"{seen:.2f} m" if joint.type == "prismatic" else f"{np.degrees(seen):.0f} deg"
+    amount = f"{seen:.2f} m" if joint.type == "prismatic" else f"{np.degrees(seen):.0f}°"
     return f"{joint.name} was seen open to {amount}, but may open further"

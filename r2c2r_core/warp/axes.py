@@ -50,10 +50,10 @@ def face_outwards(
     correction = -((yaw + np.pi / 4) % (np.pi / 2) - np.pi / 4)
     warnings: list[str] = []
     if abs(correction) > params.believable_rad:
-        warnings.append(f"the mesh stands {np.rad2deg(abs(correction)):.0f} deg off its object: its yaw was not changed")
+        warnings.append(f"the mesh stands {np.rad2deg(abs(correction)):.0f}° off its object: its yaw was not changed")
         correction = 0.0
     if has_handle and _handle_is_behind(points @ rotation_about_z(correction).T, normals @ rotation_about_z(correction).T):
-        warnings.append("the mesh's handle was on the far side: the mesh was turned by 180 degrees")
+        warnings.append("the mesh's handle was on the far side: the mesh was turned by 180°")
         correction += np.pi
     return CanonicalMesh(vertices=vertices @ rotation_about_z(correction).T, warnings=tuple(warnings))
 

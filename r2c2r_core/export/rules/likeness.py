@@ -60,7 +60,7 @@ def _unsure_place(item: dict[str, Any]) -> Iterator[Finding]:
     placement = item.get("placement")
     if placement is not None and placement["unsure"]:
         turn = placement.get("runner_up_turn_deg")
-        turned = f" turned by {turn:.0f} degrees" if turn else ""
+        turned = f" turned by {turn:.0f}°" if turn else ""
         yield finding(
             "place-unsure", item["name"], f"another place{turned} fits about as well; click it in more frames, or move it"
         )

@@ -158,7 +158,7 @@ def _conventions(shifted: Sequence[tuple[int, Poses]]) -> list[_Change]:
         changes.append(_Change("camera_axes", _FLIPPED, _turned(axes)))
     changes += [_Change("poses_mirrored", _MIRRORED, _mirrored(np.diag(1.0 - 2.0 * axis))) for axis in np.eye(3)]
     for quarters in (1, 2, 3):
-        text = f"the images are rotated by {90 * quarters} deg relative to their poses"
+        text = f"the images are rotated by {90 * quarters}° relative to their poses"
         changes.append(_Change("image_rotated", text, _turned(rotation_about_z(quarters * np.pi / 2))))
     for places, poses in shifted:
         text = f"the images belong to the poses of the frames {abs(places)} {'later' if places > 0 else 'earlier'}"

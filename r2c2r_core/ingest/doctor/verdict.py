@@ -164,10 +164,10 @@ def _gravity(figures: CaptureFigures) -> list[Remark]:
     if off is None or off <= tuned(Params).gravity_deg:
         return []
     if figures.up_corrected:
-        text = f"the recording's gravity is {off:.1f} deg off its level and upright planes; the planes are used"
+        text = f"the recording's gravity is {off:.1f}° off its level and upright planes; the planes are used"
         verdict: Verdict = "good" if off <= tuned(Params).tilt_deg else "usable with care"
         return [_remark(verdict, "gravity_off", text, "no action is needed if the scan is upright; else set up by hand")]
-    text = f"the recording's gravity is {off:.1f} deg off its level and upright planes, which are too few to rely on"
+    text = f"the recording's gravity is {off:.1f}° off its level and upright planes, which are too few to rely on"
     return [_remark("usable with care", "gravity_off", text, "film more of the floor and the walls, or set up by hand")]
 
 

@@ -52,7 +52,7 @@ def open_arti4d(files: Files) -> Recording:
     )
     rgb_camera = _camera(files, "rgb/camera_info.txt", first_size(files, found.colour.values()))
     depth_camera = _camera(files, "depth/camera_info.txt", depth_size(files, found.depth.values()))
-    turned = ("the poses show the camera upside down: its images are assumed to be turned back by 180 deg",) if hangs else ()
+    turned = ("the poses show the camera upside down: its images are assumed to be turned back by 180°",) if hangs else ()
     return joined_recording(
         files,
         found,

@@ -97,8 +97,8 @@ def test_the_yaw_of_a_bottle_is_excluded_from_its_uncertainty(bench: Any) -> Non
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"turn_deg": 1.0}, "its yaw is poorly constrained by the scan: it may be off by 2.0 degrees"),
-        ({"turn_deg": 1.0, "turn_axis_world": np.array([1.0, 0.0, 0.0])}, "its tilt is .* 2.0 degrees"),
+        ({"turn_deg": 1.0}, "its yaw is poorly constrained by the scan: it may be off by 2.0°"),
+        ({"turn_deg": 1.0, "turn_axis_world": np.array([1.0, 0.0, 0.0])}, "its tilt is .* 2.0°"),
         ({"shift_m": 0.02, "shift_axis_world": np.array([0.0, 0.0, 1.0])}, "its height above the floor is .* 40 mm"),
         ({"scale": 0.03}, "its size is .* 6 %"),
     ],

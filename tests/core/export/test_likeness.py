@@ -71,7 +71,7 @@ def test_an_ambiguous_placement_is_reported_with_the_alternative_angle(good_fold
     placement |= {"unsure": True, "runner_up_turn_deg": 90.0}
     (found,) = findings(good_folder, said)
     assert found.rule == "place-unsure"
-    assert "90 degrees" in found.message
+    assert "90°" in found.message
 
 
 def test_likeness_ignores_other_rules_and_lists_each_object_once() -> None:

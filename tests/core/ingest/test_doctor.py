@@ -253,7 +253,7 @@ def test_a_gravity_error_is_reported_with_its_angle_behind_worse_faults(off, cor
     few = examine(replace(capture, room=room, frames=capture.frames[:4]))
     assert (few.verdict, few.remarks[0].cause) == ("unusable", "few_frames")
     gravity = next(r for r in few.remarks if r.cause == "gravity_off")
-    assert gravity.text.startswith(f"the recording's gravity is {off:.1f} deg off its level and upright planes")
+    assert gravity.text.startswith(f"the recording's gravity is {off:.1f}° off its level and upright planes")
     assert gravity.verdict == verdict
     alike = [r.cause for r in few.remarks if r.verdict == verdict]
     assert alike[0] == "gravity_off"  # before the floor, which follows from it

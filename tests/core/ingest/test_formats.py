@@ -36,7 +36,7 @@ def test_arkitscenes_images_without_a_pose_are_skipped(tmp_path):
     recording = open_recording(write_arkitscenes(tmp_path / "a", ROOM))
     assert [f.index for f in recording.frames] == list(range(0, 24, 2))
     assert told(recording, "12 a pose missing")
-    assert told(recording, "turned by 90 deg")
+    assert told(recording, "turned by 90°")
 
 
 # Arti4D

@@ -113,7 +113,7 @@ def test_a_flap_is_limited_by_the_floor_unless_it_is_on_a_plinth() -> None:
 
     rng = np.random.default_rng(0)
     grounded = oven(0.002)
-    assert grounded.warnings == ("a_door_joint opens to 86 deg of 90 deg: the floor blocks it",)
+    assert grounded.warnings == ("a_door_joint opens to 86° of 90°: the floor blocks it",)
     joint = grounded.joints[0]
     flap = next(link for link in grounded.links if link.name == joint.child)
     touching = motion_at(grounded, joint, joint.upper + SPARE_RAD) @ grounded.world_from_object @ flap.object_from_link

@@ -167,7 +167,7 @@ def test_a_mesh_with_its_handle_at_the_back_is_rotated_by_180_degrees() -> None:
     moved = centre @ turn @ centre.inverse
     turned = replace(placement, world_from_mesh=Similarity3(1.0, moved.rotation, moved.translation) @ placement.world_from_mesh)
     item = fit_meshes(scene, [track], [turned], [asset], WarpConfig()).objects[0]
-    assert any("turned by 180 degrees" in w for w in item.warnings)
+    assert any("turned by 180°" in w for w in item.warnings)
     mesh = in_object(item, 1)
     assert mesh.vertices[:, 1].min() < -item.dimensions_m[1] / 2 - 0.03
 
