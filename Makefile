@@ -17,8 +17,8 @@ LEARNED := $(VENV)/.learned
 demo: env
 	"$(BIN)/python" -m r2c2r_core.cli demo --data "$(DATA)" --port $(PORT) $(DEMO)
 
-test: env check $(LEARNED)
-	"$(BIN)/python" scripts/run_tests.py
+test: env $(LEARNED)
+	$(MAKE) --no-print-directory check && CHECKED_S=$$SECONDS "$(BIN)/python" scripts/run_tests.py
 
 slow: env $(LEARNED)
 	"$(BIN)/python" scripts/run_tests.py --slow
