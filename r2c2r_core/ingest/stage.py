@@ -20,7 +20,7 @@ from r2c2r_core.ingest.noise import estimate_depth_noise
 from r2c2r_core.ingest.odometry import estimate_poses
 from r2c2r_core.ingest.planes import sample_surface
 from r2c2r_core.ingest.poses import SettledPoses, refine_poses
-from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFrame
+from r2c2r_core.ingest.readers.protocol import RawDepth, RawFrame, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.registering import register_depth
 from r2c2r_core.ingest.rgb import stored_jpeg
@@ -163,10 +163,13 @@ def _store_frames(
     """Write every frame's images; return the frames (still in the capture's world) and a notice about skipped ones."""
     frames: list[Frame] = []
     problems: list[str] = []
+    unsure: list[str] = []
     for position, frame in enumerate(raw):
         progress.at(position / len(raw), f"reading frame {position + 1}/{len(raw)}")
         try:
-            frames.append(_store_frame(recording, frame, store, least_confidence, config))
+            depth = recording.depth_of(frame)
+            frames.append(_store_frame(recording, frame, depth, store, least_confidence, config))
+            unsure += [depth.damage] if depth.damage else []
         except (UnreadableFrame, CaptureError) as problem:
             problems.append(str(problem))
         if len(problems) > config.most_bad_share * len(raw):
@@ -174,16 +177,17 @@ def _store_frames(
                 f"{recording.files.source}: {len(problems)} of {position + 1} frames cannot be used, first {problems[0]}",
                 hint="export or copy the recording again",
             )
-    notices = (
-        (f"{len(problems)} of {len(raw)} frames cannot be used and were left out, first {problems[0]}",) if problems else ()
-    )
-    return tuple(frames), notices
+    left_out = f"{len(problems)} of {len(raw)} frames cannot be used and were left out"
+    no_confidence = f"the confidence of {len(unsure)} of {len(frames)} frames cannot be read: all their depth is used"
+    told = ((left_out, problems), (no_confidence, unsure))
+    return tuple(frames), tuple(f"{text}, first {named[0]}" for text, named in told if named)
 
 
-def _store_frame(recording: Recording, frame: RawFrame, store: Path, least_confidence: int, config: IngestConfig) -> Frame:
+def _store_frame(
+    recording: Recording, frame: RawFrame, raw: RawDepth, store: Path, least_confidence: int, config: IngestConfig
+) -> Frame:
     size = (frame.rgb_camera.width, frame.rgb_camera.height)
     jpeg, sharpness = stored_jpeg(recording.colour_of(frame), frame.rgb_name, size)
-    raw = recording.depth_of(frame)
     depth = usable_depth(
         raw.metres * np.float32(config.depth_scale * config.scale),
         raw.confidence,

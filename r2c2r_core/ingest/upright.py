@@ -36,9 +36,9 @@ def upright(recording: Recording) -> Recording:
         return np.ascontiguousarray(np.rot90(pixels, turns))
 
     def depth_of(frame: RawFrame) -> RawDepth:
-        metres, confidence = recording.depth_of(original[frame.index])
+        metres, confidence, damage = recording.depth_of(original[frame.index])
         turned = None if confidence is None else np.ascontiguousarray(np.rot90(confidence, turns))
-        return RawDepth(np.ascontiguousarray(np.rot90(metres, turns)), turned)
+        return RawDepth(np.ascontiguousarray(np.rot90(metres, turns)), turned, damage)
 
     return replace(
         recording,

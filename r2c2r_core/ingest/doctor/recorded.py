@@ -85,7 +85,7 @@ def measure_recorded(recording: Recording) -> Recorded:
     counts, medians = np.zeros(3), []
     for frame in recording.frames[:: max(1, len(recording.frames) // _FRAMES)]:
         try:
-            metres, confidence = recording.depth_of(frame)
+            metres, confidence, _ = recording.depth_of(frame)
         except (UnreadableFrame, CaptureError):
             continue
         known = metres[np.isfinite(metres) & (metres > 0)]

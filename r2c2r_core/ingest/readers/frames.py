@@ -53,6 +53,9 @@ def joined_recording(
     frames come without poses, and ingest estimates them.
     """
     frames, left_out = _joined_frames(files, found, rgb_camera, depth_camera)
+    unsure = sum(frame.confidence_name is None for frame in frames) if found.confidence else 0
+    if unsure:
+        left_out.append(f"{unsure} of {len(frames)} frames have no confidence image: all their depth is used")
     packed = units_per_metre == _MILLIMETRES and not found.confidence and _is_packed(files, frames)
     return Recording(
         format=format,

@@ -155,14 +155,14 @@ def _colour_of(files: Files, lenses: Mapping[int, Lens], frame: RawFrame) -> Col
 def _depth_of(
     files: Files, stored: Callable[[RawFrame], RawDepth], lenses: Mapping[int, Lens], masks: Mapping[int, str], frame: RawFrame
 ) -> RawDepth:
-    metres, confidence = stored(frame)
+    metres, confidence, damage = stored(frame)
     if frame.index in masks:
         metres = np.where(_mask(files, masks[frame.index], metres.shape), metres, np.float32(0))
     if frame.index in lenses:
         camera, lens = frame.depth_camera, lenses[frame.index]
         metres = undistorted(metres, camera, lens, nearest=True)
         confidence = None if confidence is None else undistorted(confidence, camera, lens, nearest=True)
-    return RawDepth(metres, confidence)
+    return RawDepth(metres, confidence, damage)
 
 
 def _mask(files: Files, name: str, shape: tuple[int, ...]) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Image, Vector3
+from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.files import Files
@@ -21,6 +22,15 @@ class RawDepth(NamedTuple):
 
     metres: DepthMetres
     confidence: np.ndarray | None
+    damage: str | None = None  # why the confidence of the frame's own file could not be read
+
+
+def with_confidence(metres: DepthMetres, read: Callable[[], np.ndarray | None]) -> RawDepth:
+    """Depth with the confidence that `read` returns; a damaged confidence file costs the confidence only, not the frame."""
+    try:
+        return RawDepth(metres, read())
+    except (UnreadableFrame, CaptureError) as problem:
+        return RawDepth(metres, None, str(problem))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

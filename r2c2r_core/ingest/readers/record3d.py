@@ -16,7 +16,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_recording
 from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.lzfse_blocks import unpacked, unpacked_size
-from r2c2r_core.ingest.readers.protocol import Part, RawDepth, RawFrame, Reader, Recording, UnreadableFrame
+from r2c2r_core.ingest.readers.protocol import Part, RawDepth, RawFrame, Reader, Recording, UnreadableFrame, with_confidence
 from r2c2r_core.ingest.readers.record3d_metadata import Record3DMetadata, parse_metadata
 from r2c2r_core.ingest.readers.stored_depth import depth_size
 
@@ -98,11 +98,14 @@ def _depth_size(files: Files, metadata: Record3DMetadata, depth: dict[int, str])
 
 def _depth_of(files: Files, frame: RawFrame) -> RawDepth:
     width, height = frame.depth_camera.width, frame.depth_camera.height
-    metres = _values(files, frame.depth_name, np.dtype("<f4"), width, height)
     name = frame.confidence_name
-    if name is None or unpacked_size(files.read(name), name) == 0:  # FaceID recordings have none, or an empty one
-        return RawDepth(metres, None)
-    return RawDepth(metres, _values(files, name, np.dtype(np.uint8), width, height))
+
+    def confidence() -> np.ndarray | None:
+        if name is None or unpacked_size(files.read(name), name) == 0:  # FaceID recordings have none, or an empty one
+            return None
+        return _values(files, name, np.dtype(np.uint8), width, height)
+
+    return with_confidence(_values(files, frame.depth_name, np.dtype("<f4"), width, height), confidence)
 
 
 def _values(files: Files, name: str, dtype: np.dtype, width: int, height: int) -> np.ndarray:

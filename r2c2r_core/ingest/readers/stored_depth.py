@@ -4,13 +4,14 @@ import io
 import zipfile
 import zlib
 from collections.abc import Iterable
+from functools import partial
 from tokenize import TokenError
 
 import numpy as np
 
 from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.images import MAX_PIXELS, decoded, first_size
-from r2c2r_core.ingest.readers.protocol import RawDepth, RawFrame, UnreadableFrame
+from r2c2r_core.ingest.readers.protocol import RawDepth, RawFrame, UnreadableFrame, with_confidence
 
 ENDING = r"(?i:png|tiff?|pgm|pfm|exr|npy|npz)"
 WRITE = "write depth as 16-bit PNG in millimetres, or as float32 .npy, .tiff or .exr in metres"
@@ -43,15 +44,18 @@ def depth_file(
     _require_size(stored, frame.depth_name, frame)
     if packed and stored.dtype == np.uint16:
         return _unpacked(stored)
-    metres = _metres(stored, units_per_metre)
-    if frame.confidence_name is None:
-        return RawDepth(metres, None)
-    marks = decoded(files.read(frame.confidence_name), frame.confidence_name, ("PNG",))
-    _require_size(marks, frame.confidence_name, frame)
+    return with_confidence(_metres(stored, units_per_metre), partial(_confidence, files, frame, confidence_levels))
+
+
+def _confidence(files: Files, frame: RawFrame, levels: tuple[int, int]) -> np.ndarray | None:
+    name = frame.confidence_name
+    if name is None:
+        return None
+    marks = decoded(files.read(name), name, ("PNG",))
+    _require_size(marks, name, frame)
     if marks.dtype != np.uint8:
-        raise UnreadableFrame(f"{frame.confidence_name}: {marks.dtype.name} a pixel, uint8 expected")
-    medium, high = confidence_levels
-    return RawDepth(metres, (marks >= medium).astype(np.uint8) + (marks >= high))
+        raise UnreadableFrame(f"{name}: {marks.dtype.name} a pixel, uint8 expected")
+    return np.asarray((marks >= levels[0]).astype(np.uint8) + (marks >= levels[1]))
 
 
 def stored_values(content: bytes, name: str) -> np.ndarray:

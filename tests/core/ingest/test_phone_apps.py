@@ -235,6 +235,6 @@ def test_the_real_scanner_app_chair_is_read_with_matching_frame_numbers(real):
     assert frame.rgb_camera.fx == pytest.approx(1447.654296875)
     # The same file's projection matrix, which counts from the image's edge: (1 + 0.0068009) * 1920 / 2
     assert 966.529 in (pytest.approx(c, abs=0.01) for c in (frame.rgb_camera.cx, frame.rgb_camera.cy))
-    metres, confidence = recording.depth_of(frame)
+    metres, confidence, _ = recording.depth_of(frame)
     assert set(np.unique(confidence)) <= {0, 1, 2}
     assert 0.2 < np.median(metres[metres > 0]) < 5

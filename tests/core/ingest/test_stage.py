@@ -20,6 +20,7 @@ from r2c2r_core.ingest.stage import IngestConfig, open_images, read_capture
 from r2c2r_core.progress import Progress
 
 from .tiny import TinyRoom, write_exr, write_r3d, write_seven_scenes, write_tum, zip_folder
+from .tiny_formats import told, write_stray
 
 ROOM = TinyRoom()
 QUICK = IngestConfig(finest_voxel_m=0.03, coarsest_voxel_m=0.03)
@@ -204,7 +205,6 @@ DEPTH_BOMB = 200 * lzfse.compress(bytes(2**20))[:-4] + b"bvx$"  # blocks of 1 MB
         ("rgbd/{}.jpg", b"no image at all", "neither a JPEG nor a PNG"),
         ("rgbd/{}.depth", b"bvx2 garbage", "damaged LZFSE"),
         ("rgbd/{}.depth", b"\0" * 4000, "4000 bytes of float32, 48x64 needs 12288"),
-        ("rgbd/{}.conf", b"\1" * 100, "100 bytes of uint8"),
         ("rgbd/{}.depth", DEPTH_BOMB, "209715200 bytes of float32, 48x64 needs 12288"),
     ],
 )
@@ -215,6 +215,24 @@ def test_too_many_damaged_frames_raise_an_error_with_the_first_file(name, broken
         read(damaged, tmp_path)
     assert name.format(2) in str(caught.value)
     assert caught.value.hint
+
+
+def test_a_damaged_confidence_image_costs_its_frame_no_depth(scan, tmp_path):
+    bad = {f"rgbd/{k}.conf" for k in (2, 3, 7, 9)}
+    capture = read(rewritten(scan, tmp_path / "d.r3d", lambda n, c: b"\1" * 100 if n in bad else c), tmp_path)
+    assert [frame.index for frame in capture.frames] == list(range(12))
+    assert (capture.images.depth(2).metres > 0).mean() > 0.9
+    assert any("confidence of 4 of 12 frames" in n and "rgbd/2.conf: 100 bytes" in n for n in capture.notices)
+
+
+def test_a_damaged_or_missing_confidence_image_of_a_folder_costs_no_frame(tmp_path):
+    folder = write_stray(tmp_path / "s", replace(ROOM, count=4))
+    (folder / "confidence" / "000001.png").write_bytes(b"\x89PNG no more")
+    (folder / "confidence" / "000002.png").unlink()
+    capture = read(folder, tmp_path)
+    assert len(capture.frames) == 4
+    assert told(capture, "1 of 4 frames have no confidence image")
+    assert any("confidence of 1 of 4 frames" in n and "confidence/000001.png" in n for n in capture.notices)
 
 
 def test_an_error_keeps_the_earlier_store_and_leaves_no_partial_files(scan, tmp_path):

@@ -47,7 +47,7 @@ def recording(tmp_path: Path, rolls_deg: list[float], up=UP) -> Recording:
 def world_points(made: Recording, position: int) -> np.ndarray:
     """(n, 4): position of each depth pixel, and its confidence; sorted."""
     frame = made.frames[position]
-    metres, confidence = made.depth_of(frame)
+    metres, confidence, _ = made.depth_of(frame)
     points = frame.capture_from_camera.apply(depth_points(metres, frame.depth_camera).reshape(-1, 3))
     rows = np.column_stack([points, confidence.ravel()])
     return rows[np.lexsort(np.round(rows, 6).T)]
