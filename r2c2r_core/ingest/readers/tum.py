@@ -1,13 +1,16 @@
 """TUM RGB-D: rgb.txt, depth.txt, often groundtruth.txt; depth in 1/5000 m registered to colour; OpenCV camera-to-world, z up.
 
 Also the key-frame layout whose pose file is truth_cam_poses.txt (line i belongs to image i, the clocks differ) and whose
-calibration is an ORB-SLAM settings file; and sets whose two lists are one, associations.txt (`time file time file`, colour or
-depth first), as ICL-NUIM's. Its poses, in a .freiburg file or one renamed, are of a renderer's left-handed world, so they are
-reflected; its camera is 481.2, 480, 319.5, 239.5, and which way is up is left to the planes. Clocks are associated within
-20 ms, poses interpolated. Pixel centres lie at integers.
+calibration is an ORB-SLAM settings file; and associations.txt (`time file time file`, colour or depth first) beside or in place
+of the two lists, as in ICL-NUIM: its pairs hold, and each list adds the images that the other lacks. ICL-NUIM's poses, in a
+.freiburg file or one renamed, are of a renderer's left-handed world, so they are reflected; its camera is 481.2, 480, 319.5,
+239.5, and which way is up is left to the planes. Clocks are associated within 20 ms, poses interpolated. Pixel centres lie at
+integers.
 """
 
+import posixpath
 import re
+from functools import partial
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -19,7 +22,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Z_UP, Found, joined_recording
 from r2c2r_core.ingest.readers.images import first_size
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
-from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_quaternion, read_numbers
+from r2c2r_core.ingest.readers.texts import integer_centred, lines_of, pose_of_quaternion, read_numbers, tried
 from r2c2r_core.ingest.readers.trajectory import Trajectory, named_at
 
 _POSES = r"groundtruth\.txt|truth_cam_poses\.txt|[^/]+\.freiburg"  # z is up but in the last
@@ -52,16 +55,16 @@ class _Calibration(NamedTuple):
 def open_tum(files: Files) -> Recording:
     """The recording in a TUM RGB-D folder; raises CaptureError."""
     lists = _lists(files)
-    rgb, rgb_lines = _present(files, *lists.colour)
-    depth, _ = _present(files, *lists.depth)
+    rgb, depth = _present(files, lists.colour), _present(files, lists.depth)
     pose_name = next((name for name in sorted(files.names()) if re.fullmatch(_POSES, name)), None)
     icl = re.search(_ICL, f"{files.source} {pose_name}", re.IGNORECASE) is not None
     calibration = _calibration(files, icl)
     colour, times = {n: name for n, (_, name) in rgb.items()}, {n: time_s for n, (time_s, _) in rgb.items()}
-    placed = _placed(files, pose_name, times, rgb_lines, icl) if pose_name else _Placed({}, times, None)
+    placed = _placed(files, pose_name, times, len(lists.colour.images), icl) if pose_name else _Placed({}, times, None)
+    paired = {n: lists.pairs[name] for n, name in colour.items() if lists.pairs.get(name) in files.names()}
     found = Found(
         colour=colour,
-        depth=named_at(times, dict(depth.values()), _APART_S),
+        depth={**named_at(times, dict(depth.values()), _APART_S), **paired},
         poses=placed.poses,
         times_s=placed.times_s,
     )
@@ -73,9 +76,10 @@ def open_tum(files: Files) -> Recording:
         format="TUM RGB-D",
         up_capture=Z_UP if pose_name and not icl else None,
         notices=[
-            notice for notice in (calibration.notice, placed.notice, _LEFT_HANDED if icl and pose_name else None) if notice
+            *(n for n in (calibration.notice, placed.notice, _LEFT_HANDED if icl and pose_name else None) if n),
+            *(n for images in lists[:2] for n in _left_out(files, images)),
         ],
-        other_names={lists.colour[0], lists.depth[0], *(name for name in (pose_name, calibration.name) if name)},
+        other_names={*lists.colour.names, *lists.depth.names, *(n for n in (pose_name, calibration.name) if n)},
         units_per_metre=calibration.units_per_metre,
     )
 
@@ -123,44 +127,72 @@ def _timed_poses(files: Files, name: str) -> tuple[dict[int, tuple[float, Rigid3
     return posed, len(lines)
 
 
-_Listed = list[tuple[float, str]]  # time, file
+_Timed = tuple[float, str]  # time, file
+
+
+class _List(NamedTuple):
+    names: tuple[str, ...]  # of the files that list the images
+    images: list[_Timed]
 
 
 class _Lists(NamedTuple):
-    colour: tuple[str, _Listed]  # the list's name and its entries
-    depth: tuple[str, _Listed]
+    colour: _List
+    depth: _List
+    pairs: dict[str, str]  # depth by colour, as an associations file says
 
 
 def _lists(files: Files) -> _Lists:
-    """Lists from rgb.txt and depth.txt, else from the columns of an associations file, where a file below depth/ is depth."""
-    if {"rgb.txt", "depth.txt"} <= files.names():
-        colour, depth = (_columns(files, name, 1) for name in ("rgb.txt", "depth.txt"))
-        return _Lists(("rgb.txt", [row[0] for row in colour]), ("depth.txt", [row[0] for row in depth]))
-    name = min(name for name in files.names() if re.fullmatch(_ASSOCIATIONS, name))
-    rows = [row if "depth" in row[1][1].lower() else row[::-1] for row in _columns(files, name, 2)]
-    return _Lists((name, [row[0] for row in rows]), (name, [row[1] for row in rows]))
+    """Lists from rgb.txt and depth.txt and from the columns of an associations file, where a file below depth/ is depth."""
+    own = {"rgb.txt", "depth.txt"} <= files.names()
+    names = [name for name in sorted(files.names()) if re.fullmatch(_ASSOCIATIONS, name)][:1]
+    read = partial(_columns, count=2)
+    rows = [row for name in names for row in (tried(read, files, name) or [] if own else read(files, name))]
+    rows = [row if "depth" in row[1][1].lower() else row[::-1] for row in rows]
+    colour, depth = (_merged(files, f"{kind}.txt", names, [row[k] for row in rows]) for k, kind in enumerate(("rgb", "depth")))
+    return _Lists(colour, depth, {rgb[1]: of_depth[1] for rgb, of_depth in rows})
 
 
-def _columns(files: Files, name: str, count: int) -> list[_Listed]:
-    """`count` pairs of time and file in each line."""
-    rows = []
-    for line in lines_of(files, name):
-        words = line.split()
+def _merged(files: Files, name: str, others: list[str], associated: list[_Timed]) -> _List:
+    """A list, with what only the associations file has, in the order of time."""
+    listed = [row[0] for row in _columns(files, name, 1)] if name in files.names() else []
+    more = [image for image in associated if image[1] not in {known for _, known in listed}]
+    names = (*([name] if listed else []), *(others if more else []))
+    return _List(names or (name,), sorted([*listed, *more]) if listed and more else [*listed, *more])
+
+
+def _columns(files: Files, name: str, count: int) -> list[list[_Timed]]:
+    """`count` pairs of time and file in each line; a line without them, such as one cut off, is left out."""
+    rows, odd = [], []
+    for words in (line.split() for line in lines_of(files, name)):
         try:
             rows.append([(float(words[2 * k]), words[2 * k + 1]) for k in range(count)])
-        except (ValueError, IndexError) as problem:
-            expected = " ".join(["time filename"] * count)
-            raise CaptureError(f"{files.source}/{name}: line '{line[:80]}'", hint=f"expected '{expected}'") from problem
+        except (ValueError, IndexError):
+            odd.append(" ".join(words))
+    if odd and not rows:
+        expected = " ".join(["time filename"] * count)
+        raise CaptureError(f"{files.source}/{name}: line '{odd[0][:80]}'", hint=f"expected '{expected}'")
     return rows
 
 
-def _present(files: Files, name: str, images: _Listed) -> tuple[dict[int, tuple[float, str]], int]:
-    """(time, file) by line, of the files that exist, and the number of lines."""
-    present = {n: (time_s, image) for n, (time_s, image) in enumerate(images) if image in files.names()}
+def _present(files: Files, listed: _List) -> dict[int, _Timed]:
+    """(time, file) by line, of the files that exist."""
+    present = {n: image for n, image in enumerate(listed.images) if image[1] in files.names()}
     if not present:
-        found = f"none of the {len(images)} files it lists exist" if images else "it lists no file"
-        raise CaptureError(f"{files.source}/{name}: {found}", hint="copy the images beside it")
-    return present, len(images)
+        found = f"none of the {len(listed.images)} files it lists exist" if listed.images else "it lists no file"
+        raise CaptureError(f"{files.source}/{listed.names[0]}: {found}", hint="copy the images beside it")
+    return present
+
+
+def _left_out(files: Files, listed: _List) -> list[str]:
+    """Notices about listed images that do not exist, and about images of the same folders that are not listed."""
+    lists, known = " and ".join(listed.names), {image for _, image in listed.images}
+    folders = {posixpath.dirname(image) for image in known & files.names()} - {""}
+    beside = sum(posixpath.dirname(n) in folders and n not in known for n in files.names())
+    lost = len(known - files.names())
+    return [
+        *([f"{lost} of {len(known)} images that {lists} names do not exist: their frames were left out"] if lost else []),
+        *([f"{beside} files in {min(folders)}/ are not named in {lists} and were left out"] if beside else []),
+    ]
 
 
 def _calibration(files: Files, icl: bool) -> _Calibration:

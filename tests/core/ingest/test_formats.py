@@ -277,6 +277,47 @@ def test_tum_associations_in_either_column_order_are_read(line, tmp_path):
         assert np.allclose(found.capture_from_camera.matrix, expected.capture_from_camera.matrix)
 
 
+@pytest.mark.parametrize("shorter", ["rgb.txt", "depth.txt"])
+def test_tum_frames_that_only_the_associations_name_are_read(shorter, tmp_path):
+    whole = open_recording(write_tum(tmp_path / "t", SMALL))
+    folder = write_tum(tmp_path / "a", SMALL)
+    lists = {name: (folder / name).read_text() for name in ("rgb.txt", "depth.txt")}
+    _associated(folder, "{rgb} {depth}")
+    lists[shorter] = "\n".join(lists[shorter].splitlines()[:3])
+    for name, text in lists.items():
+        (folder / name).write_text(text)
+    recording = open_recording(folder)
+    assert [frame.rgb_name for frame in recording.frames] == [frame.rgb_name for frame in whole.frames]
+    assert [frame.depth_name for frame in recording.frames] == [frame.depth_name for frame in whole.frames]
+    assert {"associations.txt", "rgb.txt", "depth.txt"} <= set(recording.names)
+    assert not told(recording, "left out")
+
+
+def test_tum_associations_of_some_frames_leave_none_out_and_their_pairs_hold(tmp_path):
+    folder = write_tum(tmp_path / "a", SMALL)
+    rgb, depth = ((folder / name).read_text().splitlines()[1:] for name in ("rgb.txt", "depth.txt"))
+    (folder / "associations.txt").write_text(f"{rgb[1]} {depth[0]}\nno line of it")
+    recording = open_recording(folder)
+    assert [frame.depth_name for frame in recording.frames] == [depth[k].split()[1] for k in (0, 0, 2, 3)]
+
+
+def test_tum_images_that_a_short_list_does_not_name_are_counted(tmp_path):
+    folder = write_tum(tmp_path / "t", SMALL)
+    lines = (folder / "rgb.txt").read_text().splitlines()
+    (folder / "rgb.txt").write_text("\n".join([*lines[:3], lines[3][:8]]))  # cut off within a line
+    recording = open_recording(folder)
+    assert len(recording.frames) == 2
+    assert told(recording, "2 files in rgb/ are not named in rgb.txt and were left out")
+
+
+def test_tum_images_that_do_not_exist_are_counted(tmp_path):
+    folder = write_tum(tmp_path / "t", SMALL)
+    sorted((folder / "rgb").iterdir())[1].unlink()
+    recording = open_recording(folder)
+    assert len(recording.frames) == 3
+    assert told(recording, "1 of 4 images that rgb.txt names do not exist")
+
+
 def test_icl_nuim_poses_are_read_without_an_up_direction(tmp_path):
     folder = write_tum(tmp_path / "t", SMALL)
     _associated(folder, "{depth} {rgb}")
