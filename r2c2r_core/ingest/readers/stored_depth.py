@@ -82,20 +82,25 @@ def depth_size(files: Files, names: Iterable[str]) -> tuple[int, int]:
 
 
 def are_depth16(images: Iterable[np.ndarray]) -> bool:
-    """Whether images are Android's DEPTH16 instead of millimetres: their steps of metres are in the upper three bits alone."""
-    pixels, far, steps, of_codes = 0, 0, 0, 0
+    """Whether images are Android's DEPTH16 instead of millimetres.
+
+    Their steps of metres are in the upper three bits alone, or these bits are the same everywhere: millimetres would then be a
+    room of which nothing is nearer than 33 m.
+    """
+    pixels, far, steps, of_codes, codes = 0, 0, 0, 0, set[int]()
     for image in images:
         whole = np.where(image == 65535, 0, image).astype(np.int32)
         pixels, far = pixels + whole.size, far + int((whole >> _CODES >= _FAR_CODE).sum())
+        codes.update(np.unique(whole[whole & _DEPTH > 0] >> _CODES).tolist())
         for a, b in ((whole[1:], whole[:-1]), (whole[:, 1:], whole[:, :-1])):
             step = (np.abs(a - b) > _STEP_MM) & (a > 0) & (b > 0)
             steps += int(step.sum())
             of_codes += int((step & (np.abs((a & _DEPTH) - (b & _DEPTH)) < _SURFACE_MM)).sum())
-    return far > _FAR_SHARE * pixels and 2 * of_codes > steps
+    return far > _FAR_SHARE * pixels and (2 * of_codes > steps or len(codes) == 1)
 
 
 def _unpacked(stored: np.ndarray) -> RawDepth:
-    """Depth and confidence of DEPTH16, whose code 0 is certain and 1 to 7 are 0 to 100 %, here in equal thirds."""
+    """Depth and confidence of DEPTH16, whose code 0 is certain and 1 to 7 are 0 to 6/7, here in thirds."""
     codes = stored >> _CODES
     confidence = np.where(codes == 0, 2, np.minimum((np.maximum(codes, 1) - 1) // 2, 2)).astype(np.uint8)
     return RawDepth(np.where(stored == 65535, 0, stored & _DEPTH).astype(np.float32) / np.float32(1000), confidence)

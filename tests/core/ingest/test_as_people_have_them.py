@@ -256,11 +256,31 @@ def test_android_depth16_is_unpacked_with_its_confidence(tmp_path):
         assert rows == [2, 0, 0, 1, 1, 2, 2, 2]  # certain; then 0 to 100 %
 
 
+@pytest.mark.parametrize(("code", "confidence"), [(7, 2), (4, 1)])
+def test_android_depth16_of_one_confidence_is_unpacked(code, confidence, tmp_path):
+    folder = write_redwood(tmp_path / "r", SMALL)
+    expected = open_recording(folder)
+    plain = [expected.depth_of(frame).metres for frame in expected.frames]
+    for path in (folder / "depth").iterdir():
+        stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        stored[:3] = 0
+        stored[3:6] = 1 << 13  # nothing was measured: depth 0 of confidence 0
+        cv2.imwrite(str(path), np.where(stored & 0x1FFF, stored | code << 13, stored).astype(np.uint16))
+    recording = open_recording(folder)
+    assert told(recording, "DEPTH16")
+    for frame, metres in zip(recording.frames, plain, strict=True):
+        depth = recording.depth_of(frame)
+        assert np.allclose(depth.metres[6:], metres[6:])
+        assert not depth.metres[:6].any()
+        assert set(depth.confidence[6:].ravel().tolist()) == {confidence}
+
+
 def test_far_walls_and_unknown_pixels_are_not_taken_for_depth16():
     room = np.full((48, 64), 1500, np.uint16)
     room[:, 20:40] = 9700  # 8.2 m behind: the step of one code
     room[30:, 50:] = 65535
     assert not are_depth16([room])
+    assert not are_depth16([np.full((48, 64), 12_000, np.uint16)])  # 1.2 m in steps of 0.1 mm
     assert not are_depth16([np.random.default_rng(0).integers(0, 65535, (48, 64)).astype(np.uint16)])
 
 
