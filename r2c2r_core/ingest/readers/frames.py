@@ -18,6 +18,7 @@ from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_numbers
 
 Cameras = Callable[[int], Intrinsics | None]  # by frame number; None: the frame's own is unusable
 Y_UP, Z_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+_SQUARE = np.eye(3)  # the identity without its signs, which the flip of camera axes changes
 _MILLIMETRES = 1000.0  # units a metre
 _DEPTH16 = "the depth is Android's DEPTH16: its lower 13 bits are read as millimetres, the upper 3 as confidence"
 
@@ -52,6 +53,7 @@ def joined_recording(
     Depth is of the colour image's view where it has no camera of its own. If the recording has no usable pose at all, its
     frames come without poses, and ingest estimates them.
     """
+    found, notices = (found, notices) if up_capture is None else _without_placeholders(found, notices)
     frames, left_out = _joined_frames(files, found, rgb_camera, depth_camera)
     unsure = sum(frame.confidence_name is None for frame in frames) if found.confidence else 0
     if unsure:
@@ -67,6 +69,20 @@ def joined_recording(
         notices=(*notices, *left_out, *((_DEPTH16,) if packed else ())),
         other_names=(*other_names, *(found.cameras[f.index] for f in frames if f.index in found.cameras)),
     )
+
+
+def _without_placeholders(found: Found, notices: Iterable[str]) -> tuple[Found, Iterable[str]]:
+    """The recording without poses that are exactly the identity, as apps write where tracking is lost.
+
+    In a world with a vertical axis no camera is held like that in several frames.
+    """
+    lost = {
+        n for n, p in found.poses.items() if p is not None and not (p.translation.any() or np.any(abs(p.rotation) != _SQUARE))
+    }
+    if len(lost) < 2:
+        return found, notices
+    told = f"{len(lost)} poses are the identity, which stands for lost tracking"
+    return replace(found, poses={n: None if n in lost else p for n, p in found.poses.items()}), (*notices, told)
 
 
 def _joined_frames(

@@ -35,10 +35,19 @@ def open_scannetpp(files: Files) -> Recording:
             f"{files.source}/{_CAMERAS}: no frame of the {len(colour)} colour images has an 'intrinsic' of 3x3 numbers",
             hint="extract the scene with ScanNet++'s toolkit again",
         )
-    poses = {number: _pose(entries[number]) for number in cameras}
+    poses = {number: _pose(entry) for number, entry in entries.items() if entry.get("aligned_pose") is not None}
     times = {n: float(t[0]) for n in cameras if (t := finite_numbers(entries[n].get("timestamp"), (1,))) is not None}
     found = Found(colour=colour, depth=depth, poses=poses, times_s=times)
-    return joined_recording(files, found, cameras.get, format="ScanNet++ iPhone", up_capture=Z_UP, other_names=[_CAMERAS])
+    unaligned = f"{len(entries) - len(poses)} of {len(entries)} frames have no aligned_pose in {_CAMERAS}"
+    return joined_recording(
+        files,
+        found,
+        cameras.get,
+        format="ScanNet++ iPhone",
+        up_capture=Z_UP,
+        notices=[unaligned] if len(poses) < len(entries) else [],
+        other_names=[_CAMERAS],
+    )
 
 
 def _entries(files: Files) -> dict[int, Mapping[str, Any]]:

@@ -88,7 +88,30 @@ def test_scannetpp_frames_not_extracted_are_not_reported_as_missing(tmp_path):
 def test_unaligned_scannetpp_recordings_are_opened_without_poses(tmp_path):
     recording = open_recording(write_scannetpp(tmp_path / "s", SMALL, aligned=False))
     assert [frame.capture_from_camera for frame in recording.frames] == [None] * 4
-    assert told(recording, "none of 4 poses")
+    assert told(recording, "4 of 4 frames have no aligned_pose")
+
+
+@pytest.mark.parametrize(
+    ("lost", "said"), [(None, "2 of 4 frames have no aligned_pose"), (np.eye(4).tolist(), "2 poses are the identity")]
+)
+def test_half_aligned_scannetpp_recordings_lose_the_frames_without_a_pose(lost, said, tmp_path):
+    folder = write_scannetpp(tmp_path / "s", SMALL)
+    entries = json.loads((folder / "pose_intrinsic_imu.json").read_text())
+    for number in (10, 30):
+        entries[f"frame_{number:06d}"]["aligned_pose"] = lost
+    (folder / "pose_intrinsic_imu.json").write_text(json.dumps(entries))
+    recording = open_recording(folder)
+    assert [frame.index for frame in recording.frames] == [0, 20]
+    assert told(recording, said)
+    assert told(recording, "left out")
+
+
+def test_scannetpp_frames_without_a_camera_are_told_apart_from_those_without_a_pose(tmp_path):
+    folder = write_scannetpp(tmp_path / "s", SMALL)
+    entries = json.loads((folder / "pose_intrinsic_imu.json").read_text())
+    entries["frame_000010"]["intrinsic"][0][0] = None
+    (folder / "pose_intrinsic_imu.json").write_text(json.dumps(entries))
+    assert told(open_recording(folder), "1 frames have no usable camera")
 
 
 def test_invalid_scannetpp_intrinsics_report_the_expected_format(tmp_path):
