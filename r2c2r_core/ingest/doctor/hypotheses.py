@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -81,12 +82,13 @@ def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Pos
     """
     if not len(pairs):
         return None, views
-    given = compare(views, pairs)
-    posed = [(change, views.posed(*change.poses((views.rotation, views.translation)))) for change in _conventions(shifted)]
-    change, changed = max(posed, key=lambda one: compare(one[1], pairs).agreement.mean())
-    so = compare(changed, pairs)
+    given, params = compare(views, pairs), tuned(Params)
+    change, changed, so = _best(_conventions(shifted), views, pairs)
+    if not _is_usable(given):  # then two of them may be wrong at once
+        two, mended, better = _best(_combinations(), views, pairs)
+        if not _is_usable(so) or better.agreement.mean() > params.gain_ratio * so.agreement.mean():
+            change, changed, so = two, mended, better
     agreement, before = float(so.agreement.mean()), float(given.agreement.mean())
-    params = tuned(Params)
     if agreement < before + params.gain or agreement < params.gain_ratio * before or not _is_usable(so):
         return None, views
     finding = Finding(
@@ -146,17 +148,43 @@ class _Try(NamedTuple):
     cost: np.ndarray
 
 
+def _best(changes: list[_Change], views: Views, pairs: Pairs) -> tuple[_Change, Views, Disagreement]:
+    """The change under which neighbours agree most, and the views under it."""
+    posed = [(change, views.posed(*change.poses((views.rotation, views.translation)))) for change in changes]
+    change, changed = max(posed, key=lambda one: compare(one[1], pairs).agreement.mean())
+    return change, changed, compare(changed, pairs)
+
+
+def _combinations() -> list[_Change]:
+    """Two wrong conventions at once, undone in either order."""
+    stored, of_axes = [_stored(axes) for axes in _READER_AXES], _of_axes()
+    both = [two for alike in stored for two in permutations([*alike, *of_axes], 2) if two[0].cause != two[1].cause]
+    return [_Change(a.cause, f"{a.text}, and {b.text}", _one_after_the_other(a, b)) for a, b in both]
+
+
+def _one_after_the_other(first: _Change, then: _Change) -> Callable[[Poses], Poses]:
+    return lambda poses: then.poses(first.poses(poses))
+
+
+def _stored(axes: np.ndarray) -> list[_Change]:
+    """Changes of the poses as stored in the file, if ingest multiplied its rotations by `axes`."""
+    return [
+        _Change("poses_inverted", _INVERTED, _in_file(_inverted, axes)),
+        _Change("rotation_transposed", "the rotations of the poses are transposed", _in_file(_transposed, axes)),
+        *(_Change("quaternion_order", _ORDER, _in_file(_reordered(order), axes)) for order in _ORDERS),
+    ]
+
+
+def _of_axes() -> list[_Change]:
+    flips = (CAMERA_CV_FROM_GL, np.diag([-1.0, 1.0, -1.0]))  # the second: of images that stood upside down and were turned
+    return [
+        *(_Change("camera_axes", _FLIPPED, _turned(axes)) for axes in flips),
+        *(_Change("poses_mirrored", _MIRRORED, _mirrored(np.diag(1.0 - 2.0 * axis))) for axis in np.eye(3)),
+    ]
+
+
 def _conventions(shifted: Sequence[tuple[int, Poses]]) -> list[_Change]:
-    changes = []
-    for axes in _READER_AXES:
-        changes += [
-            _Change("poses_inverted", _INVERTED, _in_file(_inverted, axes)),
-            _Change("rotation_transposed", "the rotations of the poses are transposed", _in_file(_transposed, axes)),
-            *(_Change("quaternion_order", _ORDER, _in_file(_reordered(order), axes)) for order in _ORDERS),
-        ]
-    for axes in (CAMERA_CV_FROM_GL, np.diag([-1.0, 1.0, -1.0])):  # the second: of images that stood upside down and were turned
-        changes.append(_Change("camera_axes", _FLIPPED, _turned(axes)))
-    changes += [_Change("poses_mirrored", _MIRRORED, _mirrored(np.diag(1.0 - 2.0 * axis))) for axis in np.eye(3)]
+    changes = [*(change for axes in _READER_AXES for change in _stored(axes)), *_of_axes()]
     for quarters in (1, 2, 3):
         text = f"the images are rotated by {90 * quarters}° relative to their poses"
         changes.append(_Change("image_rotated", text, _turned(rotation_about_z(quarters * np.pi / 2))))

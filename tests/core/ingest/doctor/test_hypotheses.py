@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from r2c2r_core.geometry.transforms import CAMERA_CV_FROM_GL
 from r2c2r_core.ingest.doctor.hypotheses import find_convention, find_scale
-from r2c2r_core.ingest.doctor.pairs import Views, far_pairs, neighbours
+from r2c2r_core.ingest.doctor.pairs import Views, compare, far_pairs, neighbours
 from tests.core.ingest.doctor.corner import views_of
 
 Damage = Callable[[Views], Views]
@@ -58,6 +58,24 @@ def test_a_wrong_pose_convention_is_identified_and_corrected(damage: Damage, cau
     np.testing.assert_allclose(mended.translation, views.translation, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("first", "then", "causes"),
+    [
+        (inverted, mirrored, {"inverted", "mirrored"}),
+        (mirrored, quaternions_reordered, {"mirrored", "wrong order"}),
+        (quaternions_reordered, inverted, {"wrong order", "inverted"}),
+        (flipped, transposed, {"flipped", "transposed"}),
+        (flipped, mirrored, {"flipped", "mirrored"}),
+    ],
+)
+def test_two_wrong_pose_conventions_at_once_are_both_named(first: Damage, then: Damage, causes: set[str]) -> None:
+    views = views_of(16)
+    finding, mended = find_convention(then(first(views)), neighbours(views), ())
+    assert finding is not None
+    assert {cause for cause in causes if cause in finding.text} == causes
+    assert compare(mended, neighbours(views)).agreement == pytest.approx(compare(views, neighbours(views)).agreement)
+
+
 def test_poses_shifted_by_frames_are_reported_with_the_shift() -> None:
     views = views_of(16)
     late = views.posed(np.roll(views.rotation, 3, axis=0), np.roll(views.translation, 3, axis=0))
@@ -68,7 +86,7 @@ def test_poses_shifted_by_frames_are_reported_with_the_shift() -> None:
 
 
 def test_a_cause_that_leaves_the_frames_apart_is_not_named() -> None:
-    views = inverted(quaternions_reordered(views_of(16)))  # neither alone explains it
+    views = inverted(transposed(quaternions_reordered(views_of(16))))  # no two of them explain it
     assert find_convention(views, neighbours(views), ()) == (None, views)
     assert find_scale(views, far_pairs(views, 12)) is None
 
