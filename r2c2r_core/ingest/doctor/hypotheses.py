@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import permutations
 from typing import Literal, NamedTuple
 
@@ -88,19 +89,10 @@ def find_convention(views: Views, pairs: Pairs, shifted: Sequence[tuple[int, Pos
         two, mended, better = _best(_combinations(), views, pairs)
         if not _is_usable(so) or better.agreement.mean() > params.gain_ratio * so.agreement.mean():
             change, changed, so = two, mended, better
-    agreement, before = float(so.agreement.mean()), float(given.agreement.mean())
+    agreement, before = so.agreement.mean(), given.agreement.mean()
     if agreement < before + params.gain or agreement < params.gain_ratio * before or not _is_usable(so):
         return None, views
-    finding = Finding(
-        cause=change.cause,
-        text=change.text,
-        factor=None,
-        agreement_given=before,
-        agreement_so=agreement,
-        error_given_mm=_millimetres(given.error_m),
-        error_so_mm=_millimetres(so.error_m),
-    )
-    return finding, changed
+    return _finding(change.cause, change.text, None, given, so), changed
 
 
 def find_scale(views: Views, pairs: Pairs) -> Finding | None:
@@ -124,10 +116,14 @@ def find_scale(views: Views, pairs: Pairs) -> Finding | None:
         return None
     # A short path hardly separates a scale from a focal length: then both are named
     alike = [t.text for t in tries if t.cause != best.cause and t.cost.mean() < params.alike * best.cost.mean()]
+    return _finding(best.cause, " or ".join((best.text, *alike)), best.factor, given, so)
+
+
+def _finding(cause: Cause, text: str, factor: float | None, given: Disagreement, so: Disagreement) -> Finding:
     return Finding(
-        cause=best.cause,
-        text=" or ".join((best.text, *alike)),
-        factor=best.factor,
+        cause=cause,
+        text=text,
+        factor=factor,
         agreement_given=float(given.agreement.mean()),
         agreement_so=float(so.agreement.mean()),
         error_given_mm=_millimetres(given.error_m),
@@ -159,11 +155,11 @@ def _combinations() -> list[_Change]:
     """Two wrong conventions at once, undone in either order."""
     stored, of_axes = [_stored(axes) for axes in _READER_AXES], _of_axes()
     both = [two for alike in stored for two in permutations([*alike, *of_axes], 2) if two[0].cause != two[1].cause]
-    return [_Change(a.cause, f"{a.text}, and {b.text}", _one_after_the_other(a, b)) for a, b in both]
+    return [_Change(a.cause, f"{a.text}, and {b.text}", partial(_undone, a, b)) for a, b in both]
 
 
-def _one_after_the_other(first: _Change, then: _Change) -> Callable[[Poses], Poses]:
-    return lambda poses: then.poses(first.poses(poses))
+def _undone(first: _Change, then: _Change, poses: Poses) -> Poses:
+    return then.poses(first.poses(poses))
 
 
 def _stored(axes: np.ndarray) -> list[_Change]:

@@ -18,7 +18,6 @@ from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_numbers
 
 Cameras = Callable[[int], Intrinsics | None]  # by frame number; None: the frame's own is unusable
 Y_UP, Z_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-_SQUARE = np.eye(3)  # the identity without its signs, which the flip of camera axes changes
 _MILLIMETRES = 1000.0  # units a metre
 _DEPTH16 = "the depth is Android's DEPTH16: its lower 13 bits are read as millimetres, the upper 3 as confidence"
 
@@ -53,7 +52,9 @@ def joined_recording(
     Depth is of the colour image's view where it has no camera of its own. If the recording has no usable pose at all, its
     frames come without poses, and ingest estimates them.
     """
-    found, notices = (found, notices) if up_capture is None else _without_placeholders(found, notices)
+    if up_capture is not None and len(still := [n for n, pose in found.poses.items() if _is_identity(pose)]) > 1:
+        found = replace(found, poses={**found.poses, **dict.fromkeys(still)})  # no camera is held like that in a levelled world
+        notices = (*notices, f"{len(still)} poses are the identity, which stands for lost tracking")
     frames, left_out = _joined_frames(files, found, rgb_camera, depth_camera)
     unsure = sum(frame.confidence_name is None for frame in frames) if found.confidence else 0
     if unsure:
@@ -69,20 +70,6 @@ def joined_recording(
         notices=(*notices, *left_out, *((_DEPTH16,) if packed else ())),
         other_names=(*other_names, *(found.cameras[f.index] for f in frames if f.index in found.cameras)),
     )
-
-
-def _without_placeholders(found: Found, notices: Iterable[str]) -> tuple[Found, Iterable[str]]:
-    """The recording without poses that are exactly the identity, as apps write where tracking is lost.
-
-    In a world with a vertical axis no camera is held like that in several frames.
-    """
-    lost = {
-        n for n, p in found.poses.items() if p is not None and not (p.translation.any() or np.any(abs(p.rotation) != _SQUARE))
-    }
-    if len(lost) < 2:
-        return found, notices
-    told = f"{len(lost)} poses are the identity, which stands for lost tracking"
-    return replace(found, poses={n: None if n in lost else p for n, p in found.poses.items()}), (*notices, told)
 
 
 def _joined_frames(
@@ -134,6 +121,11 @@ def read_poses(files: Files, names: Mapping[int, str]) -> dict[int, Rigid3 | Non
     """The pose in each of those text files (4x4, camera-to-world, OpenCV axes)."""
     read = {number: read_numbers(files.read(name)) for number, name in names.items()}  # -inf or NaN where tracking was lost
     return {k: None if n is None or n.size != 16 else pose_of_matrix(n.reshape(4, 4)) for k, n in read.items()}
+
+
+def _is_identity(pose: Rigid3 | None) -> bool:
+    """Whether the file's pose is exactly the identity; the flip of camera axes changes signs only."""
+    return pose is not None and not pose.translation.any() and np.array_equal(abs(pose.rotation), np.eye(3))
 
 
 def _left_out(found: Found, shared: set[int], posed: int, usable: int) -> list[str]:

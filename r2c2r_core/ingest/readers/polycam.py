@@ -43,7 +43,7 @@ def open_polycam(files: Files) -> Recording:
             shot = _Shot(
                 colour.get(time_us), cameras.get(time_us), _camera(document, size) if colour else None, _pose(document)
             )
-            if time_us not in shots or (None not in shot and tried(_size, files, str(shot.image)) is not None):
+            if time_us not in shots or (None not in shot and tried(first_size, files, [str(shot.image)]) is not None):
                 shots[time_us] = shot
     ranks = {time_us: rank for rank, time_us in enumerate(sorted(shots.keys() | depth.keys() | confidence.keys()))}
     taken = {ranks[time_us]: shot for time_us, shot in shots.items()}
@@ -69,10 +69,6 @@ def open_polycam(files: Files) -> Recording:
 
 def _by_time(names: Iterable[str], pattern: str) -> dict[int, str]:
     return numbered(names, pattern, below=10**18)  # microseconds: files are numbered by the clock, not by frame
-
-
-def _size(files: Files, name: str) -> tuple[int, int]:
-    return first_size(files, [name])
 
 
 def _camera(document: dict[str, Any], size: tuple[int, int]) -> Intrinsics | None:

@@ -82,11 +82,7 @@ def depth_size(files: Files, names: Iterable[str]) -> tuple[int, int]:
 
 
 def are_depth16(images: Iterable[np.ndarray]) -> bool:
-    """Whether images are Android's DEPTH16 instead of millimetres.
-
-    Their steps of metres are in the upper three bits alone, or these bits are the same everywhere: millimetres would then be a
-    room of which nothing is nearer than 33 m.
-    """
+    """Whether images are Android's DEPTH16, not millimetres: steps are in the upper three bits alone, or all is 33 m away."""
     pixels, far, steps, of_codes, codes = 0, 0, 0, 0, set[int]()
     for image in images:
         whole = np.where(image == 65535, 0, image).astype(np.int32)

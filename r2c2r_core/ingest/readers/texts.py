@@ -13,6 +13,7 @@ from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3, nearest_rotation
 from r2c2r_core.ingest.files import Files
 
+S = TypeVar("S")
 T = TypeVar("T")
 
 
@@ -75,7 +76,7 @@ def integer_centred(fx: float, fy: float, cx: float, cy: float, size: tuple[int,
     )
 
 
-def tried(read: Callable[[Files, str], T], files: Files, name: str) -> T | None:
+def tried(read: Callable[[Files, S], T], files: Files, name: S) -> T | None:
     """Content of one frame's file; None when it is damaged, which costs that frame and not the recording."""
     try:
         return read(files, name)

@@ -16,6 +16,7 @@ from r2c2r_core.ingest.readers.stored_depth import ENDING, depth_size
 from r2c2r_core.ingest.readers.texts import integer_centred, read_calibration
 
 _INTRINSICS = "camera-intrinsics.txt"
+_UNREGISTERED = "no camera-intrinsics.txt: read as 7-Scenes, whose depth is not registered to colour (about 20 px)"
 _FOLDER = r"(?:[^/]+/)?"
 _COLOUR, _DEPTH, _POSE = (rf"frame-(\d+)\.{kind}" for kind in (r"color\.(?i:jpe?g|png)", rf"depth\.{ENDING}", r"pose\.txt"))
 
@@ -51,12 +52,7 @@ def _cameras(
     colour, depth = (
         integer_centred(f, f, 319.5, 239.5, (640, 480)).resized(*pixels) for f, pixels in ((525.0, size), (585.0, depth_pixels))
     )
-    return (
-        colour,
-        depth,
-        [],
-        ["no camera-intrinsics.txt: read as 7-Scenes, whose depth is not registered to colour (about 20 px)"],
-    )
+    return colour, depth, [], [_UNREGISTERED]
 
 
 READER = Reader(

@@ -37,10 +37,8 @@ _KNOWN_CAMERAS = {  # vision.in.tum.de, intrinsic page; fx, fy, cx, cy at 640x48
     "freiburg3": (535.4, 539.2, 320.1, 247.6),
 }
 _GENERIC_CAMERA = (525.0, 525.0, 319.5, 239.5)
-_ICL, _ICL_CAMERA = (
-    r"\.freiburg\b|(?:living|office)_room_traj\d|traj\d\w*_frei_png",
-    (481.2, 480.0, 319.5, 239.5),
-)  # and 640x480
+_ICL = r"\.freiburg\b|(?:living|office)_room_traj\d|traj\d\w*_frei_png"
+_ICL_CAMERA = (481.2, 480.0, 319.5, 239.5)  # and 640x480
 _MIRROR = np.diag([1.0, -1.0, 1.0])
 _LEFT_HANDED = "ICL-NUIM's world is left-handed: its poses were reflected about the XZ plane"
 
@@ -54,14 +52,14 @@ class _Calibration(NamedTuple):
 
 def open_tum(files: Files) -> Recording:
     """The recording in a TUM RGB-D folder; raises CaptureError."""
-    lists = _lists(files)
-    rgb, depth = _present(files, lists.colour), _present(files, lists.depth)
+    *lists, pairs = _lists(files)
+    rgb, depth = (_present(files, listed) for listed in lists)
     pose_name = next((name for name in sorted(files.names()) if re.fullmatch(_POSES, name)), None)
     icl = re.search(_ICL, f"{files.source} {pose_name}", re.IGNORECASE) is not None
     calibration = _calibration(files, icl)
     colour, times = {n: name for n, (_, name) in rgb.items()}, {n: time_s for n, (time_s, _) in rgb.items()}
-    placed = _placed(files, pose_name, times, len(lists.colour.images), icl) if pose_name else _Placed({}, times, None)
-    paired = {n: lists.pairs[name] for n, name in colour.items() if lists.pairs.get(name) in files.names()}
+    placed = _placed(files, pose_name, times, len(lists[0].images), icl) if pose_name else _Placed({}, times, None)
+    paired = {n: pairs[name] for n, name in colour.items() if pairs.get(name) in files.names()}
     found = Found(
         colour=colour,
         depth={**named_at(times, dict(depth.values()), _APART_S), **paired},
@@ -77,9 +75,9 @@ def open_tum(files: Files) -> Recording:
         up_capture=Z_UP if pose_name and not icl else None,
         notices=[
             *(n for n in (calibration.notice, placed.notice, _LEFT_HANDED if icl and pose_name else None) if n),
-            *(n for images in lists[:2] for n in _left_out(files, images)),
+            *(n for listed in lists for n in _left_out(files, listed)),
         ],
-        other_names={*lists.colour.names, *lists.depth.names, *(n for n in (pose_name, calibration.name) if n)},
+        other_names={*lists[0].names, *lists[1].names, *(n for n in (pose_name, calibration.name) if n)},
         units_per_metre=calibration.units_per_metre,
     )
 
@@ -135,21 +133,15 @@ class _List(NamedTuple):
     images: list[_Timed]
 
 
-class _Lists(NamedTuple):
-    colour: _List
-    depth: _List
-    pairs: dict[str, str]  # depth by colour, as an associations file says
-
-
-def _lists(files: Files) -> _Lists:
-    """Lists from rgb.txt and depth.txt and from the columns of an associations file, where a file below depth/ is depth."""
+def _lists(files: Files) -> tuple[_List, _List, dict[str, str]]:
+    """Lists of rgb.txt, depth.txt and an associations file, where a file below depth/ is depth; and the latter's pairs."""
     own = {"rgb.txt", "depth.txt"} <= files.names()
     names = [name for name in sorted(files.names()) if re.fullmatch(_ASSOCIATIONS, name)][:1]
     read = partial(_columns, count=2)
     rows = [row for name in names for row in (tried(read, files, name) or [] if own else read(files, name))]
     rows = [row if "depth" in row[1][1].lower() else row[::-1] for row in rows]
     colour, depth = (_merged(files, f"{kind}.txt", names, [row[k] for row in rows]) for k, kind in enumerate(("rgb", "depth")))
-    return _Lists(colour, depth, {rgb[1]: of_depth[1] for rgb, of_depth in rows})
+    return colour, depth, {rgb[1]: of_depth[1] for rgb, of_depth in rows}
 
 
 def _merged(files: Files, name: str, others: list[str], associated: list[_Timed]) -> _List:
