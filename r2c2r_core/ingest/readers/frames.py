@@ -14,7 +14,7 @@ from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.images import colour_file
 from r2c2r_core.ingest.readers.protocol import RawFrame, Recording, UnreadableFrame
 from r2c2r_core.ingest.readers.stored_depth import are_depth16, depth_file, depth_size, stored_values
-from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_numbers
+from r2c2r_core.ingest.readers.texts import pose_of_matrix, read_numbers, tried
 
 Cameras = Callable[[int], Intrinsics | None]  # by frame number; None: the frame's own is unusable
 Y_UP, Z_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -119,7 +119,8 @@ def _joined_frames(
 
 def read_poses(files: Files, names: Mapping[int, str]) -> dict[int, Rigid3 | None]:
     """The pose in each of those text files (4x4, camera-to-world, OpenCV axes)."""
-    read = {number: read_numbers(files.read(name)) for number, name in names.items()}  # -inf or NaN where tracking was lost
+    texts = {number: tried(lambda folder, one: folder.read(one), files, name) or b"" for number, name in names.items()}
+    read = {number: read_numbers(text) for number, text in texts.items()}  # -inf or NaN where tracking was lost
     return {k: None if n is None or n.size != 16 else pose_of_matrix(n.reshape(4, 4)) for k, n in read.items()}
 
 

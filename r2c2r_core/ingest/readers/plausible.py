@@ -15,22 +15,23 @@ _CENTRE_SHARE = (0.2, 0.8)  # of the image's width and height
 
 
 def plausible(recording: Recording) -> Recording:
-    """The recording without frames a kilometre away; raises CaptureError when its cameras do not fit its images."""
-    for frame in recording.frames:
-        for camera in (frame.rgb_camera, frame.depth_camera):
-            if not _is_plausible(camera):
-                raise CaptureError(
-                    f"{recording.files.source}: frame {frame.index}: focal length {camera.fx:.0f}x{camera.fy:.0f} and centre "
-                    f"({camera.cx:.0f}, {camera.cy:.0f}) do not belong to {camera.width}x{camera.height} pixels",
-                    hint="were the images resized or cropped after the export? use the untouched recording",
-                )
-    near = tuple(f for f in recording.frames if _is_near(f.capture_from_camera))
-    if len(near) == len(recording.frames):
-        return recording
+    """The recording without frames whose camera misfits its image or is a kilometre away; raises CaptureError if all do."""
+    misfits = [(f.index, c) for f in recording.frames for c in (f.rgb_camera, f.depth_camera) if not _is_plausible(c)]
+    odd = {index for index, _ in misfits}
+    notices = [f"{len(odd)} frames have a camera that does not fit their images and were left out"] if odd else []
+    if len(odd) == len(recording.frames):
+        index, camera = misfits[0]
+        raise CaptureError(
+            f"{recording.files.source}: frame {index}: focal length {camera.fx:.0f}x{camera.fy:.0f} and centre "
+            f"({camera.cx:.0f}, {camera.cy:.0f}) do not belong to {camera.width}x{camera.height} pixels",
+            hint="were the images resized or cropped after the export? use the untouched recording",
+        )
+    near = tuple(f for f in recording.frames if f.index not in odd and _is_near(f.capture_from_camera))
     if not near:
         raise CaptureError(f"{recording.files.source}: no camera lies within a kilometre", hint="are the poses in metres?")
-    left_out = f"{len(recording.frames) - len(near)} frames are more than a kilometre away and were left out"
-    return replace(recording, frames=near, notices=(*recording.notices, left_out))
+    if far := len(recording.frames) - len(odd) - len(near):
+        notices.append(f"{far} frames are more than a kilometre away and were left out")
+    return replace(recording, frames=near, notices=(*recording.notices, *notices))
 
 
 def _is_near(pose: Rigid3 | None) -> bool:

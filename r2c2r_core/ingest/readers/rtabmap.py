@@ -62,6 +62,8 @@ def open_rtabmap(files: Files) -> Recording:
     poses = {number: _of_camera(node.pose, read.get(number, common)) for number, node in on_device.items()}
     poses.update({number: node.pose for number, node in on_camera.items()})  # preferred, node by node
     found = Found(colour=colour, depth=depth, poses=poses, times_s={number: node.time_s for number, node in nodes.items()})
+    strangers = sum(re.fullmatch(_COLOUR, name) is not None for name in files.names()) - len(colour)
+    unposed = f"{strangers} colour images belong to no node of {(*of_camera, *of_device)[0]} and were left out"
     distorted = any(one.distorted for one in read.values())
     return joined_recording(
         files,
@@ -69,24 +71,26 @@ def open_rtabmap(files: Files) -> Recording:
         cameras.get,
         format="RTAB-Map export",
         up_capture=Z_UP,
-        notices=[_DISTORTED] if distorted else [],
+        notices=[*([_DISTORTED] if distorted else []), *([unposed] if strangers else [])],
         other_names=(*of_camera, *of_device, *calibrations.values()),
     )
 
 
 def _nodes(files: Files, name: str) -> dict[int, _Node]:
     """The rows of a pose file by node number, or by rank where they have none (format 10)."""
-    nodes = {}
-    for rank, line in enumerate(lines_of(files, name)):
+    nodes, lines = {}, lines_of(files, name)
+    for rank, line in enumerate(lines):
         row = read_numbers(line.encode())
         if row is None or row.size not in (8, 9) or not np.isfinite(row[[0, -1]]).all():
-            raise CaptureError(
-                f"{files.source}/{name}: line '{line[:80]}', expected 'time x y z qx qy qz qw number'",
-                hint="export poses in format 11, the default",
-            )
+            continue  # a damaged line costs its node
         number = int(row[8]) if row.size == 9 else rank
         if 0 <= number < MOST_FRAMES:
             nodes[number] = _Node(float(row[0]), pose_of_quaternion(row[1:8]))
+    if lines and not nodes:
+        raise CaptureError(
+            f"{files.source}/{name}: line '{lines[0][:80]}', expected 'time x y z qx qy qz qw number'",
+            hint="export poses in format 11, the default",
+        )
     return nodes
 
 

@@ -20,7 +20,7 @@ from r2c2r_core.ingest.readers.stored_depth import are_depth16
 from r2c2r_core.ingest.readers.table import open_recording
 from r2c2r_core.ingest.readers.video import Video
 
-from .tiny import TinyRoom, integer_centred, write_r3d, write_tum
+from .tiny import TinyRoom, integer_centred, write_r3d, write_tum, zip_folder
 from .tiny_formats import (
     millimetres,
     told,
@@ -30,6 +30,7 @@ from .tiny_formats import (
     write_redwood,
     write_rtabmap,
     write_scanner_app,
+    write_scannet,
     write_stray,
 )
 
@@ -138,6 +139,35 @@ def test_a_damaged_camera_file_costs_at_most_its_frame(write, cameras, left, tmp
     found = sorted((folder / cameras).iterdir()) if (folder / cameras).is_dir() else sorted(folder.glob(cameras))
     found[0].write_bytes(b"")
     assert len(open_recording(folder).frames) == left
+
+
+def test_an_impossible_camera_of_one_frame_costs_that_frame(tmp_path):
+    own = [[SMALL.focal, SMALL.focal, 48.0, 64.0] if k != 2 else [5.0, 5.0, 48.0, 64.0] for k in range(4)]
+    recording = open_recording(write_r3d(tmp_path / "a.r3d", SMALL, perFrameIntrinsicCoeffs=own))
+    assert [frame.index for frame in recording.frames] == [0, 1, 3]
+    assert told(recording, "1 frames have a camera that does not fit")
+
+
+@pytest.mark.parametrize(
+    "change", [lambda rows: [*rows[:2], "x y z", *rows[3:]], lambda rows: rows[:-1]], ids=["damaged", "short"]
+)
+def test_a_damaged_or_missing_line_of_rtabmaps_poses_costs_its_frame(change, tmp_path):
+    folder = write_rtabmap(tmp_path / "r", SMALL)
+    poses = folder / "kitchen_camera_poses.txt"
+    poses.write_text("\n".join(change(poses.read_text().splitlines())))
+    recording = open_recording(folder)
+    assert len(recording.frames) == 3
+    assert told(recording, "1 colour images belong to no node of kitchen_camera_poses.txt")
+
+
+def test_a_pose_file_damaged_in_its_zip_costs_its_frame(tmp_path):
+    packed = zip_folder(write_scannet(tmp_path / "s", SMALL), tmp_path / "s.zip")
+    content, pose = bytearray(packed.read_bytes()), (tmp_path / "s" / "pose" / "1.txt").read_bytes()
+    content[content.index(pose)] ^= 1
+    packed.write_bytes(content)
+    recording = open_recording(packed)
+    assert [frame.index for frame in recording.frames] == [0, 2, 3]
+    assert told(recording, "1 frames have no usable pose")
 
 
 def test_a_recording_without_any_camera_is_refused_in_one_line(tmp_path):
