@@ -59,7 +59,8 @@ def open_tum(files: Files) -> Recording:
     calibration = _calibration(files, icl)
     colour, times = {n: name for n, (_, name) in rgb.items()}, {n: time_s for n, (time_s, _) in rgb.items()}
     placed = _placed(files, pose_name, times, len(lists[0].images), icl) if pose_name else _Placed({}, times, None)
-    paired = {n: pairs[name] for n, name in colour.items() if pairs.get(name) in files.names()}
+    there = dict(image[::-1] for image in depth.values())
+    paired = {n: pairs[name] for n, name in colour.items() if pairs.get(name) in there}
     found = Found(
         colour=colour,
         depth={**named_at(times, dict(depth.values()), _APART_S), **paired},
@@ -147,7 +148,8 @@ def _lists(files: Files) -> tuple[_List, _List, dict[str, str]]:
 def _merged(files: Files, name: str, others: list[str], associated: list[_Timed]) -> _List:
     """A list, with what only the associations file has, in the order of time."""
     listed = [row[0] for row in _columns(files, name, 1)] if name in files.names() else []
-    more = [image for image in associated if image[1] not in {known for _, known in listed}]
+    known = {image for _, image in listed}
+    more = [image for image in associated if image[1] not in known]
     names = (*([name] if listed else []), *(others if more else []))
     return _List(names or (name,), sorted([*listed, *more]) if listed and more else [*listed, *more])
 
@@ -168,7 +170,8 @@ def _columns(files: Files, name: str, count: int) -> list[list[_Timed]]:
 
 def _present(files: Files, listed: _List) -> dict[int, _Timed]:
     """(time, file) by line, of the files that exist."""
-    present = {n: image for n, image in enumerate(listed.images) if image[1] in files.names()}
+    names = files.names()
+    present = {n: image for n, image in enumerate(listed.images) if image[1] in names}
     if not present:
         found = f"none of the {len(listed.images)} files it lists exist" if listed.images else "it lists no file"
         raise CaptureError(f"{files.source}/{listed.names[0]}: {found}", hint="copy the images beside it")
@@ -177,10 +180,9 @@ def _present(files: Files, listed: _List) -> dict[int, _Timed]:
 
 def _left_out(files: Files, listed: _List) -> list[str]:
     """Notices about listed images that do not exist, and about images of the same folders that are not listed."""
-    lists, known = " and ".join(listed.names), {image for _, image in listed.images}
-    folders = {posixpath.dirname(image) for image in known & files.names()} - {""}
-    beside = sum(posixpath.dirname(n) in folders and n not in known for n in files.names())
-    lost = len(known - files.names())
+    lists, known, names = " and ".join(listed.names), {image for _, image in listed.images}, files.names()
+    folders = {posixpath.dirname(image) for image in known & names} - {""}
+    beside, lost = sum(posixpath.dirname(name) in folders for name in names - known), len(known - names)
     return [
         *([f"{lost} of {len(known)} images that {lists} names do not exist: their frames were left out"] if lost else []),
         *([f"{beside} files in {min(folders)}/ are not named in {lists} and were left out"] if beside else []),
