@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from r2c2r_core.arrays import Points
+from r2c2r_core.geometry.graphs import components
 from r2c2r_core.tuning import param, tuned
 
 
@@ -63,6 +62,5 @@ def _components(cells: np.ndarray, filled: np.ndarray) -> tuple[np.ndarray, np.n
     if not len(cells):
         return np.zeros(0, dtype=np.int64), np.zeros(0)
     pairs = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells),) * 2)
-    count, label = connected_components(graph, directed=False)
-    return label, np.bincount(label, filled, minlength=count)
+    label = components(len(cells), pairs)
+    return label, np.bincount(label, filled)

@@ -14,6 +14,7 @@ from r2c2r_core.arrays import Points
 from r2c2r_core.generate.carved import Carving
 from r2c2r_core.generate.evidence import View, depth_mask
 from r2c2r_core.geometry.camera import depth_points
+from r2c2r_core.geometry.graphs import components
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.tuning import param, tuned
 
@@ -194,15 +195,11 @@ def _in_one_piece(cells: Points, cell_m: float) -> Points:
 
 def _pieces(cells: Points, cell_m: float) -> list[Points]:
     """Connected components of the cells, largest first, without those below the minimum size."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     if len(cells) == 0:
         return []
-    pairs = cKDTree(cells).query_pairs(1.8 * cell_m, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
-    _, labels = connected_components(links, directed=False)
+    labels = components(len(cells), cKDTree(cells).query_pairs(1.8 * cell_m, output_type="ndarray"))
     sizes = np.bincount(labels)
     return [cells[labels == k] for k in np.argsort(-sizes) if sizes[k] >= tuned(Params).least_cells]
 

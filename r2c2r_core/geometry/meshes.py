@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from r2c2r_core.arrays import Faces, Points, Vector3
+from r2c2r_core.geometry.graphs import components
 
 # A result has sizes of its own, and each part of a sequence too: `n` and `m` would tie them to the arguments.
 AnyPoints = Float[np.ndarray, "_ 3"]
@@ -115,16 +116,11 @@ def _collapsed(vertices: Points, faces: Faces, max_faces: int) -> Surface:
 
 def largest_component(vertices: Points, faces: Faces) -> Surface:
     """The connected component with the largest surface; connection is by shared vertices."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    graph = coo_matrix((np.ones(len(edges), np.int8), (edges[:, 0], edges[:, 1])), shape=(len(vertices), len(vertices)))
-    count, labels = connected_components(graph, directed=False)
-    if count == 1:
+    labels = components(len(vertices), np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]]))
+    if labels.max() == 0:
         return vertices, faces
     face_label = labels[faces[:, 0]]
-    areas = np.bincount(face_label, weights=face_areas(vertices, faces), minlength=count)
+    areas = np.bincount(face_label, weights=face_areas(vertices, faces))
     return compact(vertices, faces[face_label == int(np.argmax(areas))])
 
 

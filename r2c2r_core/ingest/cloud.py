@@ -11,6 +11,7 @@ import numpy as np
 from r2c2r_core.arrays import Faces, Points
 from r2c2r_core.geometry.camera import depth_points
 from r2c2r_core.geometry.fusion import DepthView, Surface, fuse_depth
+from r2c2r_core.geometry.graphs import components
 from r2c2r_core.model.capture import Frame, FrameImages
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.tuning import param, tuned
@@ -105,17 +106,11 @@ def _cell_keys(cells: np.ndarray) -> np.ndarray:
 
 def drop_crumbs(surface: Surface, smallest_part_m2: float) -> Surface:
     """The surface without connected parts smaller than `smallest_part_m2`."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     faces = surface.faces
     if not len(faces):
         return surface
-    count = len(surface.vertices)
-    start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
-    links = coo_matrix((np.ones(len(start), np.int8), (start, end)), shape=(count, count))
-    parts, part_of_vertex = connected_components(links, directed=False)
-    area_of_part = np.bincount(part_of_vertex[faces[:, 0]], weights=face_areas(surface.vertices, faces), minlength=parts)
+    part_of_vertex = components(len(surface.vertices), np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]]))
+    area_of_part = np.bincount(part_of_vertex[faces[:, 0]], weights=face_areas(surface.vertices, faces))
     return _with_faces(surface, area_of_part[part_of_vertex[faces[:, 0]]] >= smallest_part_m2)
 
 

@@ -12,12 +12,10 @@ from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.category import Kind
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import CropBox
-from r2c2r_core.model.motion import JointMotion
-from r2c2r_core.model.track import FrontPanel, ThingBox
+from r2c2r_core.model.track import ThingBox
 from r2c2r_core.segment.found import Found, View
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.things.found import FoundCarried, FoundStanding, FoundThing
-from r2c2r_core.segment.things.thing import Thing
+from r2c2r_core.segment.things.found import FoundCarried, FoundThing, Loose
 from r2c2r_core.tuning import param, tuned
 
 
@@ -67,15 +65,14 @@ def cropped(found: Found, crop: Crop, scene: Scene, name: str) -> Found:
     """Part of an object that lies in the box; raises ObjectNotSeen where hardly any does."""
     if isinstance(found, FoundCarried):  # the box is where it is with its drawer closed, like the thing
         return replace(found, thing=cropped(found.thing, crop, found.scene, name))
-    assert isinstance(found, FoundThing | FoundStanding), found  # check_prompt refuses others
-    thing = found.thing if isinstance(found, FoundThing) else found.standing.thing
-    within, least = crop.holds(thing.points), tuned(Params).least_points
+    assert isinstance(found, FoundThing), found  # check_prompt refuses others
+    within, least = crop.holds(found.thing.vertices), tuned(Params).least_points
     if within.sum() < least:
         raise ObjectNotSeen(
             f"{name}: {within.sum()} of its {len(within)} points lie in its crop box, at least {least} expected",
             hint="move the box over the object, or delete the box",
         )
-    return FoundCropped(found, thing, crop, scene)
+    return FoundCropped(found, crop, scene)
 
 
 def cropped_mask(mask: Mask, frame: Frame, depth: DepthMetres, crop: Crop) -> Mask:
@@ -94,11 +91,10 @@ def cropped_mask(mask: Mask, frame: Frame, depth: DepthMetres, crop: Crop) -> Ma
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FoundCropped:
+class FoundCropped(Loose):
     """An object restricted to a crop box."""
 
-    found: FoundThing | FoundStanding
-    thing: Thing  # the whole object
+    found: FoundThing
     crop: Crop
     scene: Scene
 
@@ -117,21 +113,13 @@ class FoundCropped:
         view = self.found.see(frame)
         return replace(view, mask=cropped_mask(view.mask, frame, self.scene.depth(frame.index), self.crop))
 
-    def panel(self) -> FrontPanel | None:
-        """None: free-standing objects have no front panel."""
-        return None
-
-    def motions(self) -> tuple[JointMotion, ...]:
-        """No motions: free-standing objects move as a whole."""
-        return ()
-
     def box(self) -> ThingBox | None:
         """Box of the part in the crop box; its base is the crop box's, where that is above the support."""
-        support = self.thing.support_z_m
+        support = self.found.thing.support_z_m
         part = replace(
-            self.thing,
-            vertices=self.thing.points[self.crop.holds(self.thing.points)],
+            self.found.thing,
+            vertices=self.found.thing.vertices[self.crop.holds(self.found.thing.vertices)],
             faces=np.zeros((0, 3), np.int64),
             support_z_m=None if support is None else max(support, self.crop.bottom_m),
         )
-        return FoundThing(part, self.scene, round=isinstance(self.found, FoundThing) and self.found.round).box()
+        return FoundThing(part, self.scene, round=self.found.round).box()

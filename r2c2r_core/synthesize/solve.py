@@ -13,6 +13,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.failing import spared
+from r2c2r_core.geometry.graphs import components
 from r2c2r_core.geometry.least_change import least_change
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.synthesize.dimensions import MeasuredObject
@@ -118,13 +119,9 @@ def _solved(
 
 def _groups(count: int, links: Sequence[tuple[int, int]]) -> list[list[int]]:
     """Connected components of ties and overlaps; isolated objects are left out."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     if not links:
         return []
-    first, second = np.array(links).T
-    _, label = connected_components(coo_array((np.ones(len(links)), (first, second)), shape=(count, count)), directed=False)
+    label = components(count, np.array(links))
     groups = [np.flatnonzero(label == number).tolist() for number in np.unique(label)]
     return [group for group in groups if len(group) > 1]
 

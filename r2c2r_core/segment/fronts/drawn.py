@@ -22,11 +22,18 @@ from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.protocol import SegmentConfig
 from r2c2r_core.segment.runs.run import Run, run_on
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.tuning import param, tuned
 
 _AROUND_M = 0.08  # margin around the rectangle: its neighbours' lines show the frames' pose errors
 _SUPPORT_M = 0.02  # side of the region's cells
-_TRIM = 0.05  # share of a painted outline beyond each edge: its corners are rounded, and hands tremble
-_FILLED = 0.85  # share of its rectangle that a painted front fills at least; handles and plants cut off some
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Tuned parameters of painted rectangles."""
+
+    trim: float = param(0.05, "share", "Fraction of an outline beyond each edge: its corners are rounded, hands tremble")
+    filled: float = param(0.85, "share", "Minimum fraction of its rectangle that a painted front fills: plants cut off some")
 
 
 def drawn_front(drawn: DrawnFront, scene: Scene, config: SegmentConfig) -> Front:
@@ -42,12 +49,13 @@ def painted_front(mask: Mask, grid: PlaneGrid, frame: Frame, world_from_capture:
     """Rectangle on a plane that a mask painted in a frame fills; None for another shape, and for one the image cuts off."""
     found, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = max((part[:, 0] for part in found), key=cv2.contourArea, default=np.zeros((0, 2), int))
+    params = tuned(Params)
     if len(outline) < 4 or (outline.min(axis=0) <= 0).any() or (outline.max(axis=0) >= np.array(mask.shape[::-1]) - 1).any():
         return None
     pixel_from_cell = grid.pixel_from_cell(frame, frame.rgb_camera)
     cells = cv2.perspectiveTransform((outline + 0.5)[None].astype(np.float64), np.linalg.inv(pixel_from_cell))[0]
-    (left, top), (right, bottom) = np.quantile(cells, [_TRIM, 1 - _TRIM], axis=0)
-    if cv2.contourArea(cells.astype(np.float32)) < _FILLED * (right - left) * (bottom - top):
+    (left, top), (right, bottom) = np.quantile(cells, [params.trim, 1 - params.trim], axis=0)
+    if cv2.contourArea(cells.astype(np.float32)) < params.filled * (right - left) * (bottom - top):
         return None
     corners = grid.rectangle(Cell(left, top, right, bottom)).corners
     return DrawnFront(corners_capture=tuple(map(tuple, world_from_capture.inverse.apply(corners).tolist())))

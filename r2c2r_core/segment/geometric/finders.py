@@ -26,7 +26,7 @@ from r2c2r_core.segment.motion.carried import drawer_boards, drawer_floor, seen_
 from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
 from r2c2r_core.segment.prepared import Hits, PreparedCapture
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.segment.things.found import FoundCarried, FoundStanding, FoundThing
+from r2c2r_core.segment.things.found import FoundCarried, FoundThing
 from r2c2r_core.segment.things.painted import find_painted, level_holes, may_hold, with_clicked_parts
 from r2c2r_core.segment.things.revolution import Sight, find_round
 from r2c2r_core.segment.things.standing import find_standing
@@ -219,7 +219,7 @@ def _found_appliance(fitted: FittedBox, scene: Scene, prompt: ObjectPrompt, cate
 
 def _loose(
     prepared: PreparedCapture, prompt: ObjectPrompt, category: Category, hits: Hits, negatives: Points
-) -> FoundThing | FoundStanding | FoundCarried | None:
+) -> FoundThing | FoundCarried | None:
     """Free-standing object; one in a drawer that stands open at the first click is found in the scene seen from that drawer."""
     drawer = drawer_at(prepared, hits.points[0], hits.clicks[0].frame) if category.kind == "thing" else None
     if drawer is None:
@@ -246,7 +246,7 @@ def _picked(scene: Scene, clicks: list[PromptPoint]) -> Hits:
 
 def _thing(
     scene: Scene, structure: tuple[PlaneRegion, ...], prompt: ObjectPrompt, config: ThingConfig, hits: Hits, negatives: Points
-) -> FoundThing | FoundStanding | None:
+) -> FoundThing | None:
     """Object under the clicks; `structure` are flat parts that it may touch but does not contain."""
     if glass := level_holes(scene, hits.clicks):
         hob = find_painted(scene, glass, config)
@@ -257,7 +257,8 @@ def _thing(
         standing = find_standing(scene, positives, negatives, config, structure)
         if standing is not None:
             colours = standing_colours(standing, scene, scene.frames)
-            return FoundStanding(replace(standing, thing=replace(standing.thing, colours=colours)), scene)
+            standing = replace(standing, thing=replace(standing.thing, colours=colours))
+            return FoundThing(standing.thing, scene, standing=standing)
     is_small = config.radius_m < tuned(Params).small_m
     thing = _small_thing(scene, structure, prompt, config, hits, negatives, by_silhouettes=is_small)
     if thing is not None:

@@ -7,7 +7,9 @@ import numpy as np
 
 from r2c2r_core.arrays import Faces, Mask, Points
 from r2c2r_core.geometry.camera import project, sample_nearest
+from r2c2r_core.geometry.graphs import components
 from r2c2r_core.geometry.masks import PackedMask, unpack_mask
+from r2c2r_core.geometry.meshes import face_areas
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
@@ -102,15 +104,8 @@ def in_view(scene: Scene, frame: Frame, points_world: Points) -> tuple[np.ndarra
 
 
 def _without_crumbs(vertices: Points, faces: Faces) -> Faces:
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     if not len(faces):
         return faces
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(vertices), len(vertices)))
-    _, part = connected_components(graph, directed=False)
-    corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    sizes = np.bincount(part[faces[:, 0]], weights=area)
+    part = components(len(vertices), np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]]))
+    sizes = np.bincount(part[faces[:, 0]], weights=face_areas(vertices, faces))
     return faces[sizes[part[faces[:, 0]]] > tuned(Params).small_part * sizes.max()]

@@ -8,6 +8,7 @@ from scipy import ndimage
 from r2c2r_core.arrays import Points
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.segment.planes import PlaneRegion
+from r2c2r_core.segment.things.thing import Params as ThingParams
 from r2c2r_core.tuning import param, tuned
 
 
@@ -22,7 +23,6 @@ class Params:
     beside_m: float = param(
         0.20, "m", "Maximum distance of an object from the observed part of its support: the object hides the rest"
     )
-    clearance_m: float = param(0.012, "m", "Minimum height above the support for surface to belong to an object")
     stands_m: float = param(0.06, "m", "Maximum height above its support of the lowest observed part of an object")
     off_plane_m: float = param(0.03, "m", "Maximum distance from a vertical plane of surface that belongs to it")
     structure_m2: float = param(0.12, "m²", "Minimum area of a vertical plane: smaller ones may be the face of a box")
@@ -120,7 +120,7 @@ def _standing_on(
 ) -> list[Clump]:
     params = tuned(Params)
     cells = ((turned[:, :2] - origin) / params.map_m).astype(int)
-    above = seen[cells[:, 0], cells[:, 1]] & (turned[:, 2] > height + params.clearance_m)
+    above = seen[cells[:, 0], cells[:, 1]] & (turned[:, 2] > height + tuned(ThingParams).clearance_m)
     above &= turned[:, 2] < height + params.reach_m
     if above.sum() < 10:
         return []

@@ -31,7 +31,7 @@ class Params:
     )
 
 
-class _Loose:
+class Loose:
     """Measurements that no free-standing object has: it has no front, and moves as a whole."""
 
     __slots__ = ()
@@ -46,19 +46,23 @@ class _Loose:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FoundThing(_Loose):
+class FoundThing(Loose):
     """A segmented free-standing object."""
 
     thing: Thing
     scene: Scene
     small: bool = False  # a visual hull, whose border follows colour
     round: bool = False
+    standing: Standing | None = None  # on the floor, such as a chair or a table
     kind: Kind = "thing"
     warnings: tuple[str, ...] = ()
 
     def see(self, frame: Frame) -> View:
         """Visible pixels of the object in a frame, with their confidence."""
-        mask, share = (small_mask if self.small else thing_mask)(self.thing, self.scene, frame)
+        if self.standing is not None:
+            mask, share = standing_mask(self.standing, self.scene, frame)
+        else:
+            mask, share = (small_mask if self.small else thing_mask)(self.thing, self.scene, frame)
         border_m = 0.5 * self.thing.border_m if self.small else tuned(Params).border_m
         sample = self.thing.vertices[:: max(1, len(self.thing.vertices) // 50)]
         return View(mask, expected_iou(mask, share, frame, sample, border_m))
@@ -68,12 +72,12 @@ class FoundThing(_Loose):
         centres = np.stack([frame.world_from_camera.translation for frame in self.scene.frames])
         room = self.scene.capture.room
         return box_of(
-            self.thing.points, self.thing.support_z_m, room.manhattan_yaw_rad, centres.mean(axis=0), round_thing=self.round
+            self.thing.vertices, self.thing.support_z_m, room.manhattan_yaw_rad, centres.mean(axis=0), round_thing=self.round
         )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FoundCarried(_Loose):
+class FoundCarried(Loose):
     """A thing in a drawer, segmented in the scene as seen from that drawer (motion/carried.py)."""
 
     thing: Found
@@ -103,23 +107,3 @@ class FoundCarried(_Loose):
         """Box of the thing with its drawer closed."""
         box = self.thing.box()
         return None if box is None else replace(box, carrier=self.carrier)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FoundStanding(_Loose):
-    """A segmented floor-standing object, such as a chair or a table."""
-
-    standing: Standing
-    scene: Scene
-    kind: Kind = "thing"
-    warnings: tuple[str, ...] = ()
-
-    def see(self, frame: Frame) -> View:
-        """Visible pixels of the object in a frame, with their confidence."""
-        mask, share = standing_mask(self.standing, self.scene, frame)
-        sample = self.standing.thing.vertices[:: max(1, len(self.standing.thing.vertices) // 50)]
-        return View(mask, expected_iou(mask, share, frame, sample, tuned(Params).border_m))
-
-    def box(self) -> ThingBox | None:
-        """Box of the object on the floor."""
-        return FoundThing(self.standing.thing, self.scene).box()

@@ -7,12 +7,11 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Colours, Faces, Points, Vector3
+from r2c2r_core.geometry.graphs import components, source_side
 from r2c2r_core.tuning import param, tuned
 
 _CAPACITY_SCALE = 1000.0
 _LARGE = 1e5
-_ASKED = 100  # places between two parts that are asked about
-_FILLED = 0.25  # share of them that must be solid: 0.4 to 1 within hoods, 0 between a hood and the cabinet beside
 
 Solid = Callable[[Points], np.ndarray]
 """Mask of the places (n, 3) that may be solid: no frame sees through them."""
@@ -32,6 +31,10 @@ class Params:
     )
     colour_cost: float = param(
         0.6, "score", "Weight of the colour difference between neighbours relative to the angle between their normals"
+    )
+    asked: int = param(100, "count", "Maximum number of places between two parts that must be solid", ge=1)
+    solid_share: float = param(
+        0.25, "share", "Minimum solid fraction of these places", source="0.4 to 1 within hoods, 0 between a hood and a cabinet"
     )
 
 
@@ -91,10 +94,6 @@ def cut(
     `radius_m`; for `upright` objects (chairs), which extend down to the floor, only plan distance counts. Parts up to `gap_m`
     from each other count as joined: scans lose dark and thin pieces; with `solid`, those with solid between them.
     """
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
-
-    count = len(graph.positions)
     a, b = graph.edges.T
     capacity = _capacities(graph)
     positions = graph.positions[:, :2] if upright else graph.positions
@@ -106,19 +105,8 @@ def cut(
     sink[background] += weight[background] * 3 + 20
     source[positive], sink[positive] = _LARGE, 0
     sink[negative], source[negative] = _LARGE, 0
-    nodes = np.arange(count)
-    rows = np.concatenate([a, b, np.full(count, count), nodes])
-    columns = np.concatenate([b, a, nodes, np.full(count, count + 1)])
-    values = np.concatenate([capacity, capacity, source, sink])
-    matrix = csr_matrix(
-        ((values * _CAPACITY_SCALE).round().clip(0, 2**31 - 1).astype(np.int32), (rows, columns)), shape=(count + 2, count + 2)
-    )
-    residual = matrix - maximum_flow(matrix, count, count + 1).flow
-    residual.data = (residual.data > 0).astype(np.int32)
-    residual.eliminate_zeros()
-    inside = np.zeros(count + 2, bool)
-    inside[breadth_first_order(residual, count, return_predecessors=False)] = True
-    chosen = connected_to(graph, inside[:count], positive, gap_m, solid)
+    inside = source_side(a, b, *(value * _CAPACITY_SCALE for value in (capacity, source, sink)))
+    chosen = connected_to(graph, inside, positive, gap_m, solid)
     crossing = capacity[chosen[a] != chosen[b]].sum()
     return chosen, float(crossing / np.sqrt(max(graph.area_m2[chosen].sum() * 1e4, 1e-6)))
 
@@ -127,23 +115,16 @@ def connected_to(
     graph: VoxelGraph, inside: np.ndarray, seeds: list[int], gap_m: float = 0.0, solid: Solid | None = None
 ) -> np.ndarray:
     """Mask of the voxels of `inside` that are connected to a seed within it, across gaps of up to `gap_m` (if solid)."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    def parts(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        both = inside[a] & inside[b]
-        links = coo_matrix((np.ones(int(both.sum())), (a[both], b[both])), shape=(len(inside), len(inside)))
-        return np.asarray(connected_components(links, directed=False)[1])
-
-    a, b = graph.edges.T
+    links = graph.edges[inside[graph.edges].all(axis=1)]
     if gap_m > 0:
         members = np.flatnonzero(inside)
         near = members[cKDTree(graph.positions[members]).query_pairs(gap_m, output_type="ndarray")]
         if solid is not None:
-            near = _across_solid(graph.positions, near, parts(a, b), solid)
-        a, b = np.concatenate([a, near[:, 0]]), np.concatenate([b, near[:, 1]])
-    labels = parts(a, b)
+            near = _across_solid(graph.positions, near, components(len(inside), links), solid)
+        links = np.concatenate([links, near])
+    labels = components(len(inside), links)
     return np.asarray(inside & np.isin(labels, labels[seeds]))
 
 
@@ -153,14 +134,15 @@ def _across_solid(positions: Points, pairs: np.ndarray, part: np.ndarray, solid:
     pairs, ends = pairs[ends[:, 0] != ends[:, 1]], ends[ends[:, 0] != ends[:, 1]]
     if not len(pairs):
         return pairs
+    params = tuned(Params)
     _, gap, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     order = np.argsort(gap.ravel(), kind="stable")
     gap = gap.ravel()[order]
     rank = np.arange(len(gap)) - (np.cumsum(count) - count)[gap]
-    some = rank % -(-count // _ASKED)[gap] == 0
+    some = rank % -(-count // params.asked)[gap] == 0
     pairs, gap = pairs[order][some], gap[some]
     filled = np.bincount(gap, solid(positions[pairs].mean(axis=1))) / np.bincount(gap)
-    return np.asarray(pairs[filled[gap] > _FILLED])
+    return np.asarray(pairs[filled[gap] > params.solid_share])
 
 
 def _capacities(graph: VoxelGraph) -> np.ndarray:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Image, Mask
+from r2c2r_core.geometry.graphs import source_side
 from r2c2r_core.tuning import param, tuned
 
 _BINS = (16, 32, 32)  # of Lab: lightness changes with the light, hue does not
@@ -70,12 +71,7 @@ def cut_pixels(rgb: Image, odds: np.ndarray, largest_px: int | None = None) -> M
 
 def _min_cut(rgb: Image, odds: np.ndarray) -> Mask:
     params = tuned(Params)
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
-
-    height, width = odds.shape
-    count = height * width
-    node = np.arange(count).reshape(height, width)
+    node = np.arange(odds.size).reshape(odds.shape)
     lab = cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB).astype(np.float32)
     pairs: list[tuple[np.ndarray, np.ndarray, float]] = [(node[:, :-1], node[:, 1:], 1.0), (node[:-1], node[1:], 1.0)]
     pairs += [(node[:-1, :-1], node[1:, 1:], 0.7), (node[:-1, 1:], node[1:, :-1], 0.7)]
@@ -86,17 +82,8 @@ def _min_cut(rgb: Image, odds: np.ndarray) -> Mask:
     a = np.concatenate([first.ravel() for first, _, _ in pairs])
     b = np.concatenate([second.ravel() for _, second, _ in pairs])
     weight = np.concatenate(weights)
-    nodes = node.ravel()
-    rows = np.concatenate([a, b, np.full(count, count), nodes])
-    columns = np.concatenate([b, a, nodes, np.full(count, count + 1)])
-    values = np.concatenate([weight, weight, np.clip(odds.ravel(), 0, None), np.clip(-odds.ravel(), 0, None)])
-    capacity = csr_matrix(((values * _CAPACITY_SCALE).round().astype(np.int32), (rows, columns)), shape=(count + 2, count + 2))
-    residual = capacity - maximum_flow(capacity, count, count + 1).flow
-    residual.data = (residual.data > 0).astype(np.int32)
-    residual.eliminate_zeros()
-    inside = np.zeros(count + 2, bool)
-    inside[breadth_first_order(residual, count, return_predecessors=False)] = True
-    return inside[:count].reshape(height, width)
+    ends = (np.clip(sign * odds.ravel(), 0, None) for sign in (1, -1))
+    return source_side(a, b, *(value * _CAPACITY_SCALE for value in (weight, *ends))).reshape(odds.shape)
 
 
 def _histogram(lab: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.depth_cloud import DepthCloud, Region, gather_cloud
 from r2c2r_core.segment.things.min_cut import VoxelGraph, cut, touching
+from r2c2r_core.segment.things.thing import Params as ThingParams
 from r2c2r_core.segment.things.thing import Thing, ThingConfig
 from r2c2r_core.tuning import param, tuned
 
@@ -31,11 +32,9 @@ class Params:
     floor_slack_m: float = param(
         0.08, "m", "Maximum height difference between the floor and the room's floor plane: terraces slope"
     )
-    near_click_m: float = param(0.12, "m", "Maximum distance from a click to the surface it selects")
     gap_m: float = param(0.06, "m", "Maximum gap between parts of one object: sensors lose dark and thin pieces")
     level_cos: float = param(0.92, "cosine", "Minimum cosine between a face normal and up for a level surface")
     large_m2: float = param(0.45, "m²", "Minimum area of a level surface without a click for it to belong to another object")
-    off_wall_m: float = param(0.03, "m", "Maximum distance from a wall of points that belong to the wall")
     off_slab_m: float = param(
         0.015, "m", "Maximum height above a slab of points that belong to it; higher ones belong to objects on it"
     )
@@ -76,9 +75,9 @@ def find_standing(
     if not scene.capture.room.floor_found:
         return None
     size = float(np.clip(2 * config.radius_m / params.voxels_along, *params.voxel_range_m))
-    reach = 2 * config.radius_m + params.near_click_m
+    reach = 2 * config.radius_m + tuned(ThingParams).seed_m
     low, high = positives.min(axis=0) - reach, positives.max(axis=0) + reach
-    low[2], high[2] = -params.floor_slack_m, max(config.tallest_m, float(positives[:, 2].max())) + params.near_click_m
+    low[2], high[2] = -params.floor_slack_m, max(config.tallest_m, float(positives[:, 2].max())) + tuned(ThingParams).seed_m
     levels = _level_cells(scene, low, high, size)
     top = _slab_at(levels, positives, low, size) if config.flat_top else None
     region = Region(low=low, high=high, level_z_m=top[1] if top is not None else 0.0)
@@ -111,7 +110,7 @@ def _cut_off(
     structure: tuple[PlaneRegion, ...],
 ) -> np.ndarray | None:
     """Min-cut of the voxels above the floor that the clicks select; None where none is near a click."""
-    params = tuned(Params)
+    params, shared = tuned(Params), tuned(ThingParams)
     members = np.flatnonzero(above)
     at, size = cloud.positions[members], cloud.size_m
     if len(members) == 0:
@@ -124,17 +123,15 @@ def _cut_off(
     area = np.full(len(at), size**2)
     graph = VoxelGraph(at, upright, cloud.lab[members], area, touching(flat, span), np.zeros(0, np.int64), size)
     seeds = [graph.nearest(point) for point in positives]
-    seeds = [
-        seed for seed, point in zip(seeds, positives, strict=True) if np.linalg.norm(at[seed] - point) < params.near_click_m
-    ]
+    near = np.linalg.norm(at[seeds] - positives, axis=1) < shared.seed_m
+    seeds = [seed for seed, is_near in zip(seeds, near, strict=True) if is_near]
     if not seeds:
         return None
     refused = [voxel for voxel in (graph.nearest(point) for point in negatives) if voxel not in seeds]
     others = _large_levels(levels, positives, cloud)[members]
     for plane in structure:
-        others |= (np.abs((at - plane.world_from_plane.translation) @ plane.outward) < params.off_wall_m) & plane.supports(
-            at, 0.10
-        )
+        on_plane = np.abs((at - plane.world_from_plane.translation) @ plane.outward) < shared.off_wall_m
+        others |= on_plane & plane.supports(at, 0.10)
     others[seeds] = False
     chosen, _ = cut(graph, seeds, refused, config.radius_m, others, gap_m=params.gap_m, upright=True)
     on = np.zeros(len(above), bool)
@@ -199,7 +196,7 @@ def _slab_at(levels: np.ndarray, positives: Points, low: np.ndarray, size: float
     from scipy import ndimage
 
     params = tuned(Params)
-    reach = int(np.ceil(params.near_click_m / size))
+    reach = int(np.ceil(tuned(ThingParams).seed_m / size))
     votes: list[int] = []
     for point in positives:
         at = np.clip(np.floor((point - low) / size).astype(int), 0, np.array(levels.shape) - 1)

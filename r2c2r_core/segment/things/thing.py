@@ -4,11 +4,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 
+import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Colours, Faces, Mask, Points, Vector3
 from r2c2r_core.geometry.camera import project, ray_slopes
 from r2c2r_core.geometry.fusion import DepthView, fuse_depth
+from r2c2r_core.geometry.graphs import components
 from r2c2r_core.geometry.raster import rasterize, subdivide_long_edges
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.kitchen.category import Category
@@ -21,8 +23,6 @@ from r2c2r_core.segment.things.boxes import box_of
 from r2c2r_core.segment.things.min_cut import VoxelGraph, build_graph, cut
 from r2c2r_core.segment.things.pixel_cut import ColourModel
 from r2c2r_core.tuning import param, tuned
-
-_UNDERSIDE_M = 0.05  # longest edge of the triangles of an underside that was not seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +59,7 @@ class Params:
     )
     surface_margin_m: float = param(0.15, "m", "Margin added to that search radius")
     seed_m: float = param(0.12, "m", "Maximum distance from a click to the surface it selects")
+    off_wall_m: float = param(0.03, "m", "Maximum distance from a wall of points that belong to the wall")
     cell: float = param(0.125, "ratio", "Voxel size of the cut relative to the object's radius", gt=0)
     cells_m: tuple[float, float] = param((0.006, 0.025), "m", "Minimum and maximum voxel size of the cut")
     flat_cos: float = param(0.93, "cosine", "Minimum cosine between a normal and up for large level parts")
@@ -124,11 +125,6 @@ class Thing:
     colours: ColourModel | None = None  # learned from confident pixels
     clicks: tuple[PromptPoint, ...] = ()  # corrections of single pixels, valid in their own frames
 
-    @property
-    def points(self) -> Points:
-        """Vertices of the surface."""
-        return self.vertices
-
 
 def find_thing(
     scene: Scene, positives: Points, negatives: Points, config: ThingConfig, *, voxel_m: float | None = None
@@ -152,8 +148,7 @@ def find_thing(
     seeds = [graph.nearest(point) for point in positives]
     if np.linalg.norm(graph.positions[seeds] - positives, axis=1).min() > params.seed_m:
         return None
-    refused = [graph.nearest(point) for point in negatives]
-    refused = [voxel for voxel in refused if voxel not in seeds]
+    refused = [voxel for voxel in (graph.nearest(point) for point in negatives) if voxel not in seeds]
     gap_m = params.furniture_gap_m if config.on_floor else config.solid_gap_m
     around_m = config.radius_m * (2 if config.solid_gap_m else 1)  # a part may be as far as the whole is long
     solid = partial(_solid, scene) if config.solid_gap_m else None
@@ -166,13 +161,14 @@ def find_thing(
 def closed_below(thing: Thing, scene: Scene, config: ThingConfig) -> Thing:
     """Hood with its underside, from its front to the wall behind: it is dark, and depth seldom shows it."""
     room, cameras = scene.capture.room, [frame.world_from_camera.translation for frame in scene.frames]
-    box = box_of(thing.points, None, room.manhattan_yaw_rad, np.mean(cameras, axis=0))
+    box = box_of(thing.vertices, None, room.manhattan_yaw_rad, np.mean(cameras, axis=0))
     (width, depth, height), place = box.dimensions_m, box.world_from_object
     front = place.apply(np.array([[0.0, -depth / 2, 0.0]]))[0]
     walls = [behind for behind in distances_behind(room.walls, front, -place.rotation[:, 1]) if 0 < behind < config.radius_m]
     back = max([*walls[:1], depth]) - depth / 2
     corners = np.array([[x, y, -height / 2] for x, y in product((-width / 2, width / 2), (-depth / 2, back))])
-    below, faces, _ = subdivide_long_edges(place.apply(corners), np.array([[0, 1, 2], [1, 3, 2]]), corners, _UNDERSIDE_M)
+    largest_m = tuned(Params).cells_m[1]
+    below, faces, _ = subdivide_long_edges(place.apply(corners), np.array([[0, 1, 2], [1, 3, 2]]), corners, largest_m)
     vertices = np.concatenate([thing.vertices, below])
     return replace(thing, vertices=vertices, faces=np.concatenate([thing.faces, faces + len(thing.vertices)]))
 
@@ -190,8 +186,6 @@ def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True)
     projected = model > 0
     if projected.sum() < 12:
         return np.zeros((size[1], size[0]), bool), 0.0
-    import cv2
-
     depth = cv2.resize(scene.filled_depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
     hidden = projected & scene.noise.occluded(depth, model, tuned(Params).before_m)
     sensor = cv2.resize(scene.depth(frame.index), (small.width, small.height), interpolation=cv2.INTER_NEAREST)
@@ -202,9 +196,7 @@ def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True)
     mask = cv2.resize(shown, size, interpolation=cv2.INTER_LINEAR) > 0
     if not mask.any():
         return mask, 0.0
-    if not refine:
-        return mask, share
-    return _refined(mask, scene, frame), share
+    return (_refined(mask, scene, frame) if refine else mask), share
 
 
 def _refined(mask: Mask, scene: Scene, frame: Frame) -> Mask:
@@ -286,23 +278,14 @@ def _over_bins(profile: np.ndarray) -> np.ndarray:
 def structure_of(graph: VoxelGraph, seeds: list[int]) -> np.ndarray:
     """Mask of the voxels on large flat parts (walls, worktops, table tops) without a click."""
     params, background = tuned(Params), np.zeros(len(graph.positions), bool)
-    for axis in ("level", "upright"):
-        upward = np.abs(graph.normals[:, 2])
-        flat = upward > params.flat_cos if axis == "level" else upward < params.upright_cos
-        a, b = graph.edges.T
-        parallel = np.einsum("nk,nk->n", graph.normals[a], graph.normals[b]) > params.parallel_cos
-        off = np.abs(np.einsum("nk,nk->n", graph.positions[b] - graph.positions[a], graph.normals[a]))
-        step = off < params.step_cells * graph.size_m
-        link = flat[a] & flat[b] & parallel & step
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
-        count = len(flat)
-        _, labels = connected_components(
-            coo_matrix((np.ones(int(link.sum())), (a[link], b[link])), shape=(count, count)), directed=False
-        )
-        areas = np.bincount(labels, graph.area_m2)
-        large = areas[labels] > params.structure_m2
+    a, b = graph.edges.T
+    off = np.abs(np.einsum("nk,nk->n", graph.positions[b] - graph.positions[a], graph.normals[a]))
+    parallel = np.einsum("nk,nk->n", graph.normals[a], graph.normals[b]) > params.parallel_cos
+    smooth = parallel & (off < params.step_cells * graph.size_m)
+    upward = np.abs(graph.normals[:, 2])
+    for flat in (upward > params.flat_cos, upward < params.upright_cos):
+        labels = components(len(flat), graph.edges[flat[a] & flat[b] & smooth])
+        large = np.bincount(labels, graph.area_m2)[labels] > params.structure_m2
         background |= large & flat & ~np.isin(labels, labels[seeds])
     return background
 
@@ -354,8 +337,6 @@ def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> 
         inside = (depth > 0) & (away < reach_m**2)
         if inside.sum() < 30:
             continue
-        import cv2
-
         colour = cv2.resize(scene.rgb(index), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
         views.append(DepthView(np.where(inside, depth, 0).astype(np.float32), camera, frame.world_from_camera, colour))
     return views

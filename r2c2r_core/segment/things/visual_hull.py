@@ -14,6 +14,7 @@ from r2c2r_core.segment.things.cylinder import Params as CylinderParams
 from r2c2r_core.segment.things.cylinder import upright_shape
 from r2c2r_core.segment.things.silhouettes import colours_of, crop_outline, usual_shift
 from r2c2r_core.segment.things.support import pose_spread, raised, support_offset
+from r2c2r_core.segment.things.thing import Params as ThingParams
 from r2c2r_core.segment.things.thing import Thing, ThingConfig, support_height
 from r2c2r_core.segment.things.voxels import Voxels, cropped, grown, label_near, mesh_of, part_at, with_headroom
 from r2c2r_core.segment.viewpoints import best_views
@@ -37,7 +38,6 @@ class Params:
         0.05, "m", "Margin around the grid for depth points", source="more than a frame's height offset"
     )
     off_support_m: float = param(0.012, "m", "Maximum height above the support of points that belong to the support")
-    off_wall_m: float = param(0.03, "m", "Maximum distance from a wall of points that belong to the wall")
     depth_slack_m: float = param(0.022, "m", "Error of coarse depth on a curved object, along the line of sight")
     carved_m: float = param(
         0.010,
@@ -239,7 +239,7 @@ def _seen_points(
         inside = ((at >= 0) & (at < shape)).all(axis=1)
         points, at = points[inside], at[inside]
         for plane in structure:
-            off = np.abs((points - plane.world_from_plane.translation) @ plane.outward) > params.off_wall_m
+            off = np.abs((points - plane.world_from_plane.translation) @ plane.outward) > tuned(ThingParams).off_wall_m
             off |= ~plane.supports(points, 0.10)
             points, at = points[off], at[off]
         once = np.unique(at @ [shape[1] * shape[2], shape[2], 1])
