@@ -106,6 +106,11 @@ def refine_border(rgb: Image, mask: Mask, band_px: int, *, within: Mask | None =
     return np.asarray((flood(colour_gradient(rgb), markers, outer) == 1) & outer)
 
 
+def at_size(flags: Mask, mask: Mask) -> Mask:
+    """Flags of the depth image at the size of a mask."""
+    return cv2.resize(flags.astype(np.uint8), mask.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+
+
 def flood(ridges: np.ndarray, markers: np.ndarray, within: Mask | None = None) -> np.ndarray:
     """Watershed labels: marked regions grow over the unmarked (0) pixels of `within` until they meet on the ridges.
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from r2c2r_core.arrays import Mask, Points, Vector3
@@ -19,7 +20,9 @@ from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid, joined
-from r2c2r_core.segment.occlusion import Facet, visible_mask
+from r2c2r_core.segment.motion.board import hand_px, patches_unlike
+from r2c2r_core.segment.occlusion import Facet, at_size, visible_mask
+from r2c2r_core.segment.occlusion import Params as SightParams
 from r2c2r_core.segment.runs.contrast import edge_changes
 from r2c2r_core.segment.runs.parting import parted
 from r2c2r_core.segment.runs.run import Run
@@ -52,7 +55,6 @@ class Params:
     off_plane_m: float = param(
         0.06, "m", "Maximum distance from the plane of a click on the panel", source="handles protrude by up to 5 cm"
     )
-    confirm_m: float = param(0.03, "m", "Maximum distance of depth from a side of the carcass, beyond the noise, to confirm it")
     far_before_m: float = param(
         0.30, "m", "Distance in front of a side beyond which occluders are ignored as no evidence about it"
     )
@@ -164,26 +166,36 @@ def front_mask(front: Front, scene: Scene, frame: Frame, part: Points | None = N
     grid = front.run.grid
     if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.03:
         return np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool), 0.0
+    corners = grid.rectangle(front.cell, front.run.slide_of(frame.index, scene)).corners if part is None else part
+    face, share = visible_mask([Facet(corners)], scene, frame)
+    face = face & ~_before(face, front, scene, frame)
+    return face | sides_mask(front, scene, frame) if part is None else face, share
+
+
+def _before(face: Mask, front: Front, scene: Scene, frame: Frame) -> Mask:
+    """Pixels without depth, of another colour than the front has in most frames: a sleeve, or the black glass of an open door.
+
+    Where no frame has depth on the front, it is black glass itself.
+    """
+    dark, place = (scene.depth(frame.index) == 0).astype(np.uint8), front.outline.centre
+    wide = cv2.erode(dark, np.ones((hand_px(place, frame, frame.depth_camera) // 2,) * 2, np.uint8)) > 0
+    if not (face & at_size(wide, face)).any():
+        return np.zeros_like(face)
     slide = front.run.slide_of(frame.index, scene)
-    if part is not None:
-        return visible_mask([Facet(part)], scene, frame)
-    facets = [Facet(grid.rectangle(front.cell, slide).corners)]
-    return visible_mask([*facets, *_side_facets(front, frame, slide)], scene, frame)
+    usual, seen = (front.run.grid.in_photo(one, frame, slide) for one in (front.run.mosaic, front.run.seen.astype(np.uint8)))
+    usual_lab = cv2.cvtColor(usual, cv2.COLOR_RGB2LAB)
+    return patches_unlike(usual_lab, at_size(dark > 0, face) & (seen > 0), place, scene, frame)
 
 
 def sides_mask(front: Front, scene: Scene, frame: Frame) -> Mask:
     """Visible pixels of the carcass's observed sides alone."""
-    return visible_mask(_side_facets(front, frame, front.run.slide_of(frame.index, scene)), scene, frame)[0]
-
-
-def _side_facets(front: Front, frame: Frame, slide: tuple[float, float]) -> list[Facet]:
-    """Observed sides that face the camera."""
-    face = front.run.grid.rectangle(front.cell, slide)
-    return [
+    face = front.run.grid.rectangle(front.cell, front.run.slide_of(frame.index, scene))
+    facing = [
         Facet(side_corners(face, side, front.depth_m), confirm=True)
         for side in front.sides
         if side_faces(front.outline, side, frame.world_from_camera.translation)
     ]
+    return visible_mask(facing, scene, frame)[0]
 
 
 def depth_behind(front: Front, room: Room, category: Category) -> FrontDepth:
@@ -203,7 +215,7 @@ def seen_sides(front: Front, scene: Scene) -> tuple[HingeSide, ...]:
                 continue
             z, depth, _ = look_up(points, frame.world_from_camera, frame.depth_camera, scene.depth(frame.index))
             known = (depth > 0) & ~scene.noise.occluded(depth, z, params.far_before_m)  # far occluders are no evidence
-            agree += int(scene.noise.agrees(depth, z, params.confirm_m).sum())
+            agree += int(scene.noise.agrees(depth, z, tuned(SightParams).confirm_m).sum())
             total += int(known.sum())
         if total > params.side_samples and agree > params.side_share * total:
             found.append(side)

@@ -92,6 +92,12 @@ class PlaneGrid:
         local[:, 2] += seen.translation
         return camera.matrix @ local
 
+    def in_photo(self, cells: Image, frame: Frame, slide: tuple[float, float]) -> Image:
+        """Image of the grid's cells as a frame with that slide shows the plane; 0 beyond it."""
+        camera, moved = frame.rgb_camera, np.array([[1, 0, -slide[0]], [0, 1, -slide[1]], [0, 0, 1]])
+        homography = _for_opencv(self.pixel_from_cell(frame, camera) @ moved)
+        return np.asarray(cv2.warpPerspective(cells, homography, (camera.width, camera.height)))
+
 
 @dataclass(frozen=True, slots=True)
 class Cell:
@@ -188,7 +194,7 @@ def _view_quality(points: Points, grid: PlaneGrid, frame: Frame, scene: Scene) -
     params = tuned(Params)
     to_camera = frame.world_from_camera.translation - points
     cosine = (to_camera @ grid.outward) / np.linalg.norm(to_camera, axis=1)
-    width, height = _stored_size(scene, frame)
+    height, width = scene.rendered_mm[frame.index].shape
     camera = frame.rgb_camera.resized(width, height)
     local = frame.world_from_camera.inverse.apply(points)
     uv, z = project(local, camera), local[:, 2]
@@ -199,11 +205,6 @@ def _view_quality(points: Points, grid: PlaneGrid, frame: Frame, scene: Scene) -
     column, row = np.floor(grid.cells_of(points)).astype(int).T.clip(0, [[grid.columns - 1], [grid.rows - 1]])
     good &= ~opened_cells(grid, scene, frame)[row, column]
     return np.where(good, cosine * np.sqrt(max(frame.sharpness, 1e-3)) / np.maximum(z, 0.4), 0)
-
-
-def _stored_size(scene: Scene, frame: Frame) -> tuple[int, int]:
-    stored = scene.rendered_mm[frame.index]
-    return stored.shape[1], stored.shape[0]
 
 
 def make_tile(grid: PlaneGrid, scene: Scene, frame_index: int) -> Tile | None:

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from r2c2r_core.arrays import Mask
-from r2c2r_core.geometry.camera import pixel_centres, unproject
+from r2c2r_core.arrays import Mask, Vector3
+from r2c2r_core.geometry.camera import Intrinsics, pixel_centres, unproject
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.motion.leaf import OpenLeaf
-from r2c2r_core.segment.occlusion import Facet, Tolerance, visible_mask
+from r2c2r_core.segment.occlusion import Facet, Tolerance, at_size, visible_mask
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -71,31 +71,40 @@ def _seen(opened: OpenLeaf, scene: Scene, frame: Frame) -> np.ndarray:
 
 
 def _hand_before(mask: Mask, opened: OpenLeaf, seen: np.ndarray, scene: Scene, frame: Frame) -> Mask:
-    """Pixels of an occluding hand: off the leaf by depth, in a patch as wide as a hand whose colour differs from the leaf's.
-
-    A hand on a handle is close in front of the leaf, and shaded skin, gloves and sleeves return no light to a phone's LiDAR:
-    depth alone does not separate them from the leaf.
-    """
+    """Pixels of an occluding hand: off the leaf by depth, and in a patch of another colour than the leaf's."""
     params = tuned(Params)
-    size = (mask.shape[1], mask.shape[0])
     from_behind = float(opened.leaf.world_from_front.inverse.apply(frame.world_from_camera.translation)[1]) > 0
     before = seen[..., 1] - opened.leaf.thickness_m if from_behind else -seen[..., 1]
     on_leaf = (scene.depth(frame.index) > 0) & (before < params.touches_m)
-    told = mask & (cv2.resize(on_leaf.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0)
+    told = mask & at_size(on_leaf, mask)
     if np.count_nonzero(told) < max(params.told_share * np.count_nonzero(mask), 1):
         return np.zeros_like(mask)
-    lab = cv2.cvtColor(scene.rgb(frame.index), cv2.COLOR_RGB2LAB).astype(np.float32)
-    usual = np.median(lab[told], axis=0)
-    light = np.maximum(lab[..., 0], 1.0) / max(float(usual[0]), 1.0)
-    hue = np.abs((lab[..., 1:] - 128.0) - (usual[1:] - 128.0) * light[..., None]).max(axis=2)
-    unlike = (np.abs(np.log(light)) > np.log(params.shade)) | (hue > params.hue_lab)
-    away = float(frame.world_from_camera.inverse.apply(opened.leaf.centre)[2])
-    width = max(int(params.hand_m * frame.rgb_camera.fx / max(away, 0.3)), 3)
-    element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
-    patch = cv2.morphologyEx((unlike & ~told).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    hand = cv2.morphologyEx(patch, cv2.MORPH_OPEN, element) > 0
+    usual_lab = np.median(cv2.cvtColor(scene.rgb(frame.index), cv2.COLOR_RGB2LAB)[told], axis=0)
+    hand = patches_unlike(usual_lab, ~told, opened.leaf.centre, scene, frame)
     covers = np.count_nonzero(hand & mask) < params.hand_share * np.count_nonzero(mask)
     return hand if covers else np.zeros_like(mask)
+
+
+def patches_unlike(usual_lab: np.ndarray, untold: Mask, place: Vector3, scene: Scene, frame: Frame) -> Mask:
+    """Patches of untold pixels, as wide as a hand at a place, that are no shade of a surface's colour (3,) or (h, w, 3) there.
+
+    A hand on a handle is close in front of a front, and shaded skin, gloves, sleeves and black glass return no light to a
+    phone's LiDAR: depth alone does not separate them from it.
+    """
+    params, usual = tuned(Params), usual_lab.astype(np.float32)
+    lab = cv2.cvtColor(scene.rgb(frame.index), cv2.COLOR_RGB2LAB).astype(np.float32)
+    light = np.maximum(lab[..., 0], 1.0) / np.maximum(usual[..., 0], 1.0)
+    hue = np.abs((lab[..., 1:] - 128.0) - (usual[..., 1:] - 128.0) * light[..., None]).max(axis=2)
+    unlike = (np.abs(np.log(light)) > np.log(params.shade)) | (hue > params.hue_lab)
+    element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (hand_px(place, frame, frame.rgb_camera),) * 2)
+    patch = cv2.morphologyEx((unlike & untold).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    return np.asarray(cv2.morphologyEx(patch, cv2.MORPH_OPEN, element) > 0)
+
+
+def hand_px(place: Vector3, frame: Frame, camera: Intrinsics) -> int:
+    """Width of a hand at a place (world) in a frame's image."""
+    away = float(frame.world_from_camera.inverse.apply(place)[2])
+    return max(int(tuned(Params).hand_m * camera.fx / max(away, 0.3)), 3)
 
 
 def _faces(opened: OpenLeaf, frame: Frame) -> list[Facet]:

@@ -8,13 +8,14 @@ from r2c2r_core.geometry.masks import mask_iou
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt
 from r2c2r_core.segment.fronts.found import FoundFront
-from r2c2r_core.segment.fronts.front import front_panel, own_handle
+from r2c2r_core.segment.fronts.front import front_mask, front_panel, own_handle
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.mosaics.handles import GridHandle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, joined
+from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.stage import open_session
 from tests.core.segment.conftest import Truth
-from tests.core.segment.scenes import BOTTOM_M, DOORS, DRAWERS, FRONT_Y, POST, TOP_M, click_on, prompt
+from tests.core.segment.scenes import BOTTOM_M, DOORS, DRAWERS, FRONT_Y, POST, TOP_M, Pixels, click_on, prompt
 
 Boxes = tuple[Capture, Truth]
 
@@ -65,6 +66,26 @@ def test_masks_follow_the_door_in_every_frame_and_exclude_the_post(session: Geom
         assert not mask[int(post.y), int(post.x)]
     assert set(track.masks) == {frame.index for frame in capture.frames}
     assert track.kind == "front"
+
+
+@pytest.mark.parametrize("colour", [15, None])
+def test_what_hides_a_front_without_returning_light_is_known_by_its_colour(
+    session: GeometricSession, boxes: Boxes, colour: int | None
+) -> None:
+    """Black glass of an open oven's door, in one frame; the front itself where the depth image has a mere hole."""
+    capture, truth = boxes
+    found, frame = session.find(prompt("a", "cabinet", click_on(capture, (0.3, FRONT_Y, 0.4), 60))), capture.frame(60)
+    assert isinstance(found, FoundFront)
+    alone, _ = front_mask(found.front, session.scene, frame)
+    before = truth["door_a"][60].copy()
+    before[: int(np.median(np.flatnonzero(before.any(axis=1))))] = False
+    rgb, depth = capture.images.rgb(60).copy(), capture.images.depth(60).metres.copy()
+    depth[before[1::2, 1::2]] = 0.0
+    rgb[before] = rgb[before] if colour is None else colour
+    shown = dataclasses.replace(capture, images=Pixels({60: rgb}, {60: depth}))
+    mask, _ = front_mask(found.front, Scene(shown, session.scene.rendered_mm, session.scene.parts), frame)
+    assert mask[alone & before].mean() == pytest.approx(0.0 if colour else 1.0, abs=0.02)
+    assert mask[alone & ~before].mean() > 0.98
 
 
 def test_a_double_door_is_found_as_one_object_from_one_click(session: GeometricSession, boxes: Boxes) -> None:
