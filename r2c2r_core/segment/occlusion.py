@@ -1,5 +1,6 @@
 """Visibility of a projected surface in one frame: per-pixel depth test, with a colour watershed at an occluder's border."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -8,6 +9,8 @@ import numpy as np
 from r2c2r_core.arrays import Image, Mask, Pixels, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics, project, ray_slopes
 from r2c2r_core.model.capture import Frame
+from r2c2r_core.model.inputs import PromptPoint
+from r2c2r_core.segment.holes import find_hole
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -104,6 +107,28 @@ def refine_border(rgb: Image, mask: Mask, band_px: int, *, within: Mask | None =
     if not (markers == 1).any() or not (markers == 2).any():
         return mask
     return np.asarray((flood(colour_gradient(rgb), markers, outer) == 1) & outer)
+
+
+def seeded(mask: Mask, clicks: Sequence[PromptPoint], scene: Scene, frame: Frame) -> Mask:
+    """Mask with all positive clicks in its frame and no negative one: a watershed grows from those on its wrong side.
+
+    It may reach as far as their own side, and over the hole in the depth image that they lie in, but not past colour edges.
+    """
+    own = [(int(click.x), int(click.y), click) for click in clicks if click.frame == frame.index]
+    wrong = [(x, y, click) for x, y, click in own if mask[y, x] != (click.label == 1)]
+    if not wrong:
+        return mask
+    free = np.zeros(mask.shape, np.uint8)
+    for x, y, click in wrong:
+        others = (mask != (click.label == 1)).astype(np.uint8)
+        away = 0 if others.all() else int(cv2.distanceTransform(others, cv2.DIST_L2, 5)[y, x])
+        cv2.circle(free, (x, y), away + 2, 1, -1)
+        hole = find_hole(frame, scene.depth(frame.index), click.x, click.y)
+        free |= others & at_size(hole, mask) if hole is not None else 0
+    markers = np.where(free > 0, 0, np.where(mask, 1, 2)).astype(np.int32)
+    for x, y, click in own:
+        markers[y, x] = 1 if click.label == 1 else 2
+    return np.asarray(flood(colour_gradient(scene.rgb(frame.index)), markers) == 1)
 
 
 def at_size(flags: Mask, mask: Mask) -> Mask:

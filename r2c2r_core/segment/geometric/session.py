@@ -34,6 +34,7 @@ from r2c2r_core.segment.fronts.front import holds
 from r2c2r_core.segment.geometric.cache import kept
 from r2c2r_core.segment.geometric.finders import find_drawn, find_object, find_painted_object, glimpse_object
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid
+from r2c2r_core.segment.occlusion import seeded
 from r2c2r_core.segment.planes import PlaneRegion, find_planes
 from r2c2r_core.segment.prepared import Hits
 from r2c2r_core.segment.prompts import check_prompt
@@ -81,7 +82,7 @@ class GeometricSession:
                 f"{prompt.name}: frame {frame_index} found, a frame of {min(known)}..{max(known)} expected",
                 hint="choose another",
             )
-        return self.find(prompt).see(self.scene.frame(frame_index)).mask
+        return self._view(self.find(prompt), prompt, self.scene.frame(frame_index)).mask
 
     def glimpse(self, prompt: ObjectPrompt) -> Glimpse | None:
         """Preview mask in the frame clicked last, as in `stream`; approximate for free-standing objects and appliances."""
@@ -91,7 +92,7 @@ class GeometricSession:
         known = self._found.get(whole) or glimpse_object(self, whole, *self._clicked(prompt)) or self.find(whole)
         found = self._within(known, prompt)
         frame = self.scene.frame(prompt.points[-1].frame)
-        view = found.see(frame)
+        view = self._view(found, prompt, frame)
         return (frame.index, pack_mask(view.mask), view.trust) if self._shows(view) else None
 
     def prefetch(self) -> Iterator[None]:
@@ -238,10 +239,16 @@ class GeometricSession:
         """Frames that show the object, the one clicked last first, then outwards both ways."""
         found = self.find(prompt)
         first = prompt.points[-1].frame if prompt.points else self.scene.frames[0].index
-        for frame in _outwards(self.scene.frames, first):
-            view = found.see(frame)
+        for frame in sorted(self.scene.frames, key=lambda frame: (abs(frame.index - first), frame.index)):
+            view = self._view(found, prompt, frame)
             if self._shows(view):
                 yield frame.index, view
+
+    def _view(self, found: Found, prompt: ObjectPrompt, frame: Frame) -> View:
+        """Pixels of an object in a frame; what was clicked on or off a thing there always holds, but within its crop box."""
+        view = found.see(frame)
+        holds = found.kind == "thing" and prompt.crop is None
+        return replace(view, mask=seeded(view.mask, prompt.points, self.scene, frame)) if holds else view
 
     def _shows(self, view: View) -> bool:
         return bool(np.count_nonzero(view.mask) >= self.config.least_area_px)
@@ -271,20 +278,11 @@ class GeometricSession:
                 points.append(point)
             elif label == 1 and category.kind != "appliance":
                 raise PromptError(
-                    _hit_nothing(prompt, click), hint="click where the object is nearer or less glossy, or in another frame"
+                    f"{prompt.name}: the click at ({click.x:g}, {click.y:g}) on frame {click.frame} hits no surface, "
+                    "a point with depth expected",
+                    hint="click where the object is nearer or less glossy, or in another frame",
                 )
         return Hits(tuple(clicks), np.array(points).reshape(-1, 3))
-
-
-def _hit_nothing(prompt: ObjectPrompt, click: PromptPoint) -> str:
-    return (
-        f"{prompt.name}: the click at ({click.x:g}, {click.y:g}) on frame {click.frame} hits no surface, "
-        "a point with depth expected"
-    )
-
-
-def _outwards(frames: tuple[Frame, ...], start: int) -> list[Frame]:
-    return sorted(frames, key=lambda frame: (abs(frame.index - start), frame.index))
 
 
 def _forget_others(folder: Path) -> None:

@@ -3,10 +3,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from r2c2r_core.arrays import Mask
 from r2c2r_core.errors import ObjectNotSeen, PromptError
 from r2c2r_core.geometry.masks import mask_iou, unpack_mask
-from r2c2r_core.model.capture import Capture
+from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.model.inputs import PromptPoint
+from r2c2r_core.segment.found import View
 from r2c2r_core.segment.geometric.finders import _on_thing
 from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.scene import Scene
@@ -89,3 +91,31 @@ def test_a_nonexistent_frame_is_rejected(session: GeometricSession, boxes: Boxes
     door = prompt("door_a", "cabinet", click_on(boxes[0], (0.3, FRONT_Y, 0.4), 60))
     with pytest.raises(PromptError, match=r"door_a: frame 7 found, a frame of 0\.\.130 expected"):
         session.mask_at(door, 7)
+
+
+def test_clicks_without_depth_are_in_the_mask_or_out_of_it_as_said(session: GeometricSession, boxes: Boxes) -> None:
+    """The carton's upper half is black and returns no light in the clicked frame, and was not found."""
+    capture, truth = boxes
+    first, on, off = (click_on(capture, (1.06, -0.36, z), 60) for z in (0.95, 1.06, 0.92))
+    shown, black = truth["carton"][60], truth["carton"][60].copy()
+    black[int((first.y + on.y) / 2) :] = False
+    rgb, depth = capture.images.rgb(60).copy(), capture.images.depth(60).metres.copy()
+    rgb[black], depth[black[1::2, 1::2]] = 15, 0.0
+    scene = Scene(dataclasses.replace(capture, images=Pixels({60: rgb}, {60: depth})), {}, session.scene.parts)
+
+    def mask(*clicks: PromptPoint) -> Mask:
+        said = prompt("carton", "box", *clicks)
+        return dataclasses.replace(session, scene=scene, _found={said: HalfFound(shown & ~black)}).mask_at(said, 60)
+
+    assert mask_iou(mask(first, on), shown) > 0.95
+    cut = mask(first, on, dataclasses.replace(off, label=0))
+    assert (cut[int(on.y), int(on.x)], cut[int(off.y), int(off.x)]) == (True, False)
+
+
+@dataclasses.dataclass(frozen=True)
+class HalfFound:
+    half: Mask
+    kind = "thing"
+
+    def see(self, frame: Frame) -> View:
+        return View(self.half, 1.0)
