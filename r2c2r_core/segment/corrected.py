@@ -27,7 +27,7 @@ def corrected_track(track: MaskTrack, said: tuple[FrameSaid, ...]) -> MaskTrack:
         return track
     size = next(iter(track.masks.values()))
     numbers = {one.frame for one in said}
-    painted = {one.frame: _at_size(one.mask, size) for one in said if one.mask is not None}
+    painted = {one.frame: pack_mask(_resized(one.mask, size)) for one in said if one.mask is not None}
     masks = {frame: mask for frame, mask in track.masks.items() if frame not in numbers} | painted
     if not masks:
         raise ObjectNotSeen(
@@ -53,13 +53,6 @@ def corrected_stream(found: Iterator[Glimpse], said: tuple[FrameSaid, ...]) -> I
     for glimpse in found:
         if glimpse[0] not in numbers:
             yield glimpse
-
-
-def _at_size(mask: PackedMask, size: PackedMask) -> PackedMask:
-    """Mask resized to the frames' size."""
-    if (mask.width, mask.height) == (size.width, size.height):
-        return mask
-    return pack_mask(_resized(mask, size))
 
 
 def _resized(mask: PackedMask, size: PackedMask | Intrinsics) -> Mask:

@@ -57,10 +57,15 @@ def find_rim(frame: Frame, depth_m: DepthMetres, x_px: float, y_px: float) -> Ri
     if hole is None:
         return None
     wide = cv2.dilate(hole.astype(np.uint8), np.ones((about_px, about_px), np.uint8)) > 0
-    rows, columns = np.nonzero(wide & ~hole & (depth_m > 0))
+    return measured(frame, depth_m, wide & ~hole, _depth_pixel(frame, depth_m, x_px, y_px))
+
+
+def measured(frame: Frame, depth_m: DepthMetres, part: Mask, at: tuple[int, int]) -> Rim:
+    """Depth in a part of a frame's depth image, as around a pixel of it."""
+    rows, columns = np.nonzero(part & (depth_m > 0))
     pixels = np.stack([columns, rows], axis=1)
     seen = unproject(pixels + 0.5, depth_m[rows, columns].astype(np.float64), frame.depth_camera)
-    return Rim(_depth_pixel(frame, depth_m, x_px, y_px), pixels, frame.world_from_camera.apply(seen))
+    return Rim(at, pixels, frame.world_from_camera.apply(seen))
 
 
 def _depth_pixel(frame: Frame, depth_m: DepthMetres, x_px: float, y_px: float) -> tuple[int, int]:

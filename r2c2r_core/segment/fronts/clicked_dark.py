@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from r2c2r_core.arrays import Mask, Points, Vector3
-from r2c2r_core.geometry.camera import project, unproject
+from r2c2r_core.geometry.camera import project, sample_through, unproject
 from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import PromptPoint
-from r2c2r_core.segment.holes import Rim, find_hole, find_rim
+from r2c2r_core.segment.holes import Rim, find_hole, find_rim, measured
 from r2c2r_core.segment.planes import PlaneRegion, region_along
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.viewpoints import best_views
@@ -53,6 +53,16 @@ def dark_place(scene: Scene, planes: Sequence[PlaneRegion], click: PromptPoint) 
         if met is not None:
             best, place = share, met[1]
     return place
+
+
+def framing_plane(scene: Scene, planes: Sequence[PlaneRegion], frame: Frame, mask: Mask) -> PlaneRegion | None:
+    """Plane nearest to the camera with enough of a mask's depth, on all sides: a glazed door's frame, not the board behind."""
+    within, inside = sample_through(mask, frame.rgb_camera, frame.depth_camera)
+    row, column = np.argwhere(within & inside).mean(axis=0).astype(int).tolist() if within.any() else (0, 0)
+    rim, camera = measured(frame, scene.depth(frame.index), within & inside, (column, row)), frame.world_from_camera.translation
+    away = [((camera - region.world_from_plane.translation) @ region.outward, region) for region in planes]
+    held = [(metres, region) for metres, region in away if metres > 0 and _share_on(region, rim) > 0]
+    return min(held, key=lambda pair: pair[0])[1] if held else None
 
 
 def _share_on(region: PlaneRegion, rim: Rim) -> float:

@@ -15,13 +15,14 @@ from r2c2r_core.segment.appliances.find import appliance_front
 from r2c2r_core.segment.appliances.fit import FittedBox, fit_box
 from r2c2r_core.segment.appliances.found import FoundAppliance
 from r2c2r_core.segment.found import Found
-from r2c2r_core.segment.fronts.clicked_dark import best_frames, dark_beyond, dark_frames, dark_place
+from r2c2r_core.segment.fronts.clicked_dark import best_frames, dark_beyond, dark_frames, dark_place, framing_plane
 from r2c2r_core.segment.fronts.clicked_open import closed_place, was_moved
 from r2c2r_core.segment.fronts.drawer_at import drawer_at
 from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front, painted_front
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, find_front, seen_sides
 from r2c2r_core.segment.fronts.sliding import sliding_chance
+from r2c2r_core.segment.mosaics.orthomosaic import make_grid
 from r2c2r_core.segment.motion.carried import drawer_boards, drawer_floor, seen_from_drawer
 from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
 from r2c2r_core.segment.prepared import Hits, PreparedCapture
@@ -115,7 +116,10 @@ def find_painted_object(
             return clicked
     if isinstance(clicked, FoundFront | FoundAppliance):
         for index, mask in painted.items():
-            drawn = painted_front(mask, clicked.front.run.grid, scene.frame(index), scene.capture.world_from_capture)
+            plane, grid = framing_plane(scene, prepared.planes, scene.frame(index), mask), clicked.front.run.grid
+            if plane is not None and region_at((plane,), clicked.front.outline.centre) is None:
+                grid = make_grid(plane, prepared.config.cell_m)  # the clicks went through the glass of a door
+            drawn = painted_front(mask, grid, scene.frame(index), scene.capture.world_from_capture)
             if drawn is not None:
                 return find_drawn(prepared, prompt, drawn, category)
         if category.kind == "front":

@@ -202,10 +202,7 @@ def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True)
 def _refined(mask: Mask, scene: Scene, frame: Frame) -> Mask:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     pad = 24
-    area = (
-        slice(max(rows[0] - pad, 0), rows[-1] + pad + 1),
-        slice(max(columns[0] - pad, 0), columns[-1] + pad + 1),
-    )
+    area = tuple(slice(max(ends[0] - pad, 0), ends[-1] + pad + 1) for ends in (rows, columns))
     band = int(np.clip(np.sqrt(mask.sum()) / 10, 2, max(4, frame.rgb_camera.width / 110)))
     result = np.zeros_like(mask)
     result[area] = refine_border(scene.rgb(frame.index)[area], mask[area], band)

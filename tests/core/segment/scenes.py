@@ -165,6 +165,38 @@ def hood() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
     return _filmed("hood", poses, [_packed(boxes, ["hood", "cabinet"])] * len(poses), (wall,))
 
 
+GLAZED_M = (0.333, 0.33, 0.6, 1.0)
+"""Left edge, width, bottom and height of a glazed door."""
+GLAZED_Y = -0.35
+
+
+@cache
+def glazed() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
+    """Two wall-cabinet doors of two clear panes each between plain ones; no depth and no colour is the glass's own."""
+    (left, wide, low, tall), y, white, wood = GLAZED_M, GLAZED_Y, (205, 204, 198), (140, 120, 95)
+    high, rail = low + tall, 0.05
+    boxes: list[Named] = [
+        ((-1.5, 0.0, 0.0), (2.0, 0.02, 2.4), (150, 160, 170), None),  # wall
+        ((-0.45, y + 0.02, low), (0.0, 0.0, high), (25, 24, 22), None),
+        ((-0.448, y, low), (-0.003, y + 0.018, high), white, "plain"),
+        ((0.664, y + 0.02, low), (1.1, 0.0, high), (25, 24, 22), None),
+        ((0.667, y, low), (1.1, y + 0.018, high), white, None),
+        ((0.0, -0.03, low), (0.664, 0.0, high), wood, None),  # rear board
+        ((0.0, y + 0.02, low - 0.018), (0.664, 0.0, low), wood, None),
+        ((0.0, y + 0.02, high), (0.664, 0.0, high + 0.018), wood, None),
+        ((0.0, y + 0.06, 1.25), (0.664, 0.0, 1.268), (160, 140, 110), None),  # shelf
+    ]
+    for x in (0.0, left):
+        sides = [(x, x + rail, low, high), (x + wide - rail, x + wide, low, high)]
+        levels = [(z, z + height) for z, height in ((low, rail), (high - rail, rail), ((low + high) / 2 - 0.012, 0.024))]
+        sides += [(x + rail, x + wide - rail, *ends) for ends in levels]
+        boxes += [((a, y, c), (b, y + 0.018, d), white, "glazed" if x else None) for a, b, c, d in sides]
+    eyes = [np.array([x, -1.9 + 0.2 * abs(x), 1.2 + 0.2 * np.cos(5 * x)]) for x in np.linspace(-0.7, 1.3, 14)]
+    poses = [look_at(eye, np.array([0.3 + 0.2 * eye[0], y, 1.1])) for eye in eyes]
+    wall = Wall(normal=np.array([0.0, -1.0, 0.0]), offset_m=0.0, area_m2=4.0)
+    return _filmed("glazed", poses, [_packed(boxes, ["plain", "glazed"])] * len(poses), (wall,))
+
+
 BOTTLE = (0.10, -0.35)
 """Plan of the bottle's axis."""
 BOTTLE_PROFILE = ((0.04, 0.0), (0.04, 0.16), (0.014, 0.19), (0.014, 0.215))

@@ -16,7 +16,7 @@ from r2c2r_core.segment.geometric.session import GeometricSession
 from r2c2r_core.segment.occlusion import fill_polygon
 from r2c2r_core.segment.stage import open_session, track_object
 from tests.core.segment.conftest import Filmed, Truth
-from tests.core.segment.scenes import FRONT_Y, HOOD_CANOPY, HOOD_CHIMNEY, click_on, hood, prompt
+from tests.core.segment.scenes import FRONT_Y, GLAZED_M, GLAZED_Y, HOOD_CANOPY, HOOD_CHIMNEY, click_on, glazed, hood, prompt
 from tests.core.segment.test_scene import HOB_HIGH, HOB_LOW, TABLE_M, with_hob
 
 Boxes = tuple[Capture, Truth]
@@ -26,6 +26,12 @@ Boxes = tuple[Capture, Truth]
 def kitchen_hood(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
     capture, truth = hood()
     return capture, truth, open_session(capture, tmp_path_factory.mktemp("hood"))
+
+
+@pytest.fixture(scope="module")
+def glass(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
+    capture, truth = glazed()
+    return capture, truth, open_session(capture, tmp_path_factory.mktemp("glass"))
 
 
 def painted(found: ObjectPrompt, frame: int, mask: Mask) -> ObjectPrompt:
@@ -81,6 +87,21 @@ def test_a_painted_mask_that_trims_a_front_leaves_the_other_frames_alone(session
     capture, truth = boxes
     clicked = prompt("door_b", "cabinet", click_on(capture, (0.9, FRONT_Y, 0.4), 60))
     assert session.find(painted(clicked, 60, truth["door_b"][60])) is session.find(clicked)
+
+
+@pytest.mark.parametrize("height_m", [0.85, 1.4])
+def test_a_rectangle_painted_round_a_glazed_door_is_the_door_though_the_click_went_through_its_glass(
+    glass: Filmed, height_m: float
+) -> None:
+    capture, _, session = glass
+    left, width, bottom, height = GLAZED_M
+    right, top = left + width, bottom + height
+    corners = np.array([[x, GLAZED_Y, z] for x, z in ((left, top), (right, top), (right, bottom), (left, bottom))])
+    clicked = prompt("door", "wall cabinet", click_on(capture, (left + width / 2, GLAZED_Y, height_m), 60))
+    panel = session.find(painted(clicked, 60, outlined(capture, corners, 60))).panel()
+    assert panel is not None
+    assert (panel.width_m, panel.height_m) == pytest.approx((width, height), abs=0.01)  # a pixel at 1.6 m, on either side
+    np.testing.assert_allclose(panel.world_from_front.translation, corners.mean(axis=0), atol=0.01)
 
 
 def outlined(capture: Capture, corners: np.ndarray, frame_index: int) -> Mask:
