@@ -21,7 +21,7 @@ from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid, joined
 from r2c2r_core.segment.motion.board import hand_px, patches_unlike
-from r2c2r_core.segment.occlusion import Facet, at_size, visible_mask
+from r2c2r_core.segment.occlusion import Facet, Tolerance, at_size, visible_mask
 from r2c2r_core.segment.occlusion import Params as SightParams
 from r2c2r_core.segment.runs.contrast import edge_changes
 from r2c2r_core.segment.runs.parting import parted
@@ -166,8 +166,13 @@ def front_mask(front: Front, scene: Scene, frame: Frame, part: Points | None = N
     grid = front.run.grid
     if (frame.world_from_camera.translation - grid.world_from_plane.translation) @ grid.outward < 0.03:
         return np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool), 0.0
-    corners = grid.rectangle(front.cell, front.run.slide_of(frame.index, scene)).corners if part is None else part
+    slide, cell = front.run.slide_of(frame.index, scene), front.cell
+    panes = front.run.panes[max(round(cell.top), 0) : round(cell.bottom), max(round(cell.left), 0) : round(cell.right)]
+    corners = grid.rectangle(cell, slide).corners if part is None else part
     face, share = visible_mask([Facet(corners)], scene, frame)
+    if panes.any():
+        through, share = visible_mask([Facet(corners)], scene, frame, Tolerance(behind_m=np.inf))
+        face |= through & (grid.in_photo(front.run.panes.astype(np.uint8), frame, slide) > 0)
     face = face & ~_before(face, front, scene, frame)
     return face | sides_mask(front, scene, frame) if part is None else face, share
 

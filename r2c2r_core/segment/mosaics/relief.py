@@ -75,7 +75,7 @@ class Relief:
         """Ends and steps of the plane, as z-scores 0..6 on (blocks, positions) of the grid, like colour evidence."""
         params = tuned(Params)
         points = self.count * (1 - self.raised)
-        framed = np.where(self._glazed(), np.median(points[points > 0]) if points.any() else 0.0, points)
+        framed = np.where(self.glazed(), np.median(points[points > 0]) if points.any() else 0.0, points)
         whole, flat, raised, depth = (
             self._blocks(_box_mean(values, 1), axis, block, columns, rows)
             for values in (framed, points, self.count * self.raised, points * self.level_m)
@@ -94,7 +94,7 @@ class Relief:
         step = 6 * np.clip((back - params.sunk_m) / (params.board_m - params.sunk_m), 0, 1)
         return Edges(ends=_widened(ends, reach), within=_widened([*panes, (step, back)], reach))
 
-    def _glazed(self) -> np.ndarray:
+    def glazed(self) -> np.ndarray:
         """Mask of the cells of enclosed holes in the plane as large as a pane: glass in a frame, or a niche."""
         params = tuned(Params)
         hole = (~self.on_plane()).astype(np.uint8)

@@ -75,8 +75,7 @@ def _hand_before(mask: Mask, opened: OpenLeaf, seen: np.ndarray, scene: Scene, f
     params = tuned(Params)
     from_behind = float(opened.leaf.world_from_front.inverse.apply(frame.world_from_camera.translation)[1]) > 0
     before = seen[..., 1] - opened.leaf.thickness_m if from_behind else -seen[..., 1]
-    on_leaf = (scene.depth(frame.index) > 0) & (before < params.touches_m)
-    told = mask & at_size(on_leaf, mask)
+    told = mask & at_size((scene.depth(frame.index) > 0) & (before < params.touches_m), mask)
     if np.count_nonzero(told) < max(params.told_share * np.count_nonzero(mask), 1):
         return np.zeros_like(mask)
     usual_lab = np.median(cv2.cvtColor(scene.rgb(frame.index), cv2.COLOR_RGB2LAB)[told], axis=0)

@@ -57,6 +57,7 @@ class Run:
     seams: PanelOdds  # log-odds of the network alone
     odds: PanelOdds  # with lines and depth evidence
     seen: np.ndarray  # grid cells the scan has depth for
+    panes: np.ndarray  # grid cells of glass in a frame
     cells: tuple[Cell, ...]
     handles: tuple[GridHandle | None, ...]  # one a cell
     poses_agree: bool
@@ -128,12 +129,12 @@ def run_on(
         contrast = Contrast(as_lab(mosaic)[0][..., 0])
         inset = inset_fronts(contrast, relief, odds, cut, grid.cell_m)
         cells = tuple(whole_frames(odds, inset, grid.cell_m, (vertical, horizontal), contrast, relief))
-    seen = cv2.resize(relief.on_plane().astype(np.uint8), None, fx=STEP, fy=STEP, interpolation=cv2.INTER_NEAREST) > 0
+    flags = relief.on_plane(), relief.glazed()
+    seen, panes = (each.repeat(STEP, axis=0).repeat(STEP, axis=1)[: grid.rows, : grid.columns] for each in flags)
     handles = tuple(find_handle(odds, relief, cell) for cell in cells)
     slides = {tile.frame_index: tile.shift for tile in tiles}
-    seen = seen[: grid.rows, : grid.columns]
     levels = vertical, horizontal
-    return Run(region, grid, roll_rad, *levels, mosaic, relief, seams, odds, seen, cells, handles, poses_agree, slides)
+    return Run(region, grid, roll_rad, *levels, mosaic, relief, seams, odds, seen, panes, cells, handles, poses_agree, slides)
 
 
 class _Views:

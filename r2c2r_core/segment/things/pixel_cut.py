@@ -70,7 +70,6 @@ def cut_pixels(rgb: Image, odds: np.ndarray, largest_px: int | None = None) -> M
 
 
 def _min_cut(rgb: Image, odds: np.ndarray) -> Mask:
-    params = tuned(Params)
     node = np.arange(odds.size).reshape(odds.shape)
     lab = cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB).astype(np.float32)
     pairs: list[tuple[np.ndarray, np.ndarray, float]] = [(node[:, :-1], node[:, 1:], 1.0), (node[:-1], node[1:], 1.0)]
@@ -78,7 +77,7 @@ def _min_cut(rgb: Image, odds: np.ndarray) -> Mask:
     flat = lab.reshape(-1, 3)
     steps = [((flat[a.ravel()] - flat[b.ravel()]) ** 2).sum(axis=1) for a, b, _ in pairs]
     usual = 2 * float(np.mean(np.concatenate(steps[:2]))) + 1e-6
-    weights = [params.smooth * w * (np.exp(-step / usual) + 0.04) for step, (_, _, w) in zip(steps, pairs, strict=True)]
+    weights = [tuned(Params).smooth * w * (np.exp(-step / usual) + 0.04) for step, (_, _, w) in zip(steps, pairs, strict=True)]
     a = np.concatenate([first.ravel() for first, _, _ in pairs])
     b = np.concatenate([second.ravel() for _, second, _ in pairs])
     weight = np.concatenate(weights)

@@ -102,6 +102,13 @@ def test_a_rectangle_painted_round_a_glazed_door_is_the_door_though_the_click_we
     assert panel is not None
     assert (panel.width_m, panel.height_m) == pytest.approx((width, height), abs=0.01)  # a pixel at 1.6 m, on either side
     np.testing.assert_allclose(panel.world_from_front.translation, corners.mean(axis=0), atol=0.01)
+    for frame in (0, 60, 130):  # the panes are the door's, whatever is seen through them
+        assert (
+            mask_iou(
+                session.mask_at(painted(clicked, 60, outlined(capture, corners, 60)), frame), outlined(capture, corners, frame)
+            )
+            > 0.9
+        )
 
 
 def outlined(capture: Capture, corners: np.ndarray, frame_index: int) -> Mask:
