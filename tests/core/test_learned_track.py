@@ -14,10 +14,8 @@ from r2c2r_core.segment.learned.session import LearnedSession
 from r2c2r_core.segment.stage import SegmentConfig
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from r2c2r_core.warp.stage import WarpConfig, fit_meshes
-from tests.core.segment.scenes import DRAWERS, FRONT_Y, click_on, kitchen, prompt
-
-pytest.importorskip("torch")
 from tests.core.segment.learned.test_session import TrueMasks
+from tests.core.segment.scenes import DRAWERS, FRONT_Y, click_on, kitchen, prompt
 
 QUICK = AlignConfig(views=4, match_photos=1, match_views=8, settled=12, refined=2)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch")
+torch = pytest.importorskip("torch", reason="no torch: pip install --group learned")
 transformers = pytest.importorskip("transformers")
 
 import r2c2r_core.align.glue as glue  # noqa: E402  # after the skips
@@ -14,6 +14,8 @@ from r2c2r_core.align.superglue import SuperGlueMatcher  # noqa: E402
 from r2c2r_core.errors import BackendUnavailable  # noqa: E402
 from r2c2r_core.geometry.meshes import distances_to_mesh  # noqa: E402
 from r2c2r_core.tuning import tuning  # noqa: E402
+
+pytestmark = pytest.mark.slow  # torch is large: `make test` does not install it
 
 torch.set_num_threads(1)
 DETECTOR = transformers.SuperPointConfig(

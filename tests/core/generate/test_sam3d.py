@@ -10,13 +10,15 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-torch = pytest.importorskip("torch")
+torch = pytest.importorskip("torch", reason="no torch: pip install --group learned")
 
 from r2c2r_core.errors import BackendUnavailable, GenerationFailed  # noqa: E402  # after the skip
 from r2c2r_core.generate import repair, sam3d  # noqa: E402
 from r2c2r_core.generate.evidence import gather_evidence  # noqa: E402
 from r2c2r_core.geometry.meshes import box_mesh, is_watertight  # noqa: E402
 from r2c2r_core.tuning import tuning  # noqa: E402
+
+pytestmark = pytest.mark.slow  # torch is large: `make test` does not install it
 
 LOW, HIGH = np.array([-0.23, 0.0, 0.9]), np.array([0.23, 0.34, 1.18])  # the scene's microwave, in world coordinates
 SCALE, TURN, SHIFT = 0.6, Rotation.from_euler("xyz", [0.3, -0.8, 1.2]), np.array([0.1, -0.2, 1.3])

@@ -10,18 +10,12 @@ import pytest
 from r2c2r_core.errors import BackendUnavailable
 from r2c2r_core.segment.learned.sam_video import EDGETAM, SAM2, SAM3, Click, Family, Seen, VideoModel, load_model
 
-torch = pytest.importorskip("torch")
+torch = pytest.importorskip("torch", reason="no torch: pip install --group learned")
 from tests.core.segment.learned.tiny_models import sam2_config, tiny  # noqa: E402
 
+pytestmark = pytest.mark.slow  # torch is large: `make test` does not install it
+
 FAMILIES = pytest.mark.parametrize("family", [SAM2, EDGETAM, SAM3], ids=["sam2", "edgetam", "sam3"])
-MOST_FAMILIES = pytest.mark.parametrize(
-    "family",
-    [
-        pytest.param(SAM2, id="sam2"),
-        pytest.param(EDGETAM, id="edgetam", marks=pytest.mark.slow),  # its memory works as sam2's
-        pytest.param(SAM3, id="sam3"),
-    ],
-)
 WIDTH, HEIGHT = 80, 60
 
 
@@ -54,7 +48,7 @@ def test_clicked_frames_are_returned_first_starting_with_the_last() -> None:
     assert [seen.position for seen in followed(tiny(SAM2), 7, clicks)] == [4, 1, 5, 3, 6, 2, 0]
 
 
-@MOST_FAMILIES
+@FAMILIES
 def test_frames_after_the_click_match_the_reference_propagation_loop(family: Family) -> None:
     """`propagate_in_video_iterator` keeps the whole video in memory; dropping old frames must not change the masks."""
     model, count = tiny(family), 24  # more than the 16 frames of pointers and 7 of memories that it attends to
@@ -79,7 +73,7 @@ def test_half_precision_gives_finite_confidences(family: Family) -> None:
     assert all(np.isfinite(seen.confidence) for seen in found)
 
 
-@MOST_FAMILIES
+@FAMILIES
 def test_memory_stays_flat_over_sixty_frames(family: Family, monkeypatch: pytest.MonkeyPatch) -> None:
     model = tiny(family)
     sessions: list[Any] = []

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +18,6 @@ from r2c2r_core.segment.learned.session import LearnedSession
 from r2c2r_core.segment.stage import SegmentConfig, open_session
 from tests.core.segment.conftest import Filmed, Truth
 from tests.core.segment.scenes import DOORS, FRONT_Y, OUT_M, PARCEL_M, click_on, parcel_top, prompt
-
-torch = pytest.importorskip("torch")
-from tests.core.segment.learned.tiny_models import tiny  # noqa: E402
 
 Boxes = tuple[Capture, Truth]
 Spoil = Callable[[int, np.ndarray], np.ndarray]
@@ -213,21 +211,31 @@ def test_tracking_a_click_in_a_nonexistent_frame_is_rejected(session: GeometricS
         opened(session, TrueMasks(true_masks(boxes, "carton"))).track(stray)
 
 
+@pytest.mark.slow
 def test_the_real_model_class_runs_with_random_weights(session: GeometricSession, boxes: Boxes, carton: ObjectPrompt) -> None:
     """Random masks mean nothing, but all calls are real: RGB-sized masks, one per frame, in the order of the protocol."""
-    learned = opened(session, tiny(SAM2), least_area_px=0)
+    learned = opened(session, tiny_model(), least_area_px=0)
     found = list(learned.stream(carton))
     assert [frame for frame, _, _ in found][:5] == [60, 70, 50, 80, 40]
     assert len(found) == len(boxes[0].frames)
     assert {(packed.width, packed.height) for _, packed, _ in found} == {(480, 360)}
 
 
+@pytest.mark.slow
 def test_a_session_opens_by_name_from_a_folder_of_weights(boxes: Boxes, tmp_path: Path) -> None:
     weights = tmp_path / "weights"
-    tiny(SAM2).model.save_pretrained(weights)
+    tiny_model().model.save_pretrained(weights)
     learned = open_session(boxes[0], tmp_path, "sam2", SegmentConfig(weights=str(weights), least_area_px=0))
     two = prompt("carton", "box", click_on(boxes[0], (1.06, -0.36, 1.0), 60), click_on(boxes[0], (1.3, -0.36, 1.0), 90, 0))
     assert [frame for (frame, _, _), _ in zip(learned.stream(two), range(3), strict=False)] == [90, 60, 100]
+
+
+def tiny_model() -> Any:
+    """The real class with random weights; skips without torch."""
+    pytest.importorskip("torch", reason="no torch: pip install --group learned")
+    from tests.core.segment.learned.tiny_models import tiny
+
+    return tiny(SAM2)
 
 
 def _moved(mask: np.ndarray, rows: int) -> np.ndarray:
