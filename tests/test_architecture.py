@@ -3,11 +3,13 @@
 import argparse
 import ast
 import importlib.util
+import json
 import re
 import subprocess
 import sys
 import tomllib
 from collections import Counter
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -16,12 +18,6 @@ import pytest
 from r2c2r_core.cli import build_parser
 
 ROOT = Path(__file__).resolve().parent.parent
-
-
-def test_import_contracts_hold() -> None:
-    lint = Path(sys.executable).with_name("lint-imports")
-    done = subprocess.run([lint], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
 
 
 def test_stages_do_not_import_each_other() -> None:
@@ -64,10 +60,18 @@ def import_graph(root: Path, *packages: str) -> dict[str, set[str]]:
     graph = {}
     for name, path in modules.items():
         package = name if path.stem == "__init__" else name.rpartition(".")[0]
-        found = _imported(ast.parse(path.read_text()), package) & modules.keys()
+        found = _imported(parsed(path), package) & modules.keys()
         members = {other.rpartition(".")[0] for other in found}  # `from package import module` names the package too
         graph[name] = {other for other in found if other not in members or "__init__" not in modules[other].name} - {name}
     return graph
+
+
+def parsed(path: Path) -> ast.Module:
+    """Syntax tree of a module; each text is parsed once for all tests."""
+    return _parsed(path.read_text(encoding="utf-8"))
+
+
+_parsed = cache(ast.parse)
 
 
 SEGMENT = ROOT / "r2c2r_core" / "segment"
@@ -83,7 +87,7 @@ def test_subpackages_of_segment_import_only_those_listed_above_them() -> None:
     listed = re.findall(r"^\| (\w+) +\|", (SEGMENT / "__init__.py").read_text(), re.MULTILINE)[1:]
     assert sorted(listed) == sorted(path.parent.name for path in SEGMENT.glob("*/__init__.py"))
     for place, room in enumerate(listed):
-        named = {name for path in (SEGMENT / room).rglob("*.py") for name in _imported(ast.parse(path.read_text()), "")}
+        named = {name for path in (SEGMENT / room).rglob("*.py") for name in _imported(parsed(path), "")}
         above = {name.split(".")[2] for name in named if name.startswith("r2c2r_core.segment.")} & set(listed)
         assert above <= {room, *listed[:place]}, f"{room} imports {above - set(listed[:place])}"
 
@@ -103,7 +107,7 @@ def test_import_levels_are_counted_through_functions_and_relative_imports(tmp_pa
 
 def import_levels(room: Path) -> dict[str, int]:
     """Level of each module of a package: number of modules in the longest import chain from it within the package."""
-    modules = {path.stem: ast.parse(path.read_text()) for path in room.glob("*.py") if path.stem != "__init__"}
+    modules = {path.stem: parsed(path) for path in room.glob("*.py") if path.stem != "__init__"}
     package = ".".join(room.parts[room.parts.index("r2c2r_core") :])
     named = {name: _imported(tree, package) for name, tree in modules.items()}
     imports = {name: {other for other in modules if f"{package}.{other}" in named[name]} for name in modules}
@@ -125,50 +129,56 @@ def _imported(tree: ast.Module, package: str) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("module", ["r2c2r_core.cli", "r2c2r_core.pipeline", "app.main, app.work"])
-def test_importing_loads_no_heavy_dependencies(module: str) -> None:
-    heavy = ["open3d", "mujoco", "scene_synthesizer", "torch", "transformers", "pybullet", "viser", "trimesh"]
-    heavy += ["opentelemetry.sdk", "opentelemetry.exporter"]  # imported only if a setting turns traces on
-    heavy += ["shapely"] if module.startswith("app") else []  # of the robot's trials
-    code = f"import sys, {module}; print([name for name in {heavy} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
-def test_the_default_server_loads_no_library_of_a_shared_deployment(tmp_path: Path) -> None:
-    code = """
-import sys
+HEAVY = (
+    *("open3d", "mujoco", "scene_synthesizer", "pybullet", "viser", "trimesh"),
+    *("opentelemetry.sdk", "opentelemetry.exporter"),  # imported only if a setting turns traces on
+)
+SHARED = ("psycopg", "obstore", "ray")
+IMPORTS = """
+import importlib, json, pkgutil, sys
 from pathlib import Path
+for name in ("torch", "transformers", "torchvision", "timm"):
+    sys.modules[name] = None  # as on a base install: an import of it fails
+loaded = {}
+import app.main, app.work
+loaded["app"] = list(sys.modules)
+import r2c2r_core.cli, r2c2r_core.pipeline
+loaded["core"] = list(sys.modules)
 from tests.app.conftest import running
 with running(Path(sys.argv[1])) as web:
-    web.sample()
-    print([name for name in ("psycopg", "obstore", "ray") if name in sys.modules])
-"""
-    command = [sys.executable, "-c", code, str(tmp_path / "data")]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.stdout.strip() == "[]", done.stderr
-
-
-def test_base_install_needs_no_torch() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert not any("torch" in requirement or "transformers" in requirement for requirement in project["dependencies"])
-
-
-def test_every_module_of_the_core_and_the_app_imports_without_torch() -> None:
-    """As on a base install: torch and transformers cannot be found, and every module still imports."""
-    code = """
-import importlib, pkgutil, sys
-for name in ("torch", "transformers", "torchvision", "timm"):
-    sys.modules[name] = None
-import r2c2r_core, app
+    web.import_sample()
+    loaded["served"] = list(sys.modules)
 for package in (r2c2r_core, app):
     for found in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
         # probes are programs of their own: they import what they probe; an extra's own package subclasses what the extra brings
         if "probes" not in found.name and not found.name.startswith("r2c2r_core.gym."):
             importlib.import_module(found.name)
+loaded["everything"] = list(sys.modules)
+print(json.dumps(loaded))
 """
-    done = subprocess.run([sys.executable, "-W", "ignore", "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    """Loaded modules of a process without torch after each step: app, core, a served project, every module."""
+    command = [sys.executable, "-W", "ignore", "-c", IMPORTS, str(tmp_path_factory.mktemp("served") / "data")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+    return dict(json.loads(done.stdout))
+
+
+@pytest.mark.parametrize(("step", "heavy"), [("app", (*HEAVY, "shapely")), ("core", HEAVY), ("served", SHARED)])
+def test_importing_loads_no_heavy_dependencies(step: str, heavy: tuple[str, ...], loaded: dict[str, list[str]]) -> None:
+    assert set(heavy) & set(loaded[step]) == set()
+
+
+def test_every_module_of_the_core_and_the_app_imports_without_torch(loaded: dict[str, list[str]]) -> None:
+    assert {"r2c2r_core.align.glue", "app.viewer.camera"} <= set(loaded["everything"])
+
+
+def test_base_install_needs_no_torch() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert not any("torch" in requirement or "transformers" in requirement for requirement in project["dependencies"])
 
 
 def test_no_package_that_forbids_commercial_use_is_installed() -> None:
@@ -246,7 +256,7 @@ def test_every_public_function_is_used_outside_the_tests() -> None:
     defined = [
         (path, node.name)
         for path, text in product.items()
-        for node in ast.walk(ast.parse(text))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not node.decorator_list
     ]
     unused = [f"{path.relative_to(ROOT)}: {name}" for path, name in defined if words[name] < 2 and name not in OVERRIDES]
@@ -261,7 +271,7 @@ def test_docstrings_do_not_start_with_an_unclear_word() -> None:
         f"{path.relative_to(ROOT)}: {text.splitlines()[0]}"
         for name in ("r2c2r_core", "app")
         for path in sorted((ROOT / name).rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
         and (text := ast.get_docstring(node))
         and text.split()[0].rstrip(",:") in RIDDLES
