@@ -21,9 +21,10 @@ from app.db.tables import Bundle, Job, JobEvent
 from app.errors import Unavailable
 from app.store.mirror import Mirror
 from app.store.objects import open_objects
-from tests.app.object_server import BUCKET, ObjectServer, free_port, object_server
+from tests.app.object_server import BUCKET, ObjectServer, object_server
 from tests.app.postgres import PostgresServer, server
 from tests.app.ray_cluster import RayNode, ray_node
+from tests.ports import free_port
 
 SEAT = """
 import sys, threading

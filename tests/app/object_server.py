@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.ports import free_ports
 from tests.waiting import until
 
 REQUIRED = bool(os.environ.get("R2C2R_REQUIRE_ALL"))
@@ -28,7 +28,7 @@ class ObjectServer:
 
     def __init__(self, folder: Path, program: str) -> None:
         self.folder, self._program = folder, program
-        self._ports = [free_port() for _ in range(8)]
+        self._ports = free_ports(8)
         self.endpoint = f"http://127.0.0.1:{self._ports[0]}"
         who = {"name": KEY, "credentials": [{"accessKey": KEY, "secretKey": SECRET}], "actions": ["Admin"]}
         (folder / "who.json").write_text(json.dumps({"identities": [who]}))
@@ -121,9 +121,3 @@ def object_server() -> Iterator[ObjectServer]:
     finally:
         found.kill()  # its data is no longer needed
         shutil.rmtree(folder, ignore_errors=True)
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

@@ -30,6 +30,7 @@ from tests.app.people import PASSWORD
 from tests.app.served import served
 from tests.app.test_imports import archive
 from tests.app.tls import certificate
+from tests.ports import free_port
 from tests.waiting import PATIENCE_S, until
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
@@ -44,12 +45,6 @@ class Proxied:
         self.origin, self.host = f"https://localhost:{port}", f"localhost:{port}"
         self.certificate, self.settings, self.app = certificate, settings, app
         self.trusted = ssl.create_default_context(cafile=str(certificate))
-
-
-def free_port() -> int:
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
 
 
 def with_line(site: str, known: str, instead: str) -> str:

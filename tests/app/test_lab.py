@@ -17,8 +17,9 @@ from r2c2r_core.cli import build_parser
 from tests.app.object_server import BUCKET, object_server
 from tests.app.people import PASSWORD
 from tests.app.postgres import PostgresServer, programs
-from tests.app.test_deploy import caddy, free_port
+from tests.app.test_deploy import caddy
 from tests.app.test_oidc import Identities, provider  # noqa: F401  # a fixture
+from tests.ports import free_port
 from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).resolve().parents[2]

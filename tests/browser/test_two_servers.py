@@ -13,7 +13,8 @@ from tests.app import postgres
 from tests.browser.looks import picture
 from tests.browser.serving import NewContext
 from tests.browser.test_together import click_frame, rows, sample
-from tests.browser.together import PASSWORD, PEOPLE, Server, free_port, signed_in
+from tests.browser.together import PASSWORD, PEOPLE, Server, signed_in
+from tests.ports import free_port
 
 
 class Beside(Server):

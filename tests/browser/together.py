@@ -1,9 +1,6 @@
 """Restartable app with accounts and stand-ins for its slow parts, and helpers to sign people in."""
 
-import random
 import shutil
-import socket
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Self
@@ -16,12 +13,10 @@ from app.settings import DATABASE
 from tests.app.conftest import migrated
 from tests.browser.stand_in import serve_stand_in
 from tests.forked import Forked
+from tests.ports import free_port
 
 PASSWORD = "correct horse battery"
 PEOPLE = {"ann": "admin", "bea": "reviewer", "cleo": "annotator"}
-LENT = Path("/proc/sys/net/ipv4/ip_local_port_range")  # the range of ephemeral ports
-LOWEST_PORT = 20_000  # Chromium refuses some below
-TRIES = 100
 
 
 class Server:
@@ -66,17 +61,6 @@ def _with_people() -> Path:
         accounts.add(engine, name, role, PASSWORD)
     engine.dispose()
     return path
-
-
-def free_port() -> int:
-    """A port outside the ephemeral range, so that it stays free while the server is down; any free one if that is unknown."""
-    kept = range(LOWEST_PORT, int(LENT.read_text().split()[0]) if LENT.is_file() else 0)
-    tried = random.SystemRandom().sample(kept, min(len(kept), TRIES))  # random, so that two test workers differ
-    for port in (*tried, 0):
-        with socket.socket() as probe, suppress(OSError):
-            probe.bind(("127.0.0.1", port))
-            return int(probe.getsockname()[1])
-    raise AssertionError("no port is free")
 
 
 def signed_in(context: BrowserContext, server: Server, name: str, password: str = PASSWORD) -> Page:
