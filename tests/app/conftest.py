@@ -3,12 +3,13 @@
 import asyncio
 import atexit
 import shutil
+import sqlite3
 import sys
 import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -22,11 +23,12 @@ from starlette.testclient import TestClient
 from app.db.engine import open_engine
 from app.jobs.plans import Commands
 from app.main import create_app
-from app.services import launch_keys
+from app.services import descriptions, launch_keys
 from app.services.context import Context
 from app.settings import DATABASE, Settings
 from app.viewer.client import Viewer
 from tests.app import postgres
+from tests.app.object_server import ObjectServer, object_server
 from tests.app.postgres import PostgresServer
 from tests.waiting import PATIENCE_S, until
 
@@ -51,6 +53,7 @@ FAKE_COMMANDS = Commands(
 )
 
 
+descriptions.PAUSE_S = 0.05  # tests wait for project.json; at 2 s, its usual pace, they would take a minute longer
 PATIENT = {"viewer_answer_s": PATIENCE_S, "viewer_page_s": PATIENCE_S, "busy_s": PATIENCE_S}  # settings for a slow machine
 
 
@@ -61,6 +64,7 @@ class Running:
     app: FastAPI
     client: TestClient
     settings: Settings
+    plain: bool = False  # all settings and stand-ins are the tests' usual ones
 
     @property
     def context(self) -> Context:
@@ -85,7 +89,11 @@ class Running:
         return self._checked(self.client.delete(path), status)
 
     def sample(self) -> str:
-        """Id of a ready project with the objects drawer_1 and mug_1."""
+        """Id of a ready project with the objects drawer_1 and mug_1; the first one of a plain app is a copy."""
+        return copy_sample(self.settings) if self.plain and not self.get("/api/projects") else self.import_sample()
+
+    def import_sample(self) -> str:
+        """The same, imported by the jobs of this app."""
         project = self.post("/api/projects/sample", {}, 202)["id"]
         self.until(lambda: self.get(f"/api/projects/{project}")["status"] == "ready")
         return str(project)
@@ -115,6 +123,33 @@ def migrated() -> Path:
     return folder / DATABASE
 
 
+COPIED = ("projects", "jobs", "job_events", "objects", "prompt_points", "events")  # tables with rows of an imported sample
+
+
+@cache
+def imported() -> tuple[Path, str]:
+    """Data folder of an app that has imported the sample, and the project's id; made once per process."""
+    folder = Path(tempfile.mkdtemp(prefix="r2c2r-sample-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    with running(folder / "data") as web:
+        return folder / "data", web.import_sample()
+
+
+def copy_sample(settings: Settings) -> str:
+    """Id of the sample's project, copied with its files and rows into the data folder of an app without projects."""
+    made, project = imported()
+    folder = shutil.copytree(made / "projects" / project, settings.data_dir / "projects" / project)
+    facts = folder / "facts.json"
+    facts.write_text(facts.read_text().replace(str(made), str(settings.data_dir)))
+    with closing(sqlite3.connect(settings.database)) as rows, rows:
+        rows.execute("ATTACH ? AS made", [str(made / DATABASE)])
+        for table in COPIED:
+            rows.execute(f"INSERT INTO main.{table} SELECT * FROM made.{table}")
+        for table, column in (("projects", "source_path"), ("jobs", "log_path")):
+            rows.execute(f"UPDATE {table} SET {column} = replace({column}, ?, ?)", [str(made), str(settings.data_dir)])
+    return project
+
+
 @contextmanager
 def running(
     data_dir: Path, commands: Commands = FAKE_COMMANDS, viewer: Viewer | None = None, **options: Any
@@ -139,7 +174,8 @@ def running(
     app = create_app(settings, commands=commands, viewer_client=viewer)
     with TestClient(app, base_url=ORIGIN, headers={"X-Requested-With": "tests"}, raise_server_exceptions=False) as client:
         client.get(f"/?token={settings.launch_token}")
-        yield Running(app, client, settings)
+        plain = commands is FAKE_COMMANDS and viewer is None and not options and not settings.postgres
+        yield Running(app, client, settings, plain)
         blocked = [stack for database, stack in ASKED_ON_THE_LOOP if database == app.state.context.engine.url]
         assert blocked == [], "everybody waited for the database"
 
@@ -223,6 +259,13 @@ def postgres_server() -> Iterator[PostgresServer]:
         yield found
 
 
+@pytest.fixture(scope="session")
+def s3() -> Iterator[ObjectServer]:
+    """An S3 server for all tests: each keeps its files below a name of its own."""
+    with object_server() as found:
+        yield found
+
+
 @pytest.fixture(autouse=True)
 def rows_in(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Database of this test's apps; commands that it runs get that of the folder used by `start`."""
@@ -240,6 +283,8 @@ def rows_in(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.
 @pytest.fixture
 def start(tmp_path: Path) -> Callable[..., Any]:
     """Start the app on this test's data folder; may be called again, as a restart."""
+    if not _POSTGRES:
+        imported()  # now, before the test replaces parts of the import
 
     def begin(**options: Any) -> Any:
         return running(tmp_path / "data", **options)
@@ -250,4 +295,12 @@ def start(tmp_path: Path) -> Callable[..., Any]:
 @pytest.fixture
 def web(start: Callable[..., Any]) -> Iterator[Running]:
     with start() as found:
+        yield found
+
+
+@pytest.fixture(scope="session")
+def shared_web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    """One app with the sample's project, for all tests that only read."""
+    with running(tmp_path_factory.mktemp("shared") / "data") as found:
+        found.sample()
         yield found

@@ -40,15 +40,15 @@ def test_every_endpoint_returns_errors_in_the_same_format(web: Running) -> None:
         ("GET", "/api/jobs?limit=99999999999999999999999", 422, "invalid"),
     ],
 )
-def test_framework_errors_have_the_same_format(web: Running, method: str, path: str, status: int, kind: str) -> None:
-    answer = web.client.request(method, path)
+def test_framework_errors_have_the_same_format(shared_web: Running, method: str, path: str, status: int, kind: str) -> None:
+    answer = shared_web.client.request(method, path)
     assert (answer.status_code, answer.json()["kind"]) == (status, kind)
     assert set(answer.json()) == SHAPE
 
 
 @pytest.mark.parametrize("body", [b"{", b"[]", b'{"seed": "x"}', b'{"seed": 1, "unknown": 2}', b'{"seed": NaN}', b"\xff\xfe"])
-def test_a_malformed_body_is_rejected_as_invalid(web: Running, body: bytes) -> None:
-    answer = web.client.post("/api/projects/sample", content=body, headers={"content-type": "application/json"})
+def test_a_malformed_body_is_rejected_as_invalid(shared_web: Running, body: bytes) -> None:
+    answer = shared_web.client.post("/api/projects/sample", content=body, headers={"content-type": "application/json"})
     assert (answer.status_code, answer.json()["kind"]) == (422, "invalid")
     assert set(answer.json()) == SHAPE
 
@@ -85,8 +85,10 @@ def test_error_kinds_list_subclasses_before_their_base_classes() -> None:
         seen.append(cls)
 
 
-def test_every_route_has_a_unique_operation_id(web: Running) -> None:
-    names = [operation["operationId"] for methods in web.app.openapi()["paths"].values() for operation in methods.values()]
+def test_every_route_has_a_unique_operation_id(shared_web: Running) -> None:
+    names = [
+        operation["operationId"] for methods in shared_web.app.openapi()["paths"].values() for operation in methods.values()
+    ]
     assert len(names) == len(set(names))
 
 

@@ -3,7 +3,6 @@
 import os
 import threading
 import urllib.request
-from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -14,19 +13,13 @@ from app.errors import NotFound, Unavailable
 from app.store.mirror import UNUSED_S, Lost, Mirror
 from app.store.objects import Objects, open_objects
 from r2c2r_core.errors import InputError
-from tests.app.object_server import BUCKET, REQUIRED, ObjectServer, object_server
+from tests.app.object_server import BUCKET, REQUIRED, ObjectServer
 from tests.waiting import PATIENCE_S, held
 
 LONG = timedelta(days=1)
 
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
-
-
-@pytest.fixture(scope="module")
-def s3() -> Iterator[ObjectServer]:
-    with object_server() as found:
-        yield found
 
 
 @pytest.fixture(params=["memory", "folder", "s3"])

@@ -24,8 +24,8 @@ def refused(code: int) -> Any:
     return pytest.raises(WebSocketDisconnect, check=lambda error: error.code == code)
 
 
-def test_requests_without_a_session_are_refused_or_sent_to_the_login(web: Running) -> None:
-    other = fresh(web, headers={"X-Requested-With": "tests"})
+def test_requests_without_a_session_are_refused_or_sent_to_the_login(shared_web: Running) -> None:
+    other = fresh(shared_web, headers={"X-Requested-With": "tests"})
     for path in (
         "/api/projects",
         "/api/system",
@@ -43,9 +43,9 @@ def test_requests_without_a_session_are_refused_or_sent_to_the_login(web: Runnin
     assert other.get("/api/health").json() == {"state": "ok"}
 
 
-def test_the_printed_token_is_exchanged_for_a_cookie_and_a_clean_url(web: Running) -> None:
-    other = fresh(web)
-    address = f"/p/abc/annotate{web.printed()[1:]}"
+def test_the_printed_token_is_exchanged_for_a_cookie_and_a_clean_url(shared_web: Running) -> None:
+    other = fresh(shared_web)
+    address = f"/p/abc/annotate{shared_web.printed()[1:]}"
     answer = other.get(address, follow_redirects=False)
     assert (answer.status_code, answer.headers["location"]) == (303, "/p/abc/annotate")
     cookie = answer.headers["set-cookie"].lower()
@@ -58,12 +58,12 @@ def test_the_printed_token_is_exchanged_for_a_cookie_and_a_clean_url(web: Runnin
     assert "set-cookie" not in again.headers
 
 
-def test_a_printed_address_signs_in_one_browser_only(web: Running) -> None:
-    address = web.printed()
+def test_a_printed_address_signs_in_one_browser_only(shared_web: Running) -> None:
+    address = shared_web.printed()
     with ThreadPoolExecutor(8) as crowd:
-        opened = list(crowd.map(lambda _: fresh(web).get(address, follow_redirects=False).status_code, range(8)))
+        opened = list(crowd.map(lambda _: fresh(shared_web).get(address, follow_redirects=False).status_code, range(8)))
     assert sorted(opened) == [303] + [401] * 7
-    page = fresh(web).get(address)
+    page = fresh(shared_web).get(address)
     assert "r2c2r key" in page.text
     assert "<form>" in page.text
 
@@ -78,8 +78,11 @@ def test_servers_on_different_ports_use_different_cookies(web: Running) -> None:
     assert web.client.get("/api/projects").status_code == 200
 
 
-def test_hsts_is_sent_over_tls_and_camera_and_microphone_are_denied(web: Running) -> None:
-    plain, tls = web.client.get("/api/health").headers, fresh(web, base_url="https://127.0.0.1:8000").get("/api/health").headers
+def test_hsts_is_sent_over_tls_and_camera_and_microphone_are_denied(shared_web: Running) -> None:
+    plain, tls = (
+        shared_web.client.get("/api/health").headers,
+        fresh(shared_web, base_url="https://127.0.0.1:8000").get("/api/health").headers,
+    )
     assert "strict-transport-security" not in plain
     assert tls["strict-transport-security"] == "max-age=31536000"
     for headers in (plain, tls):
@@ -114,15 +117,15 @@ def sessions(web: Running) -> list[SignIn]:
 
 
 @pytest.mark.parametrize("token", ["wrong", "x" * 4_000, "é"])
-def test_a_wrong_launch_token_is_unauthorized(web: Running, token: str) -> None:
-    answer = fresh(web).get("/", params={"token": token}, follow_redirects=False)
+def test_a_wrong_launch_token_is_unauthorized(shared_web: Running, token: str) -> None:
+    answer = fresh(shared_web).get("/", params={"token": token}, follow_redirects=False)
     assert answer.status_code == 401
     assert "set-cookie" not in answer.headers
 
 
 @pytest.mark.parametrize("value", ["", "x", "x.y", "." * 50, f"{'a' * 22}.{'0' * 64}", "ä.ö"])
-def test_an_invalid_session_cookie_is_unauthorized(web: Running, value: str) -> None:
-    other = fresh(web)
+def test_an_invalid_session_cookie_is_unauthorized(shared_web: Running, value: str) -> None:
+    other = fresh(shared_web)
     assert other.get("/api/projects", headers={"cookie": f"{COOKIE}={value}".encode()}).status_code == 401
 
 
@@ -135,33 +138,33 @@ def test_a_session_survives_a_server_restart(start: Callable[..., Any]) -> None:
 
 
 @pytest.mark.parametrize("others", ['a={"b": [1, 2]}; ', "plain; ", "x=\x01; ", 'q="half; '])
-def test_cookies_of_other_apps_do_not_break_the_session(web: Running, others: str) -> None:
-    cookie = web.client.cookies[COOKIE]
+def test_cookies_of_other_apps_do_not_break_the_session(shared_web: Running, others: str) -> None:
+    cookie = shared_web.client.cookies[COOKIE]
     headers = {"cookie": f"{others}{COOKIE}={cookie}; theirs=2".encode()}
-    assert fresh(web).get("/api/projects", headers=headers).status_code == 200
+    assert fresh(shared_web).get("/api/projects", headers=headers).status_code == 200
 
 
-def test_the_session_cookie_is_not_stored_in_plain_text(web: Running) -> None:
-    stored = b"".join(path.read_bytes() for path in web.settings.data_dir.glob("r2c2r.db*"))
-    assert web.client.cookies[COOKIE].encode() not in stored
+def test_the_session_cookie_is_not_stored_in_plain_text(shared_web: Running) -> None:
+    stored = b"".join(path.read_bytes() for path in shared_web.settings.data_dir.glob("r2c2r.db*"))
+    assert shared_web.client.cookies[COOKIE].encode() not in stored
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "", "[::1", "localhost.evil:8000", "10.0.0.7:8000"])
-def test_requests_for_other_host_names_are_refused(web: Running, host: str) -> None:
-    assert web.client.get("/api/projects", headers={"host": host}).status_code == 421
+def test_requests_for_other_host_names_are_refused(shared_web: Running, host: str) -> None:
+    assert shared_web.client.get("/api/projects", headers={"host": host}).status_code == 421
 
 
 @pytest.mark.parametrize("host", ["localhost:8000", "127.0.0.1", "[::1]:8000", "LOCALHOST:1"])
-def test_requests_for_loopback_host_names_are_answered(web: Running, host: str) -> None:
-    assert web.client.get("/api/health", headers={"host": host}).status_code == 200
+def test_requests_for_loopback_host_names_are_answered(shared_web: Running, host: str) -> None:
+    assert shared_web.client.get("/api/health", headers={"host": host}).status_code == 200
 
 
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "null", "http://127.0.0.1:9999", "http://localhost:8000", "http://["]
 )
-def test_requests_from_other_sites_are_refused(web: Running, origin: str) -> None:
+def test_requests_from_other_sites_are_refused(shared_web: Running, origin: str) -> None:
     for method, path in (("POST", "/api/projects/sample"), ("GET", "/api/projects"), ("DELETE", "/api/projects/x")):
-        answer = web.client.request(method, path, headers={"origin": origin})
+        answer = shared_web.client.request(method, path, headers={"origin": origin})
         assert answer.status_code == 403, (method, path)
         assert answer.json()["kind"] == "forbidden"
 
@@ -175,26 +178,26 @@ def test_state_changing_requests_need_a_header_that_forms_cannot_send(web: Runni
 
 
 @pytest.mark.parametrize("headers", [{}, {"origin": "http://evil.example"}, {"origin": "null"}])
-def test_websockets_from_other_origins_are_refused(web: Running, headers: dict[str, str]) -> None:
+def test_websockets_from_other_origins_are_refused(shared_web: Running, headers: dict[str, str]) -> None:
     for path in ("/api/live", "/viewer/token"):
         with (
             refused(4403),
-            web.client.websocket_connect(SOCKETS + path, headers=headers),
+            shared_web.client.websocket_connect(SOCKETS + path, headers=headers),
         ):
             pass
 
 
-def test_a_websocket_needs_a_session(web: Running) -> None:
+def test_a_websocket_needs_a_session(shared_web: Running) -> None:
     with (
         refused(4401),
-        fresh(web).websocket_connect(f"{SOCKETS}/api/live", headers={"origin": ORIGIN}),
+        fresh(shared_web).websocket_connect(f"{SOCKETS}/api/live", headers={"origin": ORIGIN}),
     ):
         pass
 
 
-def test_every_response_has_the_security_headers(web: Running) -> None:
+def test_every_response_has_the_security_headers(shared_web: Running) -> None:
     for path in ("/", "/api/projects", "/static/index.html", "/nowhere", "/api/projects/none"):
-        headers = web.client.get(path).headers
+        headers = shared_web.client.get(path).headers
         assert headers["x-content-type-options"] == "nosniff"
         assert headers["referrer-policy"] == "same-origin"
         policy = headers["content-security-policy"]
@@ -234,23 +237,23 @@ ESCAPES = (
 )
 
 
-def test_path_traversal_is_rejected(web: Running) -> None:
-    project = web.sample()
+def test_path_traversal_is_rejected(shared_web: Running) -> None:
+    (project,) = (each["id"] for each in shared_web.get("/api/projects"))
     for path in ESCAPES:
-        answer = web.client.get(path.replace("PROJECT", project))
+        answer = shared_web.client.get(path.replace("PROJECT", project))
         assert 400 <= answer.status_code < 500, path
         assert b"root:" not in answer.content
 
 
-def test_the_launch_token_is_not_revealed_by_the_api(web: Running) -> None:
-    assert web.settings.launch_token not in web.client.get("/api/system").text
-    assert web.settings.launch_token not in web.client.get("/api/openapi.json").text
+def test_the_launch_token_is_not_revealed_by_the_api(shared_web: Running) -> None:
+    assert shared_web.settings.launch_token not in shared_web.client.get("/api/system").text
+    assert shared_web.settings.launch_token not in shared_web.client.get("/api/openapi.json").text
 
 
 @pytest.mark.parametrize("path", ["/", "/api/projects", "/static/js/main.js"])
-def test_a_proxy_with_a_path_prefix_is_refused_with_a_hint(web: Running, path: str) -> None:
-    answer = web.client.get(path, headers={"X-Forwarded-Prefix": "/lab/r2c2r"})
+def test_a_proxy_with_a_path_prefix_is_refused_with_a_hint(shared_web: Running, path: str) -> None:
+    answer = shared_web.client.get(path, headers={"X-Forwarded-Prefix": "/lab/r2c2r"})
     assert answer.status_code == 421
     assert "/lab/r2c2r" in answer.json()["message"]
     assert "host name of its own" in answer.json()["hint"]
-    assert web.client.get(path, headers={"X-Forwarded-Prefix": "/"}).is_success
+    assert shared_web.client.get(path, headers={"X-Forwarded-Prefix": "/"}).is_success

@@ -1,6 +1,6 @@
 """Invalid settings of the object store are reported when a server or a seat starts; an unavailable store is waited for."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,17 +10,11 @@ from app.settings import Settings
 from app.store.usable import refusal, require_store
 from app.work import work
 from r2c2r_core.errors import InputError
-from tests.app.object_server import BUCKET, REQUIRED, ObjectServer, object_server
-from tests.app.test_deploy import free_port
+from tests.app.object_server import BUCKET, REQUIRED, ObjectServer
+from tests.ports import free_port
 
 if not REQUIRED:
     pytest.importorskip("obstore", reason="no obstore: pip install 'r2c2r[store]'")
-
-
-@pytest.fixture(scope="module")
-def s3() -> Iterator[ObjectServer]:
-    with object_server() as found:
-        yield found
 
 
 @pytest.fixture

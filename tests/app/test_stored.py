@@ -12,7 +12,7 @@ from app.files import project_files
 from app.jobs.outcomes import FINISHERS
 from app.store.mirror import Mirror
 from tests.app.conftest import Running, running
-from tests.app.object_server import BUCKET, REQUIRED, object_server
+from tests.app.object_server import BUCKET, REQUIRED, ObjectServer
 from tests.app.postgres import PostgresServer
 from tests.app.test_imports import R3D
 from tests.app.test_jobs import behave, run
@@ -147,16 +147,15 @@ def test_import_by_path_is_refused_if_other_machines_compute(two: tuple[Running,
 
 
 def test_a_bundle_download_redirects_to_the_store(
-    postgres_server: PostgresServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    postgres_server: PostgresServer, s3: ObjectServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with object_server() as s3:
-        for name, value in s3.environment.items():
-            monkeypatch.setenv(name, value)
-        with running(tmp_path / "a", postgres=postgres_server.of_folder(tmp_path), store=f"s3://{BUCKET}/lab") as web:
-            project = web.sample()
-            web.job(run(web, project), "done")
-            answer = web.client.get(f"/media/{project}/bundles/1.zip", follow_redirects=False)
-            assert answer.status_code == 302
-            assert answer.headers["location"].startswith(f"{s3.endpoint}/{BUCKET}/lab/projects/{project}/downloads/")
-            assert web.client.get(f"/media/{project}/frames/0.jpg").status_code == 200
+    for name, value in s3.environment.items():
+        monkeypatch.setenv(name, value)
+    with running(tmp_path / "a", postgres=postgres_server.of_folder(tmp_path), store=f"s3://{BUCKET}/stored") as web:
+        project = web.sample()
+        web.job(run(web, project), "done")
+        answer = web.client.get(f"/media/{project}/bundles/1.zip", follow_redirects=False)
+        assert answer.status_code == 302
+        assert answer.headers["location"].startswith(f"{s3.endpoint}/{BUCKET}/stored/projects/{project}/downloads/")
+        assert web.client.get(f"/media/{project}/frames/0.jpg").status_code == 200
     postgres_server.drop_all()
