@@ -17,7 +17,10 @@ from tests.core.ingest.tiny import TinyRoom, zip_folder
 ROOM = replace(TinyRoom(), count=4)
 
 
-@pytest.mark.parametrize("kind", WRITERS)
+QUICK = ("r3d", "tum")  # `r2c2r info` reads the others: tests/core/test_info_formats.py and test_readers.py
+
+
+@pytest.mark.parametrize("kind", [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.slow) for kind in WRITERS])
 def test_the_import_job_reads_a_zip_of_any_format(kind: str, tmp_path: Path) -> None:
     zipped = zip_folder(WRITERS[kind](tmp_path / "made", ROOM), tmp_path / "scan.zip", top="from my phone/scan/")
     work, folder = tmp_path / "work", tmp_path / "project"

@@ -32,7 +32,10 @@ def test_the_format_table_covers_every_reader() -> None:
     assert set(FORMATS.values()) == {reader.name for reader in READERS}
 
 
-@pytest.mark.parametrize("kind", FORMATS)
+QUICK = ("r3d", "tum", "scannetpp")  # tests/core/ingest/test_readers.py reads all of them
+
+
+@pytest.mark.parametrize("kind", [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.slow) for kind in FORMATS])
 def test_info_prints_the_format_and_frame_count(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = write(kind, tmp_path)
     assert main(["info", str(source)]) == 0

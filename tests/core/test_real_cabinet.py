@@ -33,6 +33,7 @@ pytestmark = pytest.mark.skipif(not CABINET.exists(), reason="the TUM cabinet is
 PROMPTS = Prompts(objects=(ObjectPrompt(name="cabinet", category="bench", points=CLICKS),))
 
 
+@pytest.mark.slow
 def test_two_clicks_give_the_true_box_of_a_real_cabinet(tmp_path: Path) -> None:
     """Checks the box of the segment stage, before a mesh is generated."""
     work = Workspace(tmp_path)
