@@ -1,6 +1,6 @@
 # make demo   the sample kitchen through every stage, its certified bundle, and the app opened on it
 # make test   everything CI runs
-# make slow   the tests that take long: before a release
+# make slow   the tests that take long or need torch: before a release
 # make screens  the pictures of the documentation, from a real run
 # make env | check | docs | bench beside them
 SHELL := /bin/bash
@@ -12,12 +12,12 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 LEARNED := $(VENV)/.learned
 
-.PHONY: demo test slow env check docs screens bench libs clean
+.PHONY: demo test slow env check types pages contracts format lint docs screens bench libs clean
 
 demo: env
 	"$(BIN)/python" -m r2c2r_core.cli demo --data "$(DATA)" --port $(PORT) $(DEMO)
 
-test: env $(LEARNED)
+test: env
 	$(MAKE) --no-print-directory check && CHECKED_S=$$SECONDS "$(BIN)/python" scripts/run_tests.py
 
 slow: env $(LEARNED)
@@ -35,17 +35,24 @@ $(STAMP): pyproject.toml constraints.txt
 	"$(BIN)/python" -m pip uninstall --quiet --yes triangle
 	touch "$(STAMP)"
 
-# torch is large: only the tests bring it
+# torch is large: only the slow tests bring it
 $(LEARNED): $(STAMP)
 	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt --group learned
 	touch "$(LEARNED)"
 
+CHECKS := types pages contracts format lint
 check: env
-	"$(BIN)/ruff" format --check .
-	"$(BIN)/ruff" check .
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target $(CHECKS)
+types:
 	"$(BIN)/mypy"
-	"$(BIN)/lint-imports"
+pages:
 	bash scripts/check-static.sh
+contracts:
+	"$(BIN)/lint-imports"
+format:
+	"$(BIN)/ruff" format --check .
+lint:
+	"$(BIN)/ruff" check .
 
 # in build/site, without the network
 docs: env
