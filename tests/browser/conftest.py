@@ -2,8 +2,9 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -101,9 +102,38 @@ def live() -> str:
 
 
 @pytest.fixture
-def server(tmp_path: Path, live: str) -> Iterator[Server]:
-    """A separate app for one test, with stand-ins for its slow parts and accounts of Ann, Bea and Cleo."""
+def scenes() -> bool:
+    """Whether `server` draws 3D views; modules that look at them override it."""
+    return False
+
+
+@pytest.fixture(scope="session")
+def servers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str, bool], Server]]:
+    """Running servers of this process, by live segmenter and whether they draw 3D views; each starts when first asked for."""
+    with ExitStack() as running:
+
+        @cache
+        def started(live: str, scenes: bool) -> Server:
+            return running.enter_context(Server(tmp_path_factory.mktemp("data"), live, scenes=scenes))
+
+        yield started
+
+
+@pytest.fixture
+def server(servers: Callable[[str, bool], Server], live: str, scenes: bool) -> Server:
+    """An app without projects, with stand-ins for its slow parts and accounts of Ann, Bea and Cleo.
+
+    Tests that kill it, or change more than projects, take `own_server`.
+    """
+    found = servers(live, scenes)
+    found.clear()
+    return found
+
+
+@pytest.fixture
+def own_server(tmp_path: Path, live: str) -> Iterator[Server]:
+    """Like `server`, for one test."""
     data = tmp_path / "data"
     data.mkdir()
-    with Server(data, live=live) as running:
+    with Server(data, live) as running:
         yield running

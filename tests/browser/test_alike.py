@@ -24,7 +24,7 @@ def test_proposals_similar_to_an_object_are_listed_and_confirmed(new_context: Ne
     shown = proposals.get_by_role("listitem")
     expect(shown).to_have_count(3)
     front = {"corners_m": CORNERS, "handle": None, "hinge": None}
-    post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "pull_out", "front": front})  # type: ignore[dict-item]
+    post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "pull_out", "front": front})
     expect(page.locator(".object-list")).to_contain_text("drawn · 3 frames")
 
     page.get_by_role("button", name="drawer_1", exact=True).click()
@@ -73,7 +73,7 @@ def test_selected_objects_are_numbered_left_to_right_and_top_down(new_context: N
     for across, down in ((0.6, 0.0), (0.0, 0.3), (0.0, 0.0)):  # made in reverse order
         corners = [[x + across, y, z - down] for x, y, z in CORNERS]
         front = {"corners_m": corners, "handle": None, "hinge": None}
-        post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "flap", "front": front})  # type: ignore[dict-item]
+        post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "flap", "front": front})
     expect(page.locator(".object-list").get_by_text("drawn · 3 frames")).to_have_count(3)
     page.get_by_role("button", name="flap_1", exact=True).click(modifiers=["Control"])
     page.get_by_role("button", name="flap_3", exact=True).click(modifiers=["Shift"])

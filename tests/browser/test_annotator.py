@@ -5,9 +5,8 @@ from playwright.sync_api import Page, Route, expect
 from tests.app.nouns import finish
 from tests.browser.looks import picture
 from tests.browser.serving import NewContext, wait_for_toast
-from tests.browser.test_scene_tools import ask
 from tests.browser.test_together import sample
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, ask, signed_in
 
 
 class Review:
@@ -24,9 +23,12 @@ def test_an_annotator_sees_disabled_review_buttons_and_can_comment(new_context: 
     page = signed_in(context, server, "cleo")
     project = sample(page)
     review = Review(page)
+    early = {"kind": "not-ready", "message": "there is no finished scene yet", "hint": "run the project first"}
+    page.route("**/viewer/show", lambda route: route.fulfill(status=409, json=early))
     page.goto(f"{project}/review")
     expect(review.scene).to_contain_text("there is no finished scene yet")  # said where the scene will be
     expect(page.locator(".toast.bad")).to_have_count(0)
+    page.unroute("**/viewer/show")
     held: list[Route] = []
     page.route("**/candidates", lambda route: held.append(route))
     finish(server.data / "projects" / project.split("/p/")[1] / "work")

@@ -6,17 +6,17 @@ from playwright.sync_api import expect
 
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.test_together import pick, rows, sample
-from tests.browser.together import Server, post, signed_in
+from tests.browser.test_together import both, pick, rows, sample
+from tests.browser.together import Server, post
 
 
 def test_assigned_objects_are_counted_in_the_inbox_of_the_assignee(new_context: NewContext, server: Server) -> None:
-    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
-    ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
+    ann, bea = both(new_context, server, bypass_csp=True)  # for axe
     project = sample(ann)
     for _ in range(10):
         post(ann, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "bottle"})
     ann.goto(f"{project}/annotate")
+    bea.goto(server.address)
     inbox = bea.locator("r2c2r-who").get_by_role("link", name="Inbox")
 
     # one object, by keyboard, in the list; undone and redone

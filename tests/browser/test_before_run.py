@@ -24,7 +24,7 @@ def test_objects_that_would_spoil_a_run_are_listed_before_it(new_context: NewCon
     click_frame(page, 30, 90)
     expect(rows(page)).to_have_count(3)
     post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "bottle"})
-    post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "mug", "points": [SAME]})  # type: ignore[dict-item]
+    post(page, f"/api/projects/{project.split('/p/')[1]}/objects", {"category": "mug", "points": [SAME]})
     expect(rows(page).last).to_contain_text("3 frames")
     page.get_by_role("link", name="Run", exact=True).click()
     expect(before.get_by_role("heading")).to_have_text("Fix this before the run")

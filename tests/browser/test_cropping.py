@@ -31,9 +31,10 @@ def test_a_crop_box_is_dragged_typed_undone_and_removed(new_context: NewContext,
     context = new_context()
     context.clock.install()
     page = signed_in(context, server, "ann")
-    project = sample(page).split("/p/")[1]
+    address = sample(page)
+    project = address.split("/p/")[1]
     finish(server.data / "projects" / project / "work")  # cameras and depth, as after reading the recording
-    page.get_by_role("link", name="Annotate").click()
+    page.goto(f"{address}/annotate")
     ready(page)
     page.get_by_role("button", name="mug_1", exact=True).click()
     page.keyboard.press("g")

@@ -40,8 +40,7 @@ def until_drawn(page: Page, *, whole: bool) -> None:
 def test_two_objects_on_one_panel_have_separate_masks(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Annotate").click()
+    page.goto(f"{sample(page)}/annotate")
     page.get_by_role("button", name="New object").click()
     click_frame(page, 20, 60)
     expect(page.get_by_label("Name of drawer_2")).to_be_visible()

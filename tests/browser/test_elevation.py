@@ -46,8 +46,7 @@ def stored(page: Page) -> list[dict[str, Any]]:
 def test_fronts_are_drawn_split_resized_merged_and_undone(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Elevation").click()
+    page.goto(f"{sample(page)}/elevation")
     expect(page.locator(".planes li")).to_have_count(1)
     expect(page.locator(".elevation .tip")).to_contain_text("Drag over a front")
     page.get_by_role("button", name="Plane 1, 2.40 × 0.90 m").click()
@@ -111,8 +110,7 @@ def names(page: Page) -> list[str]:
 def test_a_row_of_fronts_is_divided_repeated_numbered_and_undone_by_keyboard(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Elevation").click()
+    page.goto(f"{sample(page)}/elevation")
     expect(page.locator(".elevation .tip")).to_contain_text("D divides it")
     drag(page, (0.1, 0.1), (1.0, 0.8))
     expect(fronts(page)).to_have_count(1)
@@ -174,8 +172,7 @@ def test_a_row_of_fronts_is_divided_repeated_numbered_and_undone_by_keyboard(new
 def test_a_merge_keeps_the_handle_and_undo_skips_changes_without_effect(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Elevation").click()
+    page.goto(f"{sample(page)}/elevation")
     expect(page.locator(".elevation .tip")).to_contain_text("Drag over a front")
     with page.expect_response(lambda response: response.request.method == "POST"):  # its edges may snap
         drag(page, (0.6, 0.1), (1.2, 0.8))
@@ -207,8 +204,7 @@ def test_a_merge_keeps_the_handle_and_undo_skips_changes_without_effect(new_cont
 def test_handle_and_hinge_of_one_front_are_copied_to_the_others(new_context: NewContext, server: Server) -> None:
     context = new_context(bypass_csp=True)
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Elevation").click()
+    page.goto(f"{sample(page)}/elevation")
     expect(page.locator(".elevation .tip")).to_contain_text("Drag over a front")
     drag(page, (0.02, 0.1), (0.6, 0.8))
     expect(fronts(page)).to_have_count(1)
@@ -245,8 +241,7 @@ def test_handle_and_hinge_of_one_front_are_copied_to_the_others(new_context: New
 def test_the_header_of_a_project_fits_a_phone_screen(new_context: NewContext, server: Server) -> None:
     context = new_context(viewport={"width": 420, "height": 800})
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Elevation").click()
+    page.goto(f"{sample(page)}/elevation")
     expect(page.locator(".planes li")).to_have_count(1)
     assert page.evaluate("document.documentElement.scrollWidth") <= 420
     page.goto(page.url.replace("/elevation", "/download"))

@@ -12,13 +12,13 @@ from tests.browser.test_together import click_frame, ready, rows, sample
 from tests.browser.together import Server, signed_in
 
 
-def test_a_honeypot_is_assigned_annotated_and_scored(new_context: NewContext, server: Server) -> None:
+def test_a_honeypot_is_assigned_annotated_and_scored(new_context: NewContext, own_server: Server) -> None:
     contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
-    ann, cleo = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "cleo"), strict=True))
+    ann, cleo = (signed_in(context, own_server, name) for context, name in zip(contexts, ("ann", "cleo"), strict=True))
     project = sample(ann).split("/p/")[1]
-    write_truth(server.data / "projects" / project / "source")
+    write_truth(own_server.data / "projects" / project / "source")
 
-    ann.goto(f"{server.address}/people")
+    ann.goto(f"{own_server.address}/people")
     ann.get_by_role("combobox", name="For", exact=True).select_option("cleo")
     ann.get_by_label("Called", exact=True).fill("Flat 7")
     ann.get_by_role("button", name="Add to the inbox").press("Enter")
@@ -26,6 +26,7 @@ def test_a_honeypot_is_assigned_annotated_and_scored(new_context: NewContext, se
     line = ann.get_by_role("region", name="Honeypots").locator("tbody tr")
     expect(line).to_contain_text("0 of 2")
 
+    cleo.goto(own_server.address)
     cleo.locator("r2c2r-who").get_by_role("link", name="Inbox").press("Enter")
     cleo.get_by_role("link", name="Flat 7").press("Enter")
     cleo.get_by_role("link", name="Click objects").press("Enter")
@@ -36,7 +37,7 @@ def test_a_honeypot_is_assigned_annotated_and_scored(new_context: NewContext, se
     click_frame(cleo, 140, 20)  # on no object
     expect(rows(cleo)).to_have_count(1)
     expect(rows(cleo).last).to_contain_text("3 frames")
-    cleo.goto(f"{server.address}/people")
+    cleo.goto(f"{own_server.address}/people")
     expect(cleo.get_by_role("heading", name="Your own password")).to_be_visible()
     expect(cleo.get_by_role("heading", name="Honeypots")).to_be_hidden()
 

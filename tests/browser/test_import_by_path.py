@@ -10,6 +10,7 @@ from tests.browser.together import Server, signed_in
 def test_a_refused_import_path_stays_with_the_reason_and_the_remedy(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
+    page.goto(server.address)
     page.get_by_role("button", name="From this machine…").click()
     field = page.get_by_label("Path on this machine")
     box = box_of(field)

@@ -13,6 +13,7 @@ def test_tagged_archived_duplicated_and_deleted_projects_are_recoverable(new_con
     page = signed_in(context, server, "ann")
     for name in ("Cellar", "Attic"):
         post(page, "/api/projects/sample", {"name": name})
+    page.goto(server.address)
     names = page.locator(".cards h2 a")
     expect(page.get_by_text("annotating")).to_have_count(2)
     expect(page.get_by_role("button", name="Tags: Cellar")).to_be_hidden()

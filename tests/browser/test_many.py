@@ -108,6 +108,7 @@ def test_projects_are_searched_and_sorted(new_context: NewContext, server: Serve
     page = signed_in(context, server, "ann")
     for name in ("Cellar", "Attic", "Bath", "Attic two"):
         post(page, "/api/projects/sample", {"name": name})
+    page.goto(server.address)
     names = page.locator(".card h2 a")
     expect(names).to_have_count(4)
     page.get_by_label("Order of the projects").select_option("name")

@@ -11,8 +11,7 @@ from tests.browser.together import Server, signed_in
 def test_the_opening_lane_shows_the_state_of_the_front_in_the_frame(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Annotate").click()
+    page.goto(f"{sample(page)}/annotate")
     page.get_by_label("Category of the next object").fill("cabinet")
     page.get_by_role("button", name="New object").click()
     click_frame(page, 100, 40)  # tests/app/fakes/live.py reports it as closed, opened and open

@@ -8,13 +8,12 @@ from playwright.sync_api import expect
 
 from tests.browser.looks import picture, scroll_to, serious
 from tests.browser.serving import NewContext, wait_for_toast
-from tests.browser.test_together import click_frame, ready, rows, sample
-from tests.browser.together import Server, post, signed_in
+from tests.browser.test_together import both, click_frame, ready, rows, sample
+from tests.browser.together import Server, post
 
 
 def test_a_second_opinion_is_requested_given_and_compared(new_context: NewContext, server: Server) -> None:
-    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
-    ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
+    ann, bea = both(new_context, server, bypass_csp=True)  # for axe
     project = sample(ann)
     ann.goto(f"{project}/annotate?frame=3")
     ready(ann)
@@ -35,6 +34,7 @@ def test_a_second_opinion_is_requested_given_and_compared(new_context: NewContex
     picture(ann, "opinions-overview")
     assert serious(ann, "overview with second opinions") == []
 
+    bea.goto(server.address)
     bea.locator("r2c2r-who").get_by_role("link", name="Inbox").press("Enter")
     bea.get_by_role("link", name="Sample kitchen (opinion of bea)").press("Enter")
     bea.get_by_role("link", name="Click objects").press("Enter")

@@ -21,8 +21,7 @@ def said(page: Page) -> list[dict[str, Any]]:
 def test_a_mask_is_painted_confirmed_and_marked_absent(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Annotate").click()
+    page.goto(f"{sample(page)}/annotate")
     canvas = page.locator("r2c2r-frame-canvas canvas")
     page.get_by_role("button", name="drawer_1", exact=True).first.wait_for()
     ready(page)  # while masks of listed objects are loading, painting is refused
@@ -52,8 +51,7 @@ def test_a_mask_is_painted_confirmed_and_marked_absent(new_context: NewContext, 
 def test_eraser_lasso_polygon_and_keep_each_correct_the_mask(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Annotate").click()
+    page.goto(f"{sample(page)}/annotate")
     page.get_by_role("button", name="drawer_1", exact=True).first.wait_for()
     ready(page)  # while masks of listed objects are loading, painting is refused
     page.keyboard.press("1")

@@ -13,19 +13,20 @@ from playwright.sync_api import expect
 from app.files import project_files
 from tests.browser.looks import picture
 from tests.browser.serving import NewContext, printed_again, served, wait_for_toast
-from tests.browser.test_scene_tools import ask
-from tests.browser.together import Server, signed_in
+from tests.browser.test_together import both, sample
+from tests.browser.together import Server, ask, signed_in
 from tests.waiting import until
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def webhooks_here(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("R2C2R_WEBHOOKS_TO", "127.0.0.0/8")
 
 
-def test_an_added_account_signs_in_and_a_removed_one_is_signed_out(new_context: NewContext, server: Server) -> None:
+def test_an_added_account_signs_in_and_a_removed_one_is_signed_out(new_context: NewContext, own_server: Server) -> None:
     contexts = [new_context() for _ in range(2)]
-    ann = signed_in(contexts[0], server, "ann")
+    ann = signed_in(contexts[0], own_server, "ann")
+    ann.goto(own_server.address)
     ann.get_by_role("link", name="People").click()
     ann.get_by_label("Name").fill("carl")
     ann.get_by_label("Password, at least 10 characters", exact=True).fill("carl123456")
@@ -35,7 +36,12 @@ def test_an_added_account_signs_in_and_a_removed_one_is_signed_out(new_context: 
     ann.get_by_role("button", name="Add").click()
     wait_for_toast(ann, "carl may sign in now")
 
-    carl = signed_in(contexts[1], server, "carl", "a password of carl")
+    carl = contexts[1].new_page()
+    carl.goto(f"{own_server.address}/login")
+    carl.get_by_label("Name").fill("carl")
+    carl.get_by_label("Password").fill("a password of carl")
+    carl.get_by_role("button", name="Sign in").click()
+    carl.get_by_role("heading", name="Projects").wait_for()
     me = carl.locator("r2c2r-who").get_by_role("link", name="carl")
     expect(me).to_have_attribute("title", "annotator: your account")
     me.click()
@@ -56,12 +62,12 @@ def test_an_added_account_signs_in_and_a_removed_one_is_signed_out(new_context: 
     ann.get_by_role("button", name="Remove carl").click()
     expect(ann.get_by_label("Role of carl")).to_have_count(0)
     expect(carl.get_by_role("button", name="Sign in")).to_be_visible()  # his open page is signed out
-    carl.goto(server.address)
+    carl.goto(own_server.address)
     expect(carl.get_by_role("button", name="Sign in")).to_be_visible()
 
 
 def test_used_printed_addresses_and_wrong_passwords_are_explained(
-    new_context: NewContext, tmp_path: Path, server: Server
+    new_context: NewContext, tmp_path: Path, own_server: Server
 ) -> None:
     context = new_context()
     page = context.new_page()
@@ -79,7 +85,7 @@ def test_used_printed_addresses_and_wrong_passwords_are_explained(
         late.goto(printed_again(address))
         expect(late.get_by_role("heading", name="Projects")).to_be_visible()
         stranger.close()
-    page.goto(f"{server.address}/login")
+    page.goto(f"{own_server.address}/login")
     page.get_by_label("Name").fill("ann")
     page.get_by_label("Password").fill("not hers at all")
     page.get_by_role("button", name="Sign in").click()
@@ -87,7 +93,8 @@ def test_used_printed_addresses_and_wrong_passwords_are_explained(
     expect(page.get_by_role("button", name="Sign in")).to_be_enabled()
 
 
-def test_webhooks_are_added_tested_and_removed_by_keyboard(new_context: NewContext, server: Server) -> None:
+@pytest.mark.usefixtures("webhooks_here")
+def test_webhooks_are_added_tested_and_removed_by_keyboard(new_context: NewContext, own_server: Server) -> None:
     heard: list[str] = []
 
     class Listening(BaseHTTPRequestHandler):
@@ -103,7 +110,8 @@ def test_webhooks_are_added_tested_and_removed_by_keyboard(new_context: NewConte
         threading.Thread(target=listening.serve_forever, daemon=True).start()
         url = f"http://127.0.0.1:{listening.server_port}/r2c2r"
         context = new_context()
-        ann = signed_in(context, server, "ann")
+        ann = signed_in(context, own_server, "ann")
+        ann.goto(own_server.address)
         ann.keyboard.press("Control+k")
         ann.keyboard.type("Webhooks")
         ann.keyboard.press("Enter")
@@ -141,9 +149,9 @@ def test_webhooks_are_added_tested_and_removed_by_keyboard(new_context: NewConte
 
 
 def test_a_project_is_restricted_to_members_chosen_by_its_owner(new_context: NewContext, server: Server) -> None:
-    contexts = [new_context() for _ in range(2)]
-    ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
-    ann.get_by_role("button", name="Sample kitchen", exact=True).click()
+    ann, bea = both(new_context, server)
+    bea.goto(server.address)
+    ann.goto(sample(ann))
     card = bea.locator(".cards > li").get_by_role("link")
     expect(card).to_have_count(1)
 
@@ -190,9 +198,7 @@ def test_a_project_is_restricted_to_members_chosen_by_its_owner(new_context: New
 def test_an_admin_leaves_or_adopts_a_folder_set_aside(new_context: NewContext, server: Server) -> None:
     context = new_context()
     ann = signed_in(context, server, "ann")
-    ann.get_by_role("button", name="Sample kitchen", exact=True).click()
-    ann.get_by_role("link", name="Run on 2 objects").wait_for()
-    project = ann.url.rsplit("/", 1)[1]
+    project = sample(ann).rsplit("/", 1)[1]
     files = project_files(server.data, project)
     until(lambda: files.description.exists() and "mug_1" in files.description.read_text())  # written with a short delay
     shutil.copytree(files.root, server.data / "unknown" / project)

@@ -29,8 +29,7 @@ def pixels(canvas: Locator) -> int:
 def test_a_click_on_a_mask_selects_its_object_instead_of_adding_one(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Annotate").click()
+    page.goto(f"{sample(page)}/annotate")
     ready(page)
     page.get_by_role("button", name="New object").click()
     click_frame(page, 100, 40)
@@ -56,8 +55,7 @@ def test_a_click_on_a_mask_selects_its_object_instead_of_adding_one(new_context:
 def test_dragging_with_space_pans_and_tapping_space_plays(new_context: NewContext, server: Server) -> None:
     context = new_context()
     page = signed_in(context, server, "ann")
-    sample(page)
-    page.get_by_role("link", name="Annotate").click()
+    page.goto(f"{sample(page)}/annotate")
     ready(page)
     expect(rows(page)).to_have_count(2)
     counter = page.locator("r2c2r-film-strip output")

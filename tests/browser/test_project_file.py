@@ -30,9 +30,10 @@ def downloaded(page: Page, to: Path) -> bytes:
 def test_a_project_is_exported_and_imported_as_one_file(new_context: NewContext, server: Server, tmp_path: Path) -> None:
     context = new_context(bypass_csp=True)
     page = signed_in(context, server, "ann")
+    page.goto(server.address)
     project = import_file(page, "Kitchen.r3d", R3D)
     expect(page.get_by_role("link", name="Click objects")).to_be_visible()
-    post(page, f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]})  # type: ignore[dict-item]
+    post(page, f"/api/projects/{project}/objects", {"category": "drawer", "points": [CLICK]})
     post(page, f"/api/projects/{project}/comments", {"text": "a scratch"})
     page.get_by_role("button", name="Export…").press("Enter")
     dialog = page.get_by_role("dialog", name="Export Kitchen")
@@ -53,6 +54,7 @@ def test_a_project_is_exported_and_imported_as_one_file(new_context: NewContext,
 
     context = new_context(bypass_csp=True)
     page = signed_in(context, server, "cleo")
+    page.goto(server.address)
     import_file(page, "Kitchen.r2c2r.zip", light)
     expect(page.get_by_role("heading", name="The recording is missing")).to_be_visible()
     expect(page.get_by_role("alert")).to_contain_text("choose the recording it was made from")

@@ -14,8 +14,7 @@ from tests.browser.together import Server, signed_in
 
 def clicked_cabinet(page: Page) -> None:
     """The elevation of a front whose right and lower edges are faint, as tests/app/fakes/live.py finds it."""
-    sample(page)
-    page.get_by_role("link", name="Annotate").click()
+    page.goto(f"{sample(page)}/annotate")
     page.get_by_label("Category of the next object").fill("cabinet")
     page.get_by_role("button", name="New object").click()
     click_frame(page, 100, 40)

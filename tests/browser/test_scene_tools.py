@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from playwright.sync_api import Page, TimeoutError, expect
 
 from app.viewer.assembly import Assembly, shapes_of
@@ -17,22 +18,18 @@ from tests.app.nouns import finish
 from tests.browser.looks import picture, scroll_to
 from tests.browser.serving import NewContext, box_of, wait_for_toast
 from tests.browser.test_together import sample, viewed
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, ask, signed_in
 from tests.core.export.kitchen import kitchen
 from tests.core.export.test_report import certificate
 from tests.waiting import until
 
-ASK = """async ([method, path, body]) => {
-  const options = { method, headers: { "content-type": "application/json", "x-requested-with": "r2c2r" } };
-  const answer = await fetch(path, body === null ? options : { ...options, body: JSON.stringify(body) });
-  return await answer.json();
-}"""
 HEARD_MS = 6000  # the page polls that long for the clicked object
 CLICK = {"frame": 3, "x": 80, "y": 60, "label": 1}
 
 
-def ask(page: Page, method: str, path: str, body: Any = None) -> Any:
-    return page.evaluate(ASK, [method, path, body])
+@pytest.fixture
+def scenes() -> bool:
+    return True
 
 
 def finished(page: Page, server: Server) -> str:

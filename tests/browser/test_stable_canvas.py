@@ -4,9 +4,8 @@ from playwright.sync_api import FloatRect, Page, expect
 
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of
-from tests.browser.test_scene_tools import ask
 from tests.browser.test_together import FRAME, click_frame, ready, rows, sample
-from tests.browser.together import Server, signed_in
+from tests.browser.together import Server, ask, signed_in
 
 
 def share_of_window(page: Page) -> float:
@@ -21,9 +20,9 @@ def layout(page: Page) -> list[FloatRect]:
     return [box_of(page.locator(part)) for part in (".topbar", "main")]
 
 
-def test_appearing_elements_do_not_move_the_picture(new_context: NewContext, server: Server) -> None:
+def test_appearing_elements_do_not_move_the_picture(new_context: NewContext, own_server: Server) -> None:
     context = new_context(viewport={"width": 1280, "height": 720})
-    page = signed_in(context, server, "ann")
+    page = signed_in(context, own_server, "ann")
     project = sample(page)
     others = {path: context.new_page() for path in ("run", "review")}
     for path, other in others.items():
@@ -46,7 +45,7 @@ def test_appearing_elements_do_not_move_the_picture(new_context: NewContext, ser
     picture(page, "canvas-1280")
     pages = [page, *others.values()]
     before = [layout(each) for each in pages]
-    server.kill()
+    own_server.kill()
     for each, (header, main) in zip(pages, before, strict=True):
         expect(each.get_by_text("The server does not answer")).to_be_visible()
         assert layout(each) == [header, main]

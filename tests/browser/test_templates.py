@@ -8,11 +8,12 @@ from tests.browser.test_together import click_frame, pick, ready, rows, sample, 
 from tests.browser.together import Server, signed_in
 
 
-def test_a_template_is_saved_edited_adopted_and_clicked(new_context: NewContext, server: Server) -> None:
+def test_a_template_is_saved_edited_adopted_and_clicked(new_context: NewContext, own_server: Server) -> None:
     context = new_context(bypass_csp=True)  # bypass_csp for axe
-    page = signed_in(context, server, "ann")
+    page = signed_in(context, own_server, "ann")
+    page.goto(own_server.address)
     expect(page.get_by_label("Objects to click")).to_be_hidden()  # there is no template yet
-    sample(page)
+    page.goto(sample(page))
     viewed(page)
     page.get_by_role("button", name="Keep this project's objects as a template…").press("Enter")
     expect(page.get_by_role("dialog")).to_contain_text("2 objects: names and categories, no clicks")
@@ -35,10 +36,12 @@ def test_a_template_is_saved_edited_adopted_and_clicked(new_context: NewContext,
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     page.set_viewport_size({"width": 1280, "height": 720})
 
-    page.goto(server.address)  # when creating a project
+    page.goto(own_server.address)  # when creating a project
     page.get_by_label("Objects to click").select_option("Flat 3")
     picture(page, "templates-projects")
-    project = sample(page)
+    page.get_by_role("button", name="Sample kitchen", exact=True).click()
+    page.wait_for_url("**/p/*")
+    project = page.url
     todo = page.get_by_role("region", name="Objects to click")
     expect(todo).to_contain_text("2 of 4 are clicked. Still to click: oven_1, range_hood.")
     scroll_to(todo)

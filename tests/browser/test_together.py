@@ -4,31 +4,28 @@ import json
 import re
 from typing import Any
 
-import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.app.nouns import finish
 from tests.browser.looks import picture, serious
 from tests.browser.serving import NewContext, box_of, wait_for_toast
-from tests.browser.together import Server, post, signed_in
+from tests.browser.together import Server, ask, post, signed_in
+from tests.waiting import until
 
 FRAME = (160, 120)
 STUCK_X = 158  # the stand-in segmenter draws one frame there and blocks
 
 
-@pytest.fixture
-def people(new_context: NewContext, server: Server) -> tuple[Page, Page]:
-    """A page of Ann's and one of Bea's, both signed in."""
-    contexts = [new_context() for _ in range(2)]
-    pages = [signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True)]
-    return pages[0], pages[1]
+def both(new_context: NewContext, server: Server, **looks: Any) -> tuple[Page, Page]:
+    """A page of Ann's and one of Bea's."""
+    return signed_in(new_context(**looks), server, "ann"), signed_in(new_context(**looks), server, "bea")
 
 
 def sample(page: Page) -> str:
-    """Create a sample project; return the address of its overview."""
-    page.get_by_role("button", name="Sample kitchen", exact=True).click()
-    page.get_by_role("link", name="Run on 2 objects").wait_for()
-    return page.url
+    """Create a sample project; return the address of its overview, once its recording is read."""
+    project = ask(page, "POST", "/api/projects/sample", {})["id"]
+    until(lambda: ask(page, "GET", f"/api/projects/{project}")["status"] == "ready")
+    return f"{page.evaluate('location.origin')}/p/{project}"
 
 
 def click_frame(page: Page, x: float, y: float, *, button: str = "left") -> None:
@@ -72,8 +69,8 @@ def ready(page: Page) -> None:
     page.locator(".chip", has_text=re.compile("^ready$")).wait_for()
 
 
-def test_clicks_survive_undo_conflicts_lost_connections_and_server_crashes(people: tuple[Page, Page], server: Server) -> None:
-    ann, bea = people
+def test_clicks_survive_undo_conflicts_lost_connections_and_server_crashes(new_context: NewContext, own_server: Server) -> None:
+    people = ann, bea = both(new_context, own_server)
     project = sample(ann)
     ann.goto(f"{project}/annotate?frame=3")
     ready(ann)
@@ -139,14 +136,14 @@ def test_clicks_survive_undo_conflicts_lost_connections_and_server_crashes(peopl
 
     # the server dies; later clicks are sent once it is back, even from a page that was closed
     stored(ann)
-    server.kill()
+    own_server.kill()
     pick(ann, "drawer_1")
     click_frame(ann, 60, 60)
     click_frame(ann, 60, 90, button="right")
     expect(ann.locator(".banner")).to_contain_text("2 changes not stored yet")
     context = ann.context
     ann.close()
-    server.start()
+    own_server.start()
     again = context.new_page()
     again.goto(f"{project}/annotate?frame=3")
     expect(rows(again).first).to_contain_text("3 clicks")
@@ -154,8 +151,9 @@ def test_clicks_survive_undo_conflicts_lost_connections_and_server_crashes(peopl
     stored(again)
 
 
-def test_two_people_take_a_project_from_draft_to_approval(people: tuple[Page, Page], server: Server) -> None:
-    ann, bea = people
+def test_two_people_take_a_project_from_draft_to_approval(new_context: NewContext, server: Server) -> None:
+    people = ann, bea = both(new_context, server)
+    bea.goto(server.address)
     project = sample(ann)
     folder = server.data / "projects" / project.rsplit("/", 1)[-1]
 
@@ -303,9 +301,9 @@ def move(page: Page, step: str, reason: str = "") -> None:
 
 
 def test_the_inbox_lists_open_work_and_the_overview_lists_news(new_context: NewContext, server: Server) -> None:
-    contexts = [new_context(bypass_csp=True) for _ in range(2)]  # bypass_csp for axe
-    ann, bea = (signed_in(context, server, name) for context, name in zip(contexts, ("ann", "bea"), strict=True))
+    ann, bea = both(new_context, server, bypass_csp=True)  # for axe
     address = sample(ann)
+    ann.goto(address)
     inbox = bea.locator("r2c2r-who").get_by_role("link", name="Inbox")
     with bea.expect_response(lambda answer: answer.request.method == "PUT" and answer.ok):  # later changes count as news
         bea.goto(address)

@@ -22,7 +22,8 @@ class Beside(Server):
 
     def __init__(self, data: Path) -> None:
         data.mkdir()
-        self.data, self.port, self.live = data, free_port(), "live"
+        self.data, self.port, self.live, self.scenes = data, free_port(), "live", False
+        self._clients = {}
 
 
 @pytest.fixture

@@ -3,8 +3,9 @@
 import shutil
 from functools import cache
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
+import httpx
 from playwright.sync_api import BrowserContext, Page
 
 from app.db.engine import open_engine
@@ -14,17 +15,28 @@ from tests.app.conftest import migrated
 from tests.browser.stand_in import serve_stand_in
 from tests.forked import Forked
 from tests.ports import free_port
+from tests.waiting import PATIENCE_S
 
 PASSWORD = "correct horse battery"
 PEOPLE = {"ann": "admin", "bea": "reviewer", "cleo": "annotator"}
+EMPTY = "/static/icons/logo.svg"  # a page that loads nothing else
+ASK = """async ([method, path, body]) => {
+  const options = { method, headers: { "content-type": "application/json", "x-requested-with": "r2c2r" } };
+  const answer = await fetch(path, body === null ? options : { ...options, body: JSON.stringify(body) });
+  return [answer.status, answer.status === 204 ? null : await answer.json()];
+}"""
 
 
 class Server:
-    """The app on its own port, restartable on the same data; Ann, Bea and Cleo have accounts."""
+    """The app on its own port, restartable on the same data; Ann, Bea and Cleo have accounts.
 
-    def __init__(self, data: Path, live: str = "live") -> None:
-        self.data, self.port, self.live = data, free_port(), live
+    `live` is the live segmenter among tests/app/fakes; 3D views are empty unless there are `scenes`.
+    """
+
+    def __init__(self, data: Path, live: str = "live", *, scenes: bool = False) -> None:
+        self.data, self.port, self.live, self.scenes = data, free_port(), live, scenes
         self.process: Forked | None = None
+        self._clients: dict[str, httpx.Client] = {}
         shutil.copy(_with_people(), data / DATABASE)
 
     def __enter__(self) -> Self:
@@ -33,6 +45,8 @@ class Server:
 
     def __exit__(self, *_: object) -> None:
         assert self.process is not None
+        for client in self._clients.values():
+            client.close()
         self.process.end()  # it ends its workers; those of a killed server would go on
 
     @property
@@ -40,7 +54,7 @@ class Server:
         return f"http://localhost:{self.port}"
 
     def start(self) -> None:
-        self.process = Forked(serve_stand_in, self.data, self.port, self.live, ["localhost"])
+        self.process = Forked(serve_stand_in, self.data, self.port, self.live, self.scenes, ["localhost"])
         said = self.process.readline()
         if "http://localhost" not in said:
             self.kill()
@@ -49,6 +63,21 @@ class Server:
     def kill(self) -> None:
         assert self.process is not None
         self.process.kill()
+
+    def client(self, name: str) -> httpx.Client:
+        """A client of the person, who signs in once per server, as checking passwords takes time."""
+        if name not in self._clients:
+            headers = {"x-requested-with": "tests", "origin": self.address}
+            made = self._clients[name] = httpx.Client(base_url=self.address, headers=headers, timeout=PATIENCE_S)
+            made.post("/api/login", json={"name": name, "password": PASSWORD}).raise_for_status()
+        return self._clients[name]
+
+    def clear(self) -> None:
+        """Delete every project, with its running jobs and processes."""
+        admin = self.client("ann")
+        for place in ("projects", "trash"):
+            for found in admin.get(f"/api/{place}").raise_for_status().json():
+                admin.delete(f"/api/{place}/{found['id']}").raise_for_status()
 
 
 @cache
@@ -63,21 +92,22 @@ def _with_people() -> Path:
     return path
 
 
-def signed_in(context: BrowserContext, server: Server, name: str, password: str = PASSWORD) -> Page:
-    """A page of the person, at the projects."""
+def signed_in(context: BrowserContext, server: Server, name: str) -> Page:
+    """An empty page of the person, who is signed in."""
+    cookies = server.client(name).cookies.jar
+    context.add_cookies([{"name": one.name, "value": one.value or "", "url": server.address} for one in cookies])
     page = context.new_page()
-    page.goto(f"{server.address}/login")
-    page.get_by_label("Name").fill(name)
-    page.get_by_label("Password").fill(password)
-    page.get_by_role("button", name="Sign in").click()
-    page.get_by_role("heading", name="Projects").wait_for()
+    page.goto(f"{server.address}{EMPTY}")
     return page
 
 
-def post(page: Page, path: str, body: dict[str, str]) -> None:
+def ask(page: Page, method: str, path: str, body: Any = None) -> Any:
+    """What the API answers to the page, with its session."""
+    status, answer = page.evaluate(ASK, [method, path, body])
+    assert status < 400, answer
+    return answer
+
+
+def post(page: Page, path: str, body: dict[str, Any]) -> None:
     """POST to the API from the page, with its session."""
-    script = """async ([path, body]) => {
-      const headers = { "content-type": "application/json", "x-requested-with": "r2c2r" };
-      return (await fetch(path, { method: "POST", headers, body: JSON.stringify(body) })).status;
-    }"""
-    assert page.evaluate(script, [path, body]) in (201, 202)
+    ask(page, "POST", path, body)

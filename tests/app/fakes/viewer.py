@@ -15,7 +15,7 @@ from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection, serve
 
 KEY = json.loads(sys.stdin.readline())["key"]
-PAGE = b"<html><head><title>3D</title></head></html>"
+PAGE = b"<html><head><title>3D</title></head><body><canvas></canvas></body></html>"
 
 
 def page(connection: ServerConnection, request: Request) -> Response | None:
