@@ -41,15 +41,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.skip(reason="no Chromium on this machine"))
 
 
-@pytest.fixture(scope="session")
-def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from r2c2r_core.synthetic.stage import write_sample
-
-    folder = tmp_path_factory.mktemp("sample")
-    write_sample(folder, seed=3, frames=16, size=(320, 240))
-    return folder
-
-
 @pytest.fixture
 def address(tmp_path: Path) -> Iterator[str]:
     """The app on a free port, with an empty database."""
@@ -103,7 +94,7 @@ def live() -> str:
 
 @pytest.fixture
 def scenes() -> bool:
-    """Whether `server` draws 3D views; modules that look at them override it."""
+    """Whether `server` draws 3D views; tests that look at them override it."""
     return False
 
 

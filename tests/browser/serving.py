@@ -3,11 +3,13 @@
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from playwright.sync_api import BrowserContext, FloatRect, Locator, Page, expect
 
 from app.serve import new_address, serve
+from tests.browser.stand_in import serve_stand_in
 from tests.forked import forked
 from tests.waiting import until
 
@@ -34,9 +36,10 @@ def printed_again(address: str) -> str:
 
 
 @contextmanager
-def served(data: Path, heavy_jobs: int = 1) -> Iterator[str]:
-    """The app on a free port over a data folder; the address it prints."""
-    with forked(serve, host="127.0.0.1", port=0, data_dir=data, heavy_jobs=heavy_jobs) as server:
+def served(data: Path, *, stand_ins: bool = False) -> Iterator[str]:
+    """The app on a free port over a data folder, maybe with stand-ins for its slow parts; the address it prints."""
+    run = partial(serve_stand_in, live="live", scenes=False, names=()) if stand_ins else partial(serve, host="127.0.0.1")
+    with forked(run, port=0, data_dir=data) as server:
         line = server.readline()
         found = re.search(r"(http://\S+?/)\S*", line)
         assert found, line

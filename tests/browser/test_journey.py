@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.looks import picture
 from tests.browser.serving import box_of, drawn
+from tests.browser.together import ask
 from tests.waiting import PATIENCE_MS
 
 LONG_MS = 4 * PATIENCE_MS  # the pipeline on two busy cores
@@ -36,15 +38,34 @@ def seek(page: Page, frame: int) -> None:
     expect(page.locator("r2c2r-film-strip output")).to_contain_text(f"frame {frame} ")
 
 
-def test_a_scan_is_imported_clicked_run_reviewed_and_downloaded(page: Page, address: str, sample: Path, tmp_path: Path) -> None:
-    # Projects: the empty state offers the sample
-    expect(page.get_by_role("button", name="Open the sample kitchen")).to_be_visible()
+def test_a_kitchen_is_rendered_and_its_scan_imported_clicked_run_reviewed_and_downloaded(page: Page, tmp_path: Path) -> None:
+    # Projects: the empty state offers the sample, whose frames are shown as they are rendered
+    small = json.dumps({"seed": 1, "frames": 10, "width": 320, "height": 240})
+    page.route("**/api/projects/sample", lambda route: route.continue_(post_data=small))
     picture(page, "1-projects-empty")
+    page.get_by_role("button", name="Open the sample kitchen").click()
+    rendered = page.get_by_alt_text("The frame that was rendered last")
+    expect(rendered).to_be_visible()
+    assert rendered.evaluate("image => image.naturalWidth") == 480
 
-    # Import by upload
+    # Annotate: its objects have masks, without any click or request
+    page.get_by_role("link", name="Annotate").click(timeout=PATIENCE_MS)
+    expect(page.locator(".transport .chip").first).to_have_text("ready")
+    rows = page.locator(".object-list > li")
+    expect(rows.first).to_contain_text("frames")
+    seen = rows.all_text_contents()  # includes the number of frames, shown for the selected one
+    assert len(seen) > 5
+    assert all("frame" in row for row in seen), seen
+
+    # Import by upload: the recording of the sample, whose project is deleted
+    folder = next((tmp_path / "served" / "projects").iterdir())
+    sample = shutil.copytree(folder / "source", tmp_path / "sample")
+    page.unroute_all()
+    ask(page, "DELETE", f"/api/projects/{folder.name}")
+    page.goto(page.url.split("/p/")[0])
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Import a scan").first.click()
-    chooser.value.set_files(sample / "scan.r3d")
+    chooser.value.set_files(next(sample.glob("*.r3d")))
     page.wait_for_url(re.compile(r"/p/\w+"))
     page.get_by_role("link", name="Click objects").wait_for(timeout=LONG_MS)
     expect(page.get_by_text("320 × 240")).to_be_visible()
@@ -113,22 +134,6 @@ def test_a_scan_is_imported_clicked_run_reviewed_and_downloaded(page: Page, addr
         assert bundle.testzip() is None
         names = {name.removeprefix(f"{Path(bundle.namelist()[0]).parts[0]}/") for name in bundle.namelist()}
         assert {"scene.urdf", "scene.xml", "scene.glb", "manifest.json", "report.html"} <= names | set(bundle.namelist())
-
-
-def test_the_sample_shows_rendered_frames_and_opens_with_masks(page: Page) -> None:
-    small = json.dumps({"seed": 1, "frames": 10, "width": 320, "height": 240})
-    page.route("**/api/projects/sample", lambda route: route.continue_(post_data=small))
-    page.get_by_role("button", name="Open the sample kitchen").click()
-    rendered = page.get_by_alt_text("The frame that was rendered last")
-    expect(rendered).to_be_visible()
-    assert rendered.evaluate("image => image.naturalWidth") == 480
-    page.get_by_role("link", name="Annotate").click(timeout=PATIENCE_MS)
-    expect(page.locator(".transport .chip").first).to_have_text("ready")
-    rows = page.locator(".object-list > li")
-    expect(rows.first).to_contain_text("frames")
-    seen = rows.all_text_contents()  # includes the number of frames, shown for the selected one
-    assert len(seen) > 5
-    assert all("frame" in row for row in seen), seen  # without any click or request
 
 
 def test_a_file_that_is_no_recording_is_refused_with_its_name(page: Page, address: str, tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ def served_with_finished(data: Path) -> Iterator[tuple[str, str]]:
     variants.mkdir(parents=True)
     (variants / "facts.json").write_text(json.dumps(VARIANTS))
     (variants / "wall.jpg").write_bytes(cv2.imencode(".jpg", np.zeros((30, 40, 3), np.uint8))[1].tobytes())
-    with served(data) as address:
+    with served(data, stand_ins=True) as address:
         yield address, project
 
 
@@ -93,10 +93,10 @@ def changed(tmp_path: Path) -> Iterator[tuple[str, str]]:
         yield found
 
 
-def signed_in(new_context: NewContext, address: str, **looks: Any) -> Page:
-    """A page of a separate browser that opened the printed address."""
+def signed_in(new_context: NewContext, address: str, path: str = "/", **looks: Any) -> Page:
+    """A page of a separate browser that opened the printed address, whose key signs in on every path."""
     page = new_context(**looks).new_page()
-    page.goto(printed_again(address))
+    page.goto(printed_again(address).replace("/?", f"{path}?"))
     return page
 
 
@@ -142,8 +142,8 @@ def test_the_first_page_load_is_small(new_context: NewContext, finished: tuple[s
 
 def test_simulator_code_is_copied_by_keyboard_and_grasps_are_shown(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, project = finished
-    page = signed_in(new_context, address, permissions=["clipboard-read", "clipboard-write"])
-    page.goto(f"{address.split('/?')[0]}/p/{project}/download")
+    allowed = ["clipboard-read", "clipboard-write"]
+    page = signed_in(new_context, address, f"/p/{project}/download", permissions=allowed)
     page.locator("summary", has_text="PyBullet").focus()
     page.keyboard.press("Enter")
     expect(page.get_by_text("pip install pybullet")).to_be_visible()
@@ -202,8 +202,7 @@ def test_an_error_stays_until_another_page_is_opened(new_context: NewContext, fi
 
 def test_an_offline_change_is_stored_after_reconnecting(changed: tuple[str, str], new_context: NewContext) -> None:
     address, project = changed
-    page = signed_in(new_context, address)
-    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+    page = signed_in(new_context, address, f"/p/{project}/annotate")
     page.get_by_role("button", name="drawer_1", exact=True).click()
     page.context.set_offline(True)
     page.get_by_label("Name of drawer_1").fill("top_drawer")
@@ -239,8 +238,7 @@ def test_a_second_tab_sends_queued_changes_only_after_the_first_closes(
 
 def test_keyboard_focus_in_a_list_is_kept_after_a_change(new_context: NewContext, finished: tuple[str, str]) -> None:
     address, project = finished
-    page = signed_in(new_context, address)
-    page.goto(f"{address.split('/?')[0]}/p/{project}/annotate")
+    page = signed_in(new_context, address, f"/p/{project}/annotate")
     hide, show = (page.get_by_role("button", name=re.compile(f"^{word} ")).first for word in ("Hide", "Show"))
     hide.focus()
     for button in (show, hide):

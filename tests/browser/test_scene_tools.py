@@ -27,11 +27,6 @@ HEARD_MS = 6000  # the page polls that long for the clicked object
 CLICK = {"frame": 3, "x": 80, "y": 60, "label": 1}
 
 
-@pytest.fixture
-def scenes() -> bool:
-    return True
-
-
 def finished(page: Page, server: Server) -> str:
     """A project with the small kitchen, one bundle, and a next run that hangs; the address of its overview."""
     project = sample(page)
@@ -41,13 +36,18 @@ def finished(page: Page, server: Server) -> str:
         ask(
             page, "POST", f"/api/projects/{name}/objects?infer=false", {"name": called, "category": category, "points": [CLICK]}
         )
-    page.goto(f"{project}/run")
-    page.get_by_role("button", name="Run", exact=True).click()
-    page.get_by_role("button", name="Run again").wait_for()
+    job = ask(page, "POST", f"/api/projects/{name}/run", {})["id"]
+    until(lambda: ask(page, "GET", f"/api/jobs/{job}")["state"] == "done")
     work = server.data / "projects" / name / "work"
     finish(work)
     keep_results(work, certificate())
     (work.parent / "behave.json").write_text(json.dumps({"segment": "hang"}))
+    return project
+
+
+def drawn_in_3d(page: Page, server: Server) -> str:
+    """Such a project, with its scene drawn in Review; the address of its overview."""
+    project = finished(page, server)
     page.goto(f"{project}/review")
     page.get_by_role("button", name="Scene", exact=True).click()
     expect(page.locator(".joints strong")).to_contain_text("joint")
@@ -83,10 +83,10 @@ def from_front(page: Page, name: str) -> tuple[float, float]:
     return frame["x"] + frame["width"] / 2 + float(across), frame["y"] + frame["height"] / 2 + float(down)
 
 
-def test_a_click_in_the_scene_selects_an_object_and_keeps_the_scene(new_context: NewContext, server: Server) -> None:
-    context = new_context()
-    page = signed_in(context, server, "ann")
-    finished(page, server)
+@pytest.mark.parametrize("scenes", [True])
+def test_objects_are_clicked_cut_coloured_and_commented_in_the_scene(new_context: NewContext, server: Server) -> None:
+    page = signed_in(new_context(), server, "ann")
+    drawn_in_3d(page, server)
     page.keyboard.press("6")
     until(lambda: stands_in_front(page), "the view was not turned to the front")
     scene = page.get_by_role("button", name="Scene", exact=True)
@@ -101,6 +101,39 @@ def test_a_click_in_the_scene_selects_an_object_and_keeps_the_scene(new_context:
     expect(page.get_by_role("button", name="Show bottle_1 in the scene")).to_be_visible()
     page.get_by_label("Layers of the scene").select_option("both")
     picture(page, "scene-tools", still=True)
+    page.keyboard.press("0")
+
+    page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
+    page.keyboard.press("z")
+    section = page.get_by_role("group", name="Section")
+    expect(section.locator("output").nth(1)).to_have_text(re.compile(r"0\.\d\d m to 0\.\d\d m from the front, of 0\.\d\d m"))
+    section.get_by_role("button", name="Around the object").click()
+    narrow = section.locator("output").nth(0).inner_text()
+    left = section.get_by_label("Width from the left")
+    left.press("ArrowRight")
+    expect(section.locator("output").nth(0)).not_to_have_text(narrow)
+    expect(left).to_be_focused()  # the next key continues, although the view has responded
+    page.get_by_label("Layers of the scene").select_option("unobserved")
+    expect(page.locator(".heat-legend")).to_contain_text("50 cm from any observation")
+    picture(page, "section")
+
+    share = left.input_value()
+    page.keyboard.press("c")
+    page.keyboard.type("this side was never filmed")  # the box is open before the key returns
+    page.keyboard.press("Control+Enter")
+    note = page.get_by_role("button", name="this side was never filmed", exact=True)
+    expect(page.locator("r2c2r-comments")).to_contain_text("with a view")
+    section.get_by_role("button", name="Show all").click()
+    page.get_by_label("Layers of the scene").select_option("meshes")
+    page.keyboard.press("5")
+    note.click()
+    expect(page.get_by_role("button", name="Scene", exact=True)).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_label("Layers of the scene")).to_have_value("unobserved")
+    expect(left).to_have_value(share)
+
+    page.get_by_label("Look from").select_option("run")
+    page.keyboard.press("z")
+    expect(section).to_be_hidden()
 
 
 def clicked(page: Page, name: str) -> Any:
@@ -117,10 +150,10 @@ def clicked(page: Page, name: str) -> Any:
     return chosen
 
 
-def test_a_hinge_correction_is_previewed_and_marks_results_stale(new_context: NewContext, server: Server) -> None:
-    context = new_context()
-    page = signed_in(context, server, "ann")
-    project = finished(page, server)
+@pytest.mark.parametrize("scenes", [True])
+def test_corrections_are_previewed_and_mark_results_stale(new_context: NewContext, server: Server) -> None:
+    page = signed_in(new_context(), server, "ann")
+    project = drawn_in_3d(page, server)
     page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
     page.get_by_text("Correct it").click()
     page.get_by_label("Hinge of cabinet_1").select_option("right")
@@ -134,6 +167,21 @@ def test_a_hinge_correction_is_previewed_and_marks_results_stale(new_context: Ne
     why.locator("summary").click()
     expect(why.locator(".old")).to_contain_text("Placed by")
     picture(page, "preview")
+
+    # a worktop that nobody clicked: resized, left out and brought back
+    made = page.locator(".review nav section", has_text="Made from the scan")
+    made.get_by_role("button", name="counter_1", exact=True).click()
+    panel = page.locator(".review > aside")
+    expect(panel).to_contain_text("nobody clicked it")
+    panel.get_by_label("Width (cm)").fill("310")
+    panel.get_by_role("button", name="Set size").click()
+    expect(page.get_by_text(re.compile("Preview: .*counter_1.*; certified by the next run"))).to_be_visible()
+    picture(page, "made")
+    panel.get_by_role("button", name="Leave it out").click()
+    expect(made.get_by_role("button", name="Bring back counter_1")).to_be_visible()
+    made.get_by_role("button", name="Bring back counter_1").click()
+    expect(made.get_by_role("button", name="counter_1", exact=True)).to_be_visible()
+
     page.goto(f"{project}/run")
     expect(page.get_by_role("heading", name="Certificate")).to_contain_text("stale")
     warning = page.get_by_text("still overlap by 12 mm")
@@ -142,26 +190,8 @@ def test_a_hinge_correction_is_previewed_and_marks_results_stale(new_context: Ne
     picture(page, "warnings")
     assert Path(server.data / "projects" / project.split("/p/")[1] / "work" / "bundle.zip").is_file()  # nothing was recomputed
 
-
-def test_an_unclicked_worktop_is_resized_left_out_and_brought_back(new_context: NewContext, server: Server) -> None:
-    context = new_context()
-    page = signed_in(context, server, "ann")
-    project = finished(page, server)
-    made = page.locator(".review nav section", has_text="Made from the scan")
-    made.get_by_role("button", name="counter_1", exact=True).click()
-    panel = page.locator(".review > aside")
-    expect(panel).to_contain_text("nobody clicked it")
-    panel.get_by_label("Width (cm)").fill("310")
-    panel.get_by_role("button", name="Set size").click()
-    expect(page.get_by_text("Preview: counter_1; certified by the next run")).to_be_visible()
-    picture(page, "made")
-    panel.get_by_role("button", name="Leave it out").click()
-    expect(made.get_by_role("button", name="Bring back counter_1")).to_be_visible()
-    made.get_by_role("button", name="Bring back counter_1").click()
-    expect(made.get_by_role("button", name="counter_1", exact=True)).to_be_visible()
-
     finish(server.data / "projects" / project.split("/p/")[1] / "work")  # a run without a worktop
-    page.reload()
+    page.goto(f"{project}/review")
     expect(made).to_contain_text("counter_1: corrected, but the last run did not make it. Click on it, or delete it.")
     picture(page, "not-made")
     made.get_by_role("link", name="counter_1").click()
@@ -172,6 +202,7 @@ def test_a_hinge_is_copied_and_kind_and_custom_category_are_set_in_review(new_co
     context = new_context()
     page = signed_in(context, server, "ann")
     project = finished(page, server)
+    page.goto(f"{project}/review")
     page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
     page.get_by_text("Correct it").click()
     page.get_by_label("Hinge of cabinet_1").select_option("right")
@@ -208,43 +239,6 @@ def test_a_hinge_is_copied_and_kind_and_custom_category_are_set_in_review(new_co
     assert override["built_as"] == "drawer"
     copied = ask(page, "GET", f"/api/projects/{name}/objects/{objects['double_1']['id']}/override")
     assert (copied["hinge"], copied["built_as"], copied["dimensions_m"]) == ("right", None, None)
-
-
-def test_sections_heat_maps_and_comment_views_work_in_the_scene(new_context: NewContext, server: Server) -> None:
-    context = new_context()
-    page = signed_in(context, server, "ann")
-    finished(page, server)
-    page.locator(".review nav").get_by_role("button", name="cabinet_1", exact=True).click()
-    page.keyboard.press("z")
-    section = page.get_by_role("group", name="Section")
-    expect(section.locator("output").nth(1)).to_have_text(re.compile(r"0\.\d\d m to 0\.\d\d m from the front, of 0\.\d\d m"))
-    section.get_by_role("button", name="Around the object").click()
-    narrow = section.locator("output").nth(0).inner_text()
-    left = section.get_by_label("Width from the left")
-    left.press("ArrowRight")
-    expect(section.locator("output").nth(0)).not_to_have_text(narrow)
-    expect(left).to_be_focused()  # the next key continues, although the view has responded
-    page.get_by_label("Layers of the scene").select_option("unobserved")
-    expect(page.locator(".heat-legend")).to_contain_text("50 cm from any observation")
-    picture(page, "section")
-
-    share = left.input_value()
-    page.keyboard.press("c")
-    page.keyboard.type("this side was never filmed")  # the box is open before the key returns
-    page.keyboard.press("Control+Enter")
-    note = page.get_by_role("button", name="this side was never filmed", exact=True)
-    expect(page.locator("r2c2r-comments")).to_contain_text("with a view")
-    section.get_by_role("button", name="Show all").click()
-    page.get_by_label("Layers of the scene").select_option("meshes")
-    page.keyboard.press("5")
-    note.click()
-    expect(page.get_by_role("button", name="Scene", exact=True)).to_have_attribute("aria-pressed", "true")
-    expect(page.get_by_label("Layers of the scene")).to_have_value("unobserved")
-    expect(left).to_have_value(share)
-
-    page.get_by_label("Look from").select_option("run")
-    page.keyboard.press("z")
-    expect(section).to_be_hidden()
 
 
 def test_a_tape_measurement_reports_the_scan_error_and_rescales_it(new_context: NewContext, server: Server) -> None:

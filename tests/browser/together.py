@@ -54,7 +54,8 @@ class Server:
         return f"http://localhost:{self.port}"
 
     def start(self) -> None:
-        self.process = Forked(serve_stand_in, self.data, self.port, self.live, self.scenes, ["localhost"])
+        how = {"live": self.live, "scenes": self.scenes, "names": ["localhost"]}
+        self.process = Forked(serve_stand_in, data_dir=self.data, port=self.port, **how)
         said = self.process.readline()
         if "http://localhost" not in said:
             self.kill()
