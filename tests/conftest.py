@@ -1,5 +1,7 @@
 """Shared fixtures, and runtime checks of array shapes that are active only in tests."""
 
+import importlib.machinery
+import importlib.util
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +19,14 @@ import tests.typechecker  # noqa: F401  # the hook looks it up as an attribute o
 
 if os.environ.get("R2C2R_SHAPES", "1") == "1":
     install_import_hook(["r2c2r_core.geometry"], "tests.typechecker.checked")
+
+
+@pytest.fixture
+def torch_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The packages of learned models look installed, as long as nothing imports them."""
+    find = importlib.util.find_spec
+    found = {name: importlib.machinery.ModuleSpec(name, None) for name in ("torch", "transformers")}
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *more: found.get(name) or find(name, *more))
 
 
 @pytest.fixture(scope="session")

@@ -191,7 +191,7 @@ def test_an_invalid_bundle_is_reported_by_name(tmp_path: Path) -> None:
     assert "b.zip" in r2c2r("check", tmp_path / "b.zip", code=2)[1]
 
 
-def test_missing_segmenter_weights_are_reported_before_reading(tmp_path: Path, prompts: Path) -> None:
+def test_missing_segmenter_weights_are_reported_before_reading(torch_found: None, tmp_path: Path, prompts: Path) -> None:
     (tmp_path / "scan.r3d").write_bytes(b"")
     config = tmp_path / "config.json"
     config.write_text(json.dumps({"segment": {"weights": str(tmp_path / "nowhere")}}))
