@@ -22,18 +22,26 @@ class PackedMask:
     area_px: int
 
 
+def box_around(mask: Mask, margin_px: int = 0) -> tuple[slice, slice]:
+    """Rows and columns of the bounding box of a mask (h, w), with a margin inside the image; empty for an empty mask."""
+    if not mask.any():
+        return slice(0, 0), slice(0, 0)
+    (top, bottom), (left, right) = (np.flatnonzero(mask.any(axis=axis))[[0, -1]].tolist() for axis in (1, 0))
+    return slice(max(top - margin_px, 0), bottom + margin_px + 1), slice(max(left - margin_px, 0), right + margin_px + 1)
+
+
 def pack_mask(mask: Mask) -> PackedMask:
     """Pack a boolean mask (h, w)."""
     height, width = mask.shape
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if len(rows) == 0:
+    rows, columns = box_around(mask)
+    box = mask[rows, columns]
+    if not box.size:
         return PackedMask(height=height, width=width, left=0, top=0, box_width=0, box_height=0, bits=b"", area_px=0)
-    box = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     return PackedMask(
         height=height,
         width=width,
-        left=int(columns[0]),
-        top=int(rows[0]),
+        left=columns.start,
+        top=rows.start,
         box_width=box.shape[1],
         box_height=box.shape[0],
         bits=zlib.compress(np.packbits(box).tobytes(), 1),

@@ -8,17 +8,16 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Integer, UInt8
+from jaxtyping import Float, UInt8
 
 from r2c2r_core.arrays import DepthMetres, Faces, Points, Texture, TextureCoords
-from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.camera import Intrinsics, project
+from r2c2r_core.geometry.meshes import AnyFaces, AnyPoints
 from r2c2r_core.geometry.transforms import Rigid3
 
 # The output has sizes of its own: `h`, `w`, `n`, `m` would tie it to the texture or mesh it is drawn from.
 AnyImage = UInt8[np.ndarray, "_ _ 3"]
 AnyDepth = Float[np.ndarray, "_ _"]
-AnyPoints = Float[np.ndarray, "_ 3"]
-AnyFaces = Integer[np.ndarray, "_ 3"]
 
 _CAMERA_GL_FROM_CV = np.diag([1.0, -1.0, -1.0, 1.0])
 _NEAR_M, _FAR_M = 0.02, 20.0
@@ -36,38 +35,44 @@ def rasterize(
     vertices_world: Points, faces: Faces, attributes: np.ndarray, camera: Intrinsics, camera_from_world: Rigid3
 ) -> Raster:
     """Depth and perspective-correct attributes (n, 3) of a triangle mesh; both sides of a face are drawn."""
-    width, height = camera.width, camera.height
-    # The rasteriser assumes a centred principal point and fx = fy: draw on a larger centred canvas, scaled in x, and crop.
-    canvas_w = width + int(np.ceil(abs(2 * camera.cx - width)))
-    canvas_h = height + int(np.ceil(abs(2 * camera.cy - height)))
-    left, top = round(canvas_w / 2 - camera.cx), round(canvas_h / 2 - camera.cy)
-    fraction_px = (left + camera.cx - canvas_w / 2, top + camera.cy - canvas_h / 2)  # sub-pixel remainder
     vertices = np.ascontiguousarray(vertices_world, dtype=np.float32)
-    world_to_camera = camera_from_world.matrix
-    z = vertices @ world_to_camera[2, :3].astype(np.float32) + np.float32(world_to_camera[2, 3])
-    visible = _before(faces, z > _NEAR_M).astype(np.int32, copy=False)
-    depth = np.full((canvas_h, canvas_w), _FAR_M, np.float32)
-    drawn = np.zeros((canvas_h, canvas_w, 3), np.float32)
-    if len(visible):
-        shear = np.eye(4)  # moves the image by a fraction of a pixel: x += z * fraction / fx
-        shear[:2, 2] = fraction_px[0] / camera.fx, fraction_px[1] / camera.fy
-        view = np.diag([camera.fx / camera.fy, 1.0, 1.0, 1.0]) @ _CAMERA_GL_FROM_CV @ shear @ world_to_camera
+    points = vertices @ camera_from_world.rotation.T.astype(np.float32) + camera_from_world.translation.astype(np.float32)
+    visible = faces[(points[:, 2] > _NEAR_M)[faces].all(axis=1)].astype(np.int32, copy=False)
+    size = camera.height, camera.width
+    depth, interpolated = np.zeros(size, np.float32), np.zeros((*size, 3), np.float32)
+    rows, columns = window = _window(points[points[:, 2] > _NEAR_M] if len(visible) else points[:0], camera)
+    width, height = columns.stop - columns.start, rows.stop - rows.start
+    if width and height:
+        # The rasteriser draws with fx = fy and a centred principal point: scale in x, and shear to the centre of the window.
+        shear = np.eye(4)
+        shear[:2, 2] = (camera.cx - columns.start - width / 2) / camera.fx, (camera.cy - rows.start - height / 2) / camera.fy
+        view = np.diag([camera.fx / camera.fy, 1.0, 1.0, 1.0]) @ _CAMERA_GL_FROM_CV @ shear @ camera_from_world.matrix
+        found, drawn = np.full((height, width), _FAR_M, np.float32), np.zeros((height, width, 3), np.float32)
         cv2.triangleRasterize(
             vertices.reshape(-1, 1, 3),
             np.ascontiguousarray(visible),
             np.ascontiguousarray(attributes, dtype=np.float32).reshape(-1, 1, 3),
             drawn,
-            depth,
+            found,
             view.astype(np.float32),
-            2 * np.arctan(canvas_h / 2 / camera.fy),
+            2 * np.arctan(height / 2 / camera.fy),
             _NEAR_M,
             _FAR_M,
             _settings(),
         )
-    crop = (slice(top, top + height), slice(left, left + width))
-    depth = depth[crop]
-    hit = depth < _FAR_M * 0.999
-    return Raster(depth_m=np.where(hit, depth, np.float32(0)), attributes=np.where(hit[..., None], drawn[crop], np.float32(0)))
+        hit = found < _FAR_M * 0.999
+        depth[window], interpolated[window] = np.where(hit, found, 0), np.where(hit[..., None], drawn, 0)
+    return Raster(depth_m=depth, attributes=interpolated)
+
+
+def _window(points: np.ndarray, camera: Intrinsics) -> tuple[slice, slice]:
+    """Rows and columns of the image that a mesh with these vertices (camera coordinates) may cover."""
+    if not len(points):
+        return slice(0, 0), slice(0, 0)
+    at = project(points, camera)
+    ends = np.clip([np.floor(at.min(axis=0)), np.ceil(at.max(axis=0)) + 1], 0, [camera.width, camera.height])
+    (left, top), (right, bottom) = ends.astype(int).tolist()
+    return slice(top, bottom), slice(left, right)
 
 
 def sample_texture(texture: Texture, uv: np.ndarray) -> AnyImage:
@@ -100,13 +105,6 @@ def subdivide_long_edges(
     packed[:, 3:] *= 1e-6
     split, split_faces = subdivide_to_size(packed, faces, max_edge=longest_m, max_iter=12)
     return split[:, :3], split_faces, split[:, 3:] * 1e6
-
-
-def _before(faces: Faces, is_before: np.ndarray) -> AnyFaces:
-    """The faces whose vertices all satisfy `is_before`."""
-    if is_before.all():
-        return faces
-    return faces[is_before[faces[:, 0]] & is_before[faces[:, 1]] & is_before[faces[:, 2]]]
 
 
 def _settings() -> "cv2.TriangleRasterizeSettings":

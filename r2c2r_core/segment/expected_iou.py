@@ -7,6 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Mask, Points
 from r2c2r_core.calibration import FITTED, calibrated
+from r2c2r_core.geometry.masks import box_around
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.tuning import param, tuned
 
@@ -37,16 +38,10 @@ def expected_iou(mask: Mask, share: float, frame: Frame, points_world: Points, b
     A border error of s pixels on one side changes the area by about s times its length; borders of the image are exact.
     """
     params = tuned(Params)
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if len(rows) == 0:
+    crop = mask[box_around(mask, 1)].astype(np.uint8)
+    if not crop.size:
         return 0.0
-    crop = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.uint8)
-    top, bottom = rows[0] > 0, rows[-1] < mask.shape[0] - 1
-    left, right = columns[0] > 0, columns[-1] < mask.shape[1] - 1
-    framed = cv2.copyMakeBorder(crop, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
-    framed[0], framed[-1] = framed[0] * (not top), framed[-1] * (not bottom)
-    framed[:, 0], framed[:, -1] = framed[:, 0] * (not left), framed[:, -1] * (not right)
-    inner = cv2.erode(framed, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))[1:-1, 1:-1]
+    inner = cv2.erode(crop, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))  # not at the image's border
     area = float(crop.sum())
     border = area - float((inner & crop).sum())
     distance = max(float(np.median(frame.world_from_camera.inverse.apply(points_world)[:, 2])), 0.1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Image, Mask, Pixels, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics, project, ray_slopes
+from r2c2r_core.geometry.masks import box_around
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.model.inputs import PromptPoint
 from r2c2r_core.segment.holes import find_hole
@@ -147,8 +148,7 @@ def flood(ridges: np.ndarray, markers: np.ndarray, within: Mask | None = None) -
     free = markers == 0 if within is None else (markers == 0) & within
     if not free.any():
         return markers
-    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
-    area = (slice(max(rows[0] - 1, 0), rows[-1] + 2), slice(max(columns[0] - 1, 0), columns[-1] + 2))
+    area = box_around(free, 1)
     rim = cv2.dilate(free[area].astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))) > 0
     if within is not None:
         rim &= within[area]

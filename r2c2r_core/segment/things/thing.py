@@ -11,6 +11,7 @@ from r2c2r_core.arrays import Colours, Faces, Mask, Points, Vector3
 from r2c2r_core.geometry.camera import project, ray_slopes
 from r2c2r_core.geometry.fusion import DepthView, fuse_depth
 from r2c2r_core.geometry.graphs import components
+from r2c2r_core.geometry.masks import box_around
 from r2c2r_core.geometry.raster import rasterize, subdivide_long_edges
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.kitchen.category import Category
@@ -200,9 +201,7 @@ def thing_mask(thing: Thing, scene: Scene, frame: Frame, *, refine: bool = True)
 
 
 def _refined(mask: Mask, scene: Scene, frame: Frame) -> Mask:
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    pad = 24
-    area = tuple(slice(max(ends[0] - pad, 0), ends[-1] + pad + 1) for ends in (rows, columns))
+    area = box_around(mask, 24)
     band = int(np.clip(np.sqrt(mask.sum()) / 10, 2, max(4, frame.rgb_camera.width / 110)))
     result = np.zeros_like(mask)
     result[area] = refine_border(scene.rgb(frame.index)[area], mask[area], band)

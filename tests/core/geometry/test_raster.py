@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,3 +57,14 @@ def test_a_fused_plane_matches_the_depth_and_is_reproducible() -> None:
     assert abs(np.median(distance)) < 1e-3  # half a pixel of shift would be 3 mm
     assert np.array_equal(first.faces, second.faces)
     assert np.array_equal(first.vertices, second.vertices)
+
+
+def test_a_mesh_in_a_corner_is_drawn_as_in_a_larger_image_and_one_beside_the_image_not_at_all() -> None:
+    vertices, faces = wall([(0.913, 0.517, 2.0), (1.6, 0.517, 2.2), (1.6, 1.3, 2.2), (0.913, 1.3, 2.0)])
+    small = rasterize(vertices, faces, vertices, camera(), Rigid3())
+    large = rasterize(vertices, faces, vertices, replace(camera(), width=400, height=300), Rigid3())
+    assert 0 < (small.depth_m > 0).sum() < (large.depth_m > 0).sum()
+    assert np.abs(small.depth_m - large.depth_m[:128, :192]).max() < 2e-4  # m: float32 rasteriser
+    assert np.abs(small.attributes - large.attributes[:128, :192]).max() < 2e-3
+    for moved in (vertices - [9.0, 0.0, 0.0], vertices - [0.0, 0.0, 9.0]):  # to the left, and behind the camera
+        assert not rasterize(moved, faces, moved, camera(), Rigid3()).depth_m.any()
