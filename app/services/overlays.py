@@ -1,5 +1,6 @@
 """Renderings of an object's mesh over photos: ghost, outline, and residual to the measured depth."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from app.services.cameras import pinhole
 from app.services.context import Context
 from r2c2r_core.arrays import Points
 from r2c2r_core.geometry.camera import Intrinsics, ray_slopes, unproject
+from r2c2r_core.geometry.masks import box_around
 from r2c2r_core.geometry.meshes import box_mesh
 from r2c2r_core.geometry.raster import rasterize, sample_texture
 from r2c2r_core.geometry.transforms import Rigid3, joint_transform
@@ -238,25 +240,43 @@ def _render(parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) ->
     """BGR (h, w, 3) and z-depth (h, w) of the nearest surface."""
     colours = np.zeros((camera.height, camera.width, 3), np.uint8)
     depth = np.zeros((camera.height, camera.width), np.float32)
-    for part in parts:
-        attributes = np.tile(np.asarray(part.colour), (len(part.vertices_world), 1))
-        if part.uv is not None:
-            attributes = np.column_stack([part.uv, np.ones(len(part.uv))])
-        drawn = rasterize(part.vertices_world, part.faces, attributes, camera, camera_from_world)
-        nearer = (drawn.depth_m > 0) & ((depth == 0) | (drawn.depth_m < depth))
-        seen = sample_texture(part.texture, drawn.attributes[..., :2]) if part.texture is not None else 255 * drawn.attributes
-        colours[nearer] = np.clip(seen[nearer], 0, 255).astype(np.uint8)[:, ::-1]
-        depth[nearer] = drawn.depth_m[nearer]
+    for vertices, faces, attributes, texture in _surfaces(parts):
+        drawn = rasterize(vertices, faces, attributes, camera, camera_from_world)
+        near = box_around(drawn.depth_m > 0)
+        found, values, known = drawn.depth_m[near], drawn.attributes[near], depth[near]
+        nearer = (found > 0) & ((known == 0) | (found < known))
+        seen = sample_texture(texture, values[..., :2]) if texture is not None else 255 * values
+        colours[near][nearer] = np.clip(seen[nearer], 0, 255).astype(np.uint8)[:, ::-1]
+        known[nearer] = found[nearer]
     return colours, depth
+
+
+def _surfaces(parts: list[Part]) -> Iterator[tuple[Points, np.ndarray, np.ndarray, np.ndarray | None]]:
+    """Vertices, faces, vertex attributes and texture of each textured part, and of all others as one mesh."""
+    for part in parts:
+        if part.texture is not None and part.uv is not None:
+            yield part.vertices_world, part.faces, np.column_stack([part.uv, np.ones(len(part.uv))]), part.texture
+    plain = [part for part in parts if part.texture is None or part.uv is None]
+    if plain:
+        counts = [len(part.vertices_world) for part in plain]
+        firsts = np.cumsum([0, *counts[:-1]])
+        faces = np.concatenate([part.faces + first for part, first in zip(plain, firsts, strict=True)])
+        attributes = np.repeat([part.colour for part in plain], counts, axis=0)
+        yield np.concatenate([part.vertices_world for part in plain]), faces, attributes, None
 
 
 def _outline(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
     """BGRA: silhouette and inner edges, with dark borders for visibility on any photo."""
     width_px = round(depth.shape[1] / _LINE_OF)
-    rim = _widened(edges_of(depth, camera), width_px)
+    rows, columns = near = box_around(depth > 0, 2 * width_px + round(6 * _SOFT_PX))
+    part = depth[near]
+    window = replace(camera, width=part.shape[1], height=part.shape[0], cx=camera.cx - columns.start, cy=camera.cy - rows.start)
+    rim = _widened(edges_of(part, window), width_px)
     line, border = _softened(rim), _softened(_widened(rim, 1 + 2 * width_px))
     colour = _BORDER + line[..., None] * (_OUTLINE - _BORDER)
-    return np.dstack([colour, np.maximum(255 * line, 200 * border)]).astype(np.uint8)
+    image = np.zeros((*depth.shape, 4), np.uint8)
+    image[near] = np.dstack([colour, np.maximum(255 * line, 200 * border)]).astype(np.uint8)
+    return image
 
 
 def edges_of(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
