@@ -157,8 +157,8 @@ def create_app(
         max_body_size=MOST_BODY_BYTES,
         telemetry=of_requests(traces),
     )
+    app.mount("/static", PageFiles(static), name="static")  # first, as pages ask for a hundred of them
     app.router.routes.extend(_api().routes)
-    app.mount("/static", PageFiles(directory=static), name="static")
     _add_error_handlers(app)
     settings.data_dir.mkdir(parents=True, exist_ok=True)
     if settings.store:

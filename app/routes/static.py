@@ -1,4 +1,7 @@
-"""Static files from memory, as a page requests fifty modules at once, which would wait for file-reading threads."""
+"""Static files from memory, as a page requests fifty modules at once, which would wait for file-reading threads.
+
+Pages name them below `/static/@VERSION/`: browsers keep those of the current version and revalidate all others.
+"""
 
 import gzip
 import mimetypes
@@ -12,24 +15,32 @@ from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
-SERVED = ("index.html", "login.html", "css", "js", "icons", "favicon.svg")  # without development files
+from app.routes.files import IMMUTABLE
+from app.services.pages import FOLDERS, version_of
+
+SERVED = ("index.html", "login.html", *FOLDERS)  # without development files
 LEAST_BYTES = 500  # smaller files are not compressed
 
 
 class PageFiles(StaticFiles):
-    """Static files that browsers revalidate each time, so that updates take effect at once."""
+    """Static files by path, or by version and path."""
+
+    def __init__(self, static: Path) -> None:
+        super().__init__(directory=static)
+        self._static = static
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         """The file, or 304 if the browser has it; HTTPException 404 for files that are not served, 405 for other methods."""
         if scope["method"] not in ("GET", "HEAD"):
             raise HTTPException(405)
+        version, path = path.partition("/")[::2] if path.startswith("@") else ("", path)
         file, found = self.lookup_path(path)
         if path.split("/", 1)[0] not in SERVED or found is None or not S_ISREG(found.st_mode):
             raise HTTPException(404)
         asked = Headers(scope=scope)
         headers = {
             "etag": f'"{found.st_mtime_ns:x}-{found.st_size:x}"',
-            "cache-control": "no-cache",
+            "cache-control": IMMUTABLE if version == f"@{version_of(self._static)}" else "no-cache",
             "vary": "Accept-Encoding",
         }
         if headers["etag"] in [given.strip().removeprefix("W/") for given in asked.get("if-none-match", "").split(",")]:

@@ -4,11 +4,14 @@ Otherwise the browser discovers modules level by level, the frames from a module
 a round trip each, which take seconds on a busy machine.
 """
 
+import os
 import re
 from functools import lru_cache
+from hashlib import sha256
 from html import escape
 from pathlib import Path
 from posixpath import join, normpath
+from time import monotonic
 from urllib.parse import urlsplit
 
 from app.db import queries
@@ -19,6 +22,7 @@ from app.services import projects
 from app.services.context import Context
 
 OF_A_PROJECT = ("annotate", "elevation", "run", "review", "download", "agreement")
+FOLDERS = ("css", "js", "icons")  # of static files
 SHOWN_WIDTH = 960  # of a frame, as requested by static/js/annotate/frames.js
 _IMPORTED = re.compile(r'^(?:import|export)\b[^;]*?from "(\.[^"]+)";', re.MULTILINE)
 
@@ -29,17 +33,39 @@ def html(context: Context, path: str, frame: str = "", person: Person | None = N
     shown = page == "annotate" and context.access.sees(person or context.person, project)
     head = _first_frame(context, project, frame) if shown else []
     head += [f'<link rel="modulepreload" href="/static/{module}" />' for module in modules(context.static, page)]
-    text = (context.static / "index.html").read_text(encoding="utf-8")
-    return text.replace("</head>", "".join(f"  {line}\n  " for line in head) + "</head>", 1)
+    text = _read(context.static, "index.html")
+    return text.replace("</head>", _versioned(context.static, "".join(f"  {line}\n  " for line in head)) + "</head>", 1)
 
 
 def sign_in(context: Context, refused: str = "") -> str:
     """The sign-in page, with the identity provider if there is one, and the reason of a refusal."""
-    text = (context.static / "login.html").read_text(encoding="utf-8")
+    text = _read(context.static, "login.html")
     if context.provider is not None:
         host = escape(urlsplit(context.provider.issuer).netloc)
         text = text.replace('href="/login/provider" hidden', 'href="/login/provider"').replace("PROVIDER", host)
     return text.replace('id="refused">', f'id="refused">{escape(refused)}')
+
+
+def _read(static: Path, name: str) -> str:
+    """A page whose static files have the current version."""
+    return _versioned(static, (static / name).read_text(encoding="utf-8"))
+
+
+def _versioned(static: Path, text: str) -> str:
+    return text.replace('"/static/', f'"/static/@{version_of(static)}/')
+
+
+def version_of(static: Path) -> str:
+    """Version of all static files together, at most a second old, so that updates take effect at once."""
+    return _version_at(static, int(monotonic()))
+
+
+@lru_cache(maxsize=1)
+def _version_at(static: Path, _second: int) -> str:
+    folders = (walked for folder in FOLDERS for walked in os.walk(static / folder))
+    files = sorted(os.path.join(parent, name) for parent, _, names in folders for name in names)
+    states = [(file, found.st_mtime_ns, found.st_size) for file in files for found in (os.stat(file),)]
+    return sha256(repr(states).encode()).hexdigest()[:12]
 
 
 def shown_at(path: str) -> tuple[str, str]:

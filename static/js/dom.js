@@ -37,7 +37,7 @@ function assign(element, props) {
  * @param {string} name
  */
 export function icon(name) {
-  const use = shape("use", { href: `/static/icons/sprite.svg#${name}` });
+  const use = shape("use", { href: new URL(`../icons/sprite.svg#${name}`, import.meta.url).href });
   return shape("svg", { class: "icon", "aria-hidden": "true" }, use);
 }
 

@@ -3,7 +3,11 @@
 import posixpath
 import re
 from html import unescape
+from pathlib import Path
 
+import pytest
+
+from app.services import pages
 from tests.app.conftest import Running
 
 MOST_BYTES = 200_000
@@ -79,3 +83,25 @@ def test_static_files_are_compressed_and_revalidated_by_etag(web: Running) -> No
     assert web.client.head("/static/js/main.js").status_code == 200
     assert web.client.get("/static/js").status_code == 404
     assert web.client.get("/static/js/none.js").status_code == 404
+
+
+def test_a_page_names_static_files_of_the_current_version_which_browsers_keep(web: Running) -> None:
+    page = web.client.get("/").text
+    asked = set(ASSET.findall(page))
+    assert len(asked) > 50
+    for path in asked:
+        assert "immutable" in web.client.get(path).headers["cache-control"], path
+    kept = re.sub(r"@\w+", "@0123456789ab", min(asked))  # of another version, after an update
+    for revalidated in (kept, re.sub(r"@\w+/", "", min(asked))):
+        assert web.client.get(revalidated).headers["cache-control"] == "no-cache"
+
+
+def test_a_change_of_a_static_file_changes_the_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    main = tmp_path / "js" / "main.js"
+    main.parent.mkdir()
+    versions = []
+    for second, text in enumerate(("one", "two words")):
+        main.write_text(text)
+        monkeypatch.setattr(pages, "monotonic", lambda now=float(second): now)
+        versions += [pages.version_of(tmp_path), pages.version_of(tmp_path)]
+    assert versions[0] == versions[1] != versions[2] == versions[3]

@@ -55,6 +55,7 @@ PROMPTS = {
 SIZES = (1280, 720), (1024, 768)  # pixels of a laptop and of a tablet
 PAGES = ("", "/annotate", "/run", "/review", "/download")
 FIRST_LOAD_BYTES = 200_000
+IMPORT = "((name) => import(new URL(name, document.querySelector('script[type=module]').src)))"  # the page's own module
 
 
 @contextmanager
@@ -150,7 +151,7 @@ def test_simulator_code_is_copied_by_keyboard_and_grasps_are_shown(new_context: 
     expect(page.get_by_text("pip install mujoco", exact=True)).to_be_hidden()  # only one is open at a time
     summary = page.locator("summary", has_text="PyBullet")
     drawn = summary.element_handle()
-    page.evaluate("import('/static/js/live.js').then(({ live }) => live.dispatchEvent(new Event('project')))")
+    page.evaluate(f"{IMPORT}('live.js').then(({{ live }}) => live.dispatchEvent(new Event('project')))")
     page.wait_for_function("summary => !summary.isConnected", arg=drawn)  # an event of the project rebuilds the page
     expect(page.get_by_text("pip install pybullet")).to_be_visible()
     expect(summary).to_be_focused()
@@ -172,12 +173,15 @@ def test_simulator_code_is_copied_by_keyboard_and_grasps_are_shown(new_context: 
 
 def test_a_button_pressed_while_its_list_rerenders_is_still_clicked(new_context: NewContext, finished: tuple[str, str]) -> None:
     page = signed_in(new_context, finished[0])
-    page.evaluate("""import("/static/js/dom.js").then(({ h, renew }) => {
+    page.evaluate(
+        f"{IMPORT}('dom.js')"
+        """.then(({ h, renew }) => {
         const list = h("div"), button = (text) => h("button", { onclick: () => (window.clicked = text) }, text);
         document.body.prepend(list);
         renew(list, button("Held down"));
         window.change = () => renew(list, button("Changed"));
-    })""")
+    })"""
+    )
     held = page.get_by_role("button", name="Held down")
     held.hover()
     page.mouse.down()
@@ -192,7 +196,7 @@ def test_an_error_stays_until_another_page_is_opened(new_context: NewContext, fi
     page = signed_in(new_context, finished[0])
     page.get_by_role("link", name="kitchen").wait_for()
     error = page.locator(".toast.bad")
-    said = """import("/static/js/elements/toasts.js").then(({ say }) => say("it broke", { kind: "bad" }))"""
+    said = f"{IMPORT}('elements/toasts.js').then(({{ say }}) => say('it broke', {{ kind: 'bad' }}))"
     for leave in (page.get_by_role("link", name="kitchen").click, page.go_back):
         page.evaluate(said)
         expect(error).to_have_text("it broke")
