@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
-import httpx
+import httpx2
 import kubernetes_validate
 import pytest
 import yaml
@@ -149,7 +149,7 @@ def listens(port: int) -> bool:
 
 
 def test_pages_websockets_and_uploads_pass_the_proxy(proxied: Proxied, monkeypatch: pytest.MonkeyPatch) -> None:
-    with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
+    with httpx2.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
         entered = client.get(f"/?token={proxied.settings.launch_token}")
         assert "Secure" in entered.headers["set-cookie"]
         assert "strict-transport-security" in entered.headers
@@ -170,7 +170,7 @@ def test_pages_websockets_and_uploads_pass_the_proxy(proxied: Proxied, monkeypat
 
 
 def test_forwarded_address_headers_of_a_browser_are_ignored(proxied: Proxied) -> None:
-    with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
+    with httpx2.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
         headers = {"X-Requested-With": "tests", "X-Forwarded-For": "203.0.113.9", "X-Forwarded-Proto": "http"}
         assert client.get("/?token=wrong", headers=headers).status_code == 401
         client.get(f"/?token={proxied.settings.launch_token}", headers=headers)
@@ -179,7 +179,7 @@ def test_forwarded_address_headers_of_a_browser_are_ignored(proxied: Proxied) ->
 
 
 def test_user_headers_of_a_browser_do_not_pass_the_proxy(proxied: Proxied) -> None:
-    with httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
+    with httpx2.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client:
         for headers in ({"X-Forwarded-User": "ann"}, {"x-forwarded-user": "ann"}):
             assert client.get("/api/system", headers=headers).status_code == 401
     assert accounts.everyone(proxied.app.state.context.engine) == []  # type: ignore[attr-defined]
@@ -191,7 +191,7 @@ def test_a_user_authenticated_by_the_proxy_is_signed_in_under_that_name(
 ) -> None:
     with (
         behind_proxy(name, tmp_path, monkeypatch, signs_in=True) as proxied,
-        httpx.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client,
+        httpx2.Client(base_url=proxied.origin, verify=proxied.trusted, trust_env=False, timeout=PATIENCE_S) as client,
     ):
         said = {"X-Forwarded-User": "root"}
         assert client.get("/api/system", headers=said).status_code == 401
@@ -207,7 +207,7 @@ def test_the_proxy_pins_views_uploads_and_projects_to_one_server(name: str, tmp_
         trusted = ssl.create_default_context(cafile=str(tmp_path / "certificate.pem"))
         with (
             proxy(program, given, port, tmp_path),
-            httpx.Client(base_url=f"https://localhost:{port}", verify=trusted, trust_env=False, timeout=PATIENCE_S) as client,
+            httpx2.Client(base_url=f"https://localhost:{port}", verify=trusted, trust_env=False, timeout=PATIENCE_S) as client,
         ):
             kept = ("/viewer/token/", "/api/projects/p/viewer/show", "/api/uploads", "/api/uploads/u")
             assert len({client.get(path).text for path in kept for _ in range(5)}) == 1
@@ -299,4 +299,4 @@ def test_kubelet_probes_are_answered_with_200(tmp_path: Path) -> None:
     with served(create_app(settings, commands=FAKE_COMMANDS)) as port:
         for probe in (server["readinessProbe"]["httpGet"], server["livenessProbe"]["httpGet"]):
             asked = {header["name"]: header["value"] for header in probe["httpHeaders"]}
-            assert httpx.get(f"http://127.0.0.1:{port}{probe['path']}", headers=asked).status_code == 200
+            assert httpx2.get(f"http://127.0.0.1:{port}{probe['path']}", headers=asked).status_code == 200

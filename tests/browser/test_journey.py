@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import zipfile
 from pathlib import Path
 
@@ -38,7 +37,7 @@ def seek(page: Page, frame: int) -> None:
     expect(page.locator("r2c2r-film-strip output")).to_contain_text(f"frame {frame} ")
 
 
-def test_a_kitchen_is_rendered_and_its_scan_imported_clicked_run_reviewed_and_downloaded(page: Page, tmp_path: Path) -> None:
+def test_a_kitchen_is_rendered_imported_clicked_run_reviewed_and_downloaded(page: Page, tmp_path: Path) -> None:
     # Projects: the empty state offers the sample, whose frames are shown as they are rendered
     small = json.dumps({"seed": 1, "frames": 10, "width": 320, "height": 240})
     page.route("**/api/projects/sample", lambda route: route.continue_(post_data=small))
@@ -57,27 +56,28 @@ def test_a_kitchen_is_rendered_and_its_scan_imported_clicked_run_reviewed_and_do
     assert len(seen) > 5
     assert all("frame" in row for row in seen), seen
 
-    # Import by upload: the recording of the sample, whose project is deleted
-    folder = next((tmp_path / "served" / "projects").iterdir())
-    sample = shutil.copytree(folder / "source", tmp_path / "sample")
+    # Its recording, uploaded: the scan is described once it is read
+    kitchen, folder = page.url.split("/annotate")[0], next((tmp_path / "served" / "projects").iterdir())
     page.unroute_all()
-    ask(page, "DELETE", f"/api/projects/{folder.name}")
     page.goto(page.url.split("/p/")[0])
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Import a scan").first.click()
-    chooser.value.set_files(next(sample.glob("*.r3d")))
+    chooser.value.set_files(next((folder / "source").glob("*.r3d")))
     page.wait_for_url(re.compile(r"/p/\w+"))
     page.get_by_role("link", name="Click objects").wait_for(timeout=LONG_MS)
     expect(page.get_by_text("320 × 240")).to_be_visible()
     expect(page.locator(".scan-pictures img")).to_have_count(2)
     expect(page.get_by_role("img", name=re.compile("Sharpness over the frames"))).to_be_visible()
     picture(page, "2-overview")
+    ask(page, "DELETE", f"/api/projects/{page.url.split('/p/')[1]}")
 
     # Annotate: click, mask, name; a wrong click is undone
-    page.get_by_role("link", name="Annotate").click()
+    page.goto(f"{kitchen}/annotate")
+    for row in ask(page, "GET", f"/api/projects/{folder.name}/objects"):
+        ask(page, "DELETE", f"/api/projects/{folder.name}/objects/{row['id']}")
     expect(page.get_by_text("Each object gets a lane here")).to_be_visible()
     page.locator(".chip", has_text=re.compile("^ready$")).wait_for(timeout=LONG_MS)
-    frame, x, y = click_of(sample, "drawer")
+    frame, x, y = click_of(folder / "source", "drawer")
     seek(page, frame)
     page.locator(".chip", has_text=re.compile("^ready$")).wait_for(timeout=LONG_MS)
     click_frame(page, x, y)

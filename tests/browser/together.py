@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Self
 
-import httpx
+import httpx2
 from playwright.sync_api import BrowserContext, Page
 
 from app.db.engine import open_engine
@@ -36,7 +36,7 @@ class Server:
     def __init__(self, data: Path, live: str = "live", *, scenes: bool = False) -> None:
         self.data, self.port, self.live, self.scenes = data, free_port(), live, scenes
         self.process: Forked | None = None
-        self._clients: dict[str, httpx.Client] = {}
+        self._clients: dict[str, httpx2.Client] = {}
         shutil.copy(_with_people(), data / DATABASE)
 
     def __enter__(self) -> Self:
@@ -65,11 +65,12 @@ class Server:
         assert self.process is not None
         self.process.kill()
 
-    def client(self, name: str) -> httpx.Client:
+    def client(self, name: str) -> httpx2.Client:
         """A client of the person, who signs in once per server, as checking passwords takes time."""
         if name not in self._clients:
             headers = {"x-requested-with": "tests", "origin": self.address}
-            made = self._clients[name] = httpx.Client(base_url=self.address, headers=headers, timeout=PATIENCE_S)
+            anew = httpx2.Limits(max_keepalive_connections=0)  # the server may close an idle one just as it is used
+            made = self._clients[name] = httpx2.Client(base_url=self.address, headers=headers, timeout=PATIENCE_S, limits=anew)
             made.post("/api/login", json={"name": name, "password": PASSWORD}).raise_for_status()
         return self._clients[name]
 
