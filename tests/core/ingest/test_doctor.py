@@ -109,7 +109,7 @@ def test_a_good_recording_gets_the_verdict_good(report):
 @pytest.mark.parametrize(
     "name",
     [
-        "poses inverted",
+        pytest.param("poses inverted", marks=pytest.mark.slow),
         "OpenGL taken for OpenCV",
         pytest.param("quaternions w first", marks=pytest.mark.slow),
         "depth x0.9",
@@ -127,7 +127,9 @@ def test_a_corrupted_recording_is_reported_with_its_cause(name, corrupted):
     assert report.remarks[0].cause in named(name).causes, report.reasons
 
 
-@pytest.mark.parametrize("factor", [1000.0, pytest.param(10.0, marks=pytest.mark.slow), 0.1])
+@pytest.mark.parametrize(
+    "factor", [pytest.param(1000.0, marks=pytest.mark.slow), pytest.param(10.0, marks=pytest.mark.slow), 0.1]
+)
 def test_depth_in_a_wrong_unit_is_reported_with_the_correcting_option(factor, scan, tmp_path):
     other = Corruption(name="unit", depth=lambda depth, _: depth * np.float32(factor))
     bad = corrupt_r3d(other, scan, tmp_path / "unit.r3d")

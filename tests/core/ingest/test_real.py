@@ -46,6 +46,7 @@ def test_held_out_frames_are_within_10_mm_of_the_fused_kitchen(real, tmp_path):
     assert np.median(np.concatenate(distances)) < 0.010
 
 
+@pytest.mark.slow
 def test_the_kitchens_table_and_chairs_have_their_measured_heights(kitchen):
     """Table 0.73 m, chair seat 0.46 m above the floor, from the level surfaces of the mesh."""
     vertices, faces = kitchen.surface.vertices_world, kitchen.surface.faces
@@ -64,6 +65,7 @@ def test_the_kitchens_table_and_chairs_have_their_measured_heights(kitchen):
     assert mode(0.36, 0.56) == pytest.approx(0.46, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_kitchen_gets_the_verdict_good_and_a_back_wall(kitchen):
     report = examine(kitchen)
     assert report.verdict == "good", report.reasons
@@ -71,6 +73,7 @@ def test_the_kitchen_gets_the_verdict_good_and_a_back_wall(kitchen):
     assert any(w.normal[1] < -0.95 for w in kitchen.room.walls)
 
 
+@pytest.mark.slow
 def test_exposure_compensation_reduces_the_kitchens_colour_spread(kitchen):
     """Automatic exposure: the same red door is filmed as red, dark red and purple."""
     points = kitchen.surface.vertices_world[::40]

@@ -112,6 +112,7 @@ def test_every_category_is_complete_and_consistent(category: Category) -> None:
         assert category_of(other).width.low <= least <= category.width.high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", CATEGORIES, ids=lambda category: category.name)
 def test_all_names_of_a_category_are_built_and_exported_the_same(category: Category) -> None:
     """Stages pass the category as text: their results must not depend on the synonym typed."""

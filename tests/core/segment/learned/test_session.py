@@ -153,6 +153,7 @@ def test_the_stream_starts_at_the_clicked_frame_and_reuses_masks(
     assert sorted(model.asked) == list(range(len(boxes[0].frames)))
 
 
+@pytest.mark.slow
 def test_a_thing_in_an_open_drawer_is_measured_where_the_drawer_is_closed(looked_into: Filmed) -> None:
     capture, truth, session = looked_into
     (left, near, bottom), (right, far, top) = PARCEL_M
@@ -178,7 +179,7 @@ def test_a_crop_box_of_a_thing_in_a_drawer_is_where_the_drawer_is_closed(looked_
     assert 0.2 < np.count_nonzero(half) / np.count_nonzero(whole) < 0.6
 
 
-@pytest.mark.parametrize(("y", "frame"), [(FRONT_Y, 20), (FRONT_Y - OUT_M, 120)])
+@pytest.mark.parametrize(("y", "frame"), [(FRONT_Y, 20), pytest.param(FRONT_Y - OUT_M, 120, marks=pytest.mark.slow)])
 def test_a_drawer_open_in_the_last_frames_keeps_its_masks_and_gets_its_motion(y: float, frame: int, drawn_out: Filmed) -> None:
     """Clicked where it is closed, and where it is open."""
     capture, truth, session = drawn_out

@@ -62,7 +62,7 @@ def opened(scan: tuple[Capture, Truth], tmp_path_factory: pytest.TempPathFactory
     return session
 
 
-@pytest.mark.parametrize("point", [ON_BODY, ON_NECK], ids=["body", "neck"])
+@pytest.mark.parametrize("point", [ON_BODY, pytest.param(ON_NECK, marks=pytest.mark.slow)], ids=["body", "neck"])
 def test_a_bottle_is_measured_to_its_cap_from_any_click(
     opened: GeometricSession, scan: tuple[Capture, Truth], point: tuple[float, float, float]
 ) -> None:
