@@ -30,7 +30,7 @@ libs:
 
 $(STAMP): pyproject.toml constraints.txt
 	bash scripts/make-venv.sh "$(PYTHON)" "$(VENV)"
-	"$(BIN)/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . --group dev
+	"$(BIN)/python" -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt -e . --group dev
 	@# scene_synthesizer (of the dev group) brings it, nothing here calls it: its C code is free for non-commercial use only
 	"$(BIN)/python" -m pip uninstall --quiet --yes triangle
 	touch "$(STAMP)"
