@@ -244,6 +244,8 @@ def _render(parts: list[Part], camera: Intrinsics, camera_from_world: Rigid3) ->
         drawn = rasterize(vertices, faces, attributes, camera, camera_from_world)
         near = box_around(drawn.depth_m > 0)
         found, values, known = drawn.depth_m[near], drawn.attributes[near], depth[near]
+        if not found.size:  # outside the photo
+            continue
         nearer = (found > 0) & ((known == 0) | (found < known))
         seen = sample_texture(texture, values[..., :2]) if texture is not None else 255 * values
         colours[near][nearer] = np.clip(seen[nearer], 0, 255).astype(np.uint8)[:, ::-1]
@@ -267,14 +269,15 @@ def _surfaces(parts: list[Part]) -> Iterator[tuple[Points, np.ndarray, np.ndarra
 
 def _outline(depth: np.ndarray, camera: Intrinsics) -> np.ndarray:
     """BGRA: silhouette and inner edges, with dark borders for visibility on any photo."""
-    width_px = round(depth.shape[1] / _LINE_OF)
+    image, width_px = np.zeros((*depth.shape, 4), np.uint8), round(depth.shape[1] / _LINE_OF)
     rows, columns = near = box_around(depth > 0, 2 * width_px + round(6 * _SOFT_PX))
     part = depth[near]
+    if not part.size:
+        return image
     window = replace(camera, width=part.shape[1], height=part.shape[0], cx=camera.cx - columns.start, cy=camera.cy - rows.start)
     rim = _widened(edges_of(part, window), width_px)
     line, border = _softened(rim), _softened(_widened(rim, 1 + 2 * width_px))
     colour = _BORDER + line[..., None] * (_OUTLINE - _BORDER)
-    image = np.zeros((*depth.shape, 4), np.uint8)
     image[near] = np.dstack([colour, np.maximum(255 * line, 200 * border)]).astype(np.uint8)
     return image
 
