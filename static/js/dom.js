@@ -1,7 +1,7 @@
 /** Small DOM helpers. Text is inserted with textContent, never as markup. */
 
 /**
- * Create an element: properties are set, `on…` functions become listeners, dashed names and a few more become attributes.
+ * Create an element: `on…` functions become listeners, dashed names and a few more attributes, others properties.
  * @template {keyof HTMLElementTagNameMap} K
  * @param {K} tag
  * @param {Record<string, unknown>} [props]
@@ -37,7 +37,7 @@ function assign(element, props) {
  * @param {string} name
  */
 export function icon(name) {
-  const use = shape("use", { href: new URL(`../icons/sprite.svg#${name}`, import.meta.url).href });
+  const use = shape("use", { href: import.meta.resolve(`../icons/sprite.svg#${name}`) });
   return shape("svg", { class: "icon", "aria-hidden": "true" }, use);
 }
 

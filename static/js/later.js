@@ -87,7 +87,7 @@ export function fetched(page) {
  * @returns {Promise<void>}
  */
 function styled(name) {
-  const href = new URL(`../css/${name}.css`, import.meta.url).pathname;
+  const href = import.meta.resolve(`../css/${name}.css`);
   if (!name || document.querySelector(`link[href="${href}"]`)) return Promise.resolve();
   const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href });
   return new Promise((done) => {
