@@ -249,8 +249,13 @@ def _unsure_edges(track: MaskTrack, category: Category, params: Params) -> Itera
     sure, seam = front_certainty(front, category), unexpected_seam(front, category)
     if sure >= params.unsure_front:
         return
-    sides = [side for side, odds in zip(_SIDES, front.edges, strict=True) if odds < params.unsure_edge]
-    doubts = [f"its {' and '.join(sides)} edge{'s' * (len(sides) > 1)} hardly show{'s' * (len(sides) == 1)}"] if sides else []
+    faint = [k for k, odds in enumerate(front.edges) if odds < params.unsure_edge]
+    seen, hidden = [k for k in faint if front.changes[k] > 0], [k for k in faint if front.changes[k] == 0]
+    doubts = [
+        f"its {' and '.join(_SIDES[k] for k in edges)} edge{'s' * (len(edges) > 1)} {verb}"
+        for edges, verb in ((seen, "can hardly be seen"), (hidden, "can be seen in no frame"))
+        if edges
+    ]
     if seam > params.unsure_seam:
         doubts.append(f"there may be a seam inside it ({100 * seam:.0f} %)")
     yield Contradiction(

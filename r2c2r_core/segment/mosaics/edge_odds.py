@@ -61,9 +61,7 @@ def edge_odds(odds: PanelOdds, mosaic: Image, relief: Relief, vertical: Evidence
     seen = mosaic[: rows * STEP, : columns * STEP].any(axis=2).reshape(rows, STEP, columns, STEP).any(axis=(1, 3))
     return replace(
         odds,
-        front=np.where(seen, odds.front, -SUREST).astype(
-            np.float32
-        ),  # else unobserved cells would be evidence against lines through them
+        front=np.where(seen, odds.front, 0.0).astype(np.float32),  # what no frame shows is as likely front as not
         upright=_with_ends(_with_lines(odds.upright, vertical), relief, 0),
         level=np.ascontiguousarray(_with_ends(_with_lines(odds.level.T, horizontal), relief, 1).T),
     )

@@ -17,15 +17,16 @@ _MARGIN = 12  # cells around an edge that are read for comparison
 
 
 def edge_changes(mosaic: Image, panel: Cell) -> tuple[float, ...]:
-    """CIELAB colour change at each edge of a panel, median along it: left, right, upper, lower."""
+    """CIELAB colour change at each edge of a panel, median along it: left, right, upper, lower; 0 where no frame shows it."""
     left, top = max(int(panel.left) - _MARGIN, 0), max(int(panel.top) - _MARGIN, 0)
-    lab, _ = as_lab(np.ascontiguousarray(mosaic[top : int(panel.bottom) + _MARGIN, left : int(panel.right) + _MARGIN]))
+    lab, seen = as_lab(np.ascontiguousarray(mosaic[top : int(panel.bottom) + _MARGIN, left : int(panel.right) + _MARGIN]))
     moved = Cell(panel.left - left, panel.top - top, panel.right - left, panel.bottom - top)
     found = []
     for (axis, _), at in zip(SIDES, edges_of(moved), strict=True):
         low, high = across(moved, 1 - axis)
         squares = sum(Contrast(lab[..., k]).changes(axis, at, low + CORNER, high - CORNER) ** 2 for k in range(3))
-        found.append(float(np.median(np.sqrt(squares).max(axis=1))))
+        shown = Contrast(seen.astype(np.float32)).changes(axis, at, low + CORNER, high - CORNER) == 0
+        found.append(float(np.median((shown * np.sqrt(squares)).max(axis=1))))
     return tuple(found)
 
 

@@ -161,8 +161,16 @@ def test_faint_edges_and_uncut_seams_are_reported() -> None:
     assert doubt.rule == "edge-unsure"
     assert doubt.message == (
         f"door_1 is 50 x 70 cm if its edges are right ({100 * front_certainty(front, category_of('cabinet')):.0f} %): "
-        "its right and upper edges hardly show, and there may be a seam inside it (30 %)"
+        "its right and upper edges can hardly be seen, and there may be a seam inside it (30 %)"
     )
+
+
+def test_an_edge_in_no_frame_is_reported_as_such() -> None:
+    door, clicked = track("door_1", "cabinet", slice(0, 80)), prompt("door_1", "cabinet", 40.5)
+    assert door.front is not None
+    front = replace(seen(door.front, (0.9, 0.9, 0.9, 0.1), 0.0), changes=(20.0, 20.0, 20.0, 0.0))
+    (doubt,) = found((replace(door, front=front), clicked))
+    assert doubt.message.endswith("its lower edge can be seen in no frame")
 
 
 def test_an_uncertain_extent_is_reported_even_where_all_edges_show() -> None:

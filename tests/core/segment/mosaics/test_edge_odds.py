@@ -14,7 +14,7 @@ from r2c2r_core.segment.runs.panels import cut_panels
 ROWS, COLUMNS, CELL_M = 160, 200, 0.0025
 
 
-def test_unobserved_mosaic_cells_have_minimal_front_odds() -> None:
+def test_unobserved_mosaic_cells_are_as_likely_front_as_not() -> None:
     mosaic = np.full((ROWS, COLUMNS, 3), 120, np.uint8)
     mosaic[:, 120:] = 0
     empty = np.zeros((ROWS // STEP, COLUMNS // STEP))
@@ -22,8 +22,8 @@ def test_unobserved_mosaic_cells_have_minimal_front_odds() -> None:
     nothing = Evidence(np.zeros((8, COLUMNS)), np.zeros((8, COLUMNS), bool), 20)
     across = Evidence(np.zeros((10, ROWS)), np.zeros((10, ROWS), bool), 20)
     odds = edge_odds(seam_odds(mosaic, relief), mosaic, relief, nothing, across)
-    assert (odds.front[:, 120 // STEP :] == -4).all()
-    assert (odds.front[:, : 120 // STEP] > -4).any()
+    assert (odds.front[:, 120 // STEP :] == 0).all()
+    assert (odds.front[:, : 120 // STEP] != 0).all()
 
 
 def test_unobserved_cells_are_no_evidence_against_a_line() -> None:
@@ -36,8 +36,24 @@ def test_unobserved_cells_are_no_evidence_against_a_line() -> None:
         return len(cut_panels(PanelOdds(upright, level, handle, front), Cell(0, 0, COLUMNS, ROWS * STEP), CELL_M))
 
     assert cells() == 1
-    front[ROWS // 2 :] = -4
+    front[ROWS // 2 :] = 0
     assert cells() > 1
+
+
+def test_a_door_is_not_cut_at_the_chair_before_it() -> None:
+    """Two doors end at one level; a chair hid the lower part of the second, where the network sees no front."""
+    upright, level, handle, front = (np.full((ROWS, COLUMNS), -4.0, np.float32) for _ in range(4))
+    front[20:140, 20:180] = 4
+    front[110:, 100:] = -4
+    upright[20:140, [20, 100, 180]], level[[20, 140], 20:180], level[110, 100:180] = 1, 4, -2
+    mosaic = np.full((ROWS * STEP, COLUMNS * STEP, 3), 120, np.uint8)
+    mosaic[110 * STEP :, 100 * STEP :] = 0
+    nothing = Evidence(np.zeros((40, COLUMNS * STEP)), np.zeros((40, COLUMNS * STEP), bool), 20)
+    relief = Relief(CELL_M * STEP, *(np.zeros((ROWS, COLUMNS)) for _ in range(4)))
+    odds = edge_odds(PanelOdds(upright, level, handle, front), mosaic, relief, nothing, nothing)
+    cells = cut_panels(odds, Cell(0, 0, COLUMNS * STEP, ROWS * STEP), CELL_M)
+    (door,) = [cell for cell in cells if cell.contains(140 * STEP, 60 * STEP)]
+    assert door.bottom == pytest.approx(140 * STEP, abs=2 * STEP)
 
 
 def _two_dark_doors(gap: int) -> np.ndarray:

@@ -40,3 +40,13 @@ def test_a_gap_gives_contrast_only_at_its_own_edge(side: str) -> None:
 
 def test_a_panel_that_fills_the_mosaic_has_four_edge_values() -> None:
     assert len(edge_changes(mosaic(PAINT)[58:302, 58:262], Cell(0, 0, 204, 244))) == 4
+
+
+def test_an_edge_in_no_frame_has_no_contrast() -> None:
+    hidden = mosaic(PAINT)
+    hidden[290:] = 0  # a chair stood there
+    shown = dict(zip(SIDES, edge_changes(hidden, PANEL), strict=True))
+    assert shown.pop("lower") == 0
+    assert min(shown.values()) > 3
+    hidden[290:302] = PAINT  # the black ends at the edge
+    assert edge_changes(hidden, PANEL)[3] == 0
