@@ -27,7 +27,7 @@ from r2c2r_core.ingest.stage import IngestConfig, read_capture
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import ObjectPrompt, PromptPoint
-from r2c2r_core.model.track import FrontPanel
+from r2c2r_core.model.rectangle import Rectangle3
 from r2c2r_core.segment.stage import open_session
 from r2c2r_core.workspace import Workspace
 
@@ -155,7 +155,7 @@ def try_click(session: Any, front: TrueFront, click: PromptPoint) -> Trial:
     return Trial(front, click, None if panel is None else off_mm(front, panel))
 
 
-def off_mm(front: TrueFront, panel: FrontPanel) -> np.ndarray:
+def off_mm(front: TrueFront, panel: Rectangle3) -> np.ndarray:
     """Edge errors of a panel against the truth: left, right, bottom, top, outwards positive."""
     local = front.world_from_face.inverse @ panel.world_from_front
     sides = np.array([[sign * panel.width_m / 2, 0, 0] for sign in (-1, 1)])

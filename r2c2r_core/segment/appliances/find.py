@@ -84,7 +84,7 @@ def appliance_front(
     cell = _rectangle(run, on, off, beside, kind, past, support_row)
     if cell is None:
         return None
-    surface = surface_of(run.mosaic, run.relief, run.seams)
+    surface = surface_of(run.mosaic, run.relief)
     cell = panel_edges(cell, surface, run.grid.cell_m)
     handle = None if glimpse else find_handle(run.odds, run.relief, _above(cell, support_row, run.grid.cell_m))
     front = Front(run, cell, handle, kind.depth.usual)

@@ -49,9 +49,6 @@ class Params:
         0.2, "share", "Maximum relative difference where their handles meet: a cell may include the gap beside its door"
     )
     handles_meet: float = param(0.5, "score", "Minimum pair score of doors whose handles meet")
-    supported_share: float = param(
-        0.25, "share", "Minimum observed fraction of a row or column, relative to the panel's, for it to belong to the panel"
-    )
     off_plane_m: float = param(
         0.06, "m", "Maximum distance from the plane of a click on the panel", source="handles protrude by up to 5 cm"
     )
@@ -127,9 +124,7 @@ def find_front(
         cell = _without(cell, float(column), float(row), run, on)
     cell = _own_part(cell, on, run.grid.cells_of(near_plane(run.grid, others)), run)
     handle = next((handle for part in cells if (handle := _handle_on(run, part)) is not None), None)
-    surface = surface_of(run.mosaic, run.relief, run.seams)
-    cut = _supported(cell, run)
-    panel = panel_edges(cut, surface, run.grid.cell_m)
+    panel = panel_edges(cell, surface_of(run.mosaic, run.relief), run.grid.cell_m)
     return Front(run, panel, own_handle(handle, panel), 0.0)
 
 
@@ -369,23 +364,6 @@ def _side_of(cell: Cell, line: Line, kept: np.ndarray) -> Cell:
     """Half of a cut that contains the kept clicks."""
     first, second = halves(cell, line)
     return first if kept[0, line.axis] < line.position else second
-
-
-def _supported(cell: Cell, run: Run) -> Cell:
-    """Cell without margins that the scan never observed as part of the plane."""
-    params = tuned(Params)
-    rows, columns = slice(round(cell.top), round(cell.bottom)), slice(round(cell.left), round(cell.right))
-    seen = run.seen[rows, columns]
-    across = np.flatnonzero(seen.mean(axis=0) > params.supported_share * max(seen.mean(), 1e-6))
-    down = np.flatnonzero(seen.mean(axis=1) > params.supported_share * max(seen.mean(), 1e-6))
-    if len(across) == 0 or len(down) == 0:
-        return cell
-    slack = 0.03 / run.grid.cell_m  # observed depth stops short of an edge by about its own resolution
-    left = cell.left if across[0] < slack else cell.left + float(across[0])
-    right = cell.right if cell.width - across[-1] < slack else cell.left + float(across[-1]) + 1
-    top = cell.top if down[0] < slack else cell.top + float(down[0])
-    bottom = cell.bottom if cell.height - down[-1] < slack else cell.top + float(down[-1]) + 1
-    return Cell(left, top, right, bottom)
 
 
 def _handle_on(run: Run, cell: Cell) -> GridHandle | None:

@@ -120,7 +120,7 @@ def _front(
     if voted is None:
         return None
     cell = _as_cut(run, voted)
-    cell = panel_edges(cell, surface_of(run.mosaic, run.relief, run.seams), run.grid.cell_m)
+    cell = panel_edges(cell, surface_of(run.mosaic, run.relief), run.grid.cell_m)
     handle = find_handle(run.odds, run.relief, cell)
     return Front(run, cell, handle, category.depth.usual)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from r2c2r_core.geometry.camera import depth_points, project
 from r2c2r_core.model.capture import Frame
-from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell, PlaneGrid
+from r2c2r_core.segment.mosaics.orthomosaic import STEP, PlaneGrid
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -61,15 +61,6 @@ class Relief:
         element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
         closed = cv2.morphologyEx(np.pad(filled, size), cv2.MORPH_CLOSE, element)[size:-size, size:-size]
         return np.asarray(cv2.medianBlur(closed, 5) > 0)
-
-    def levels_over(self, cell: Cell) -> np.ndarray:
-        """Number of points of the plane over a rectangle of the grid, and the sum of their levels: (2,)."""
-        (left, right), (top, bottom) = (
-            [max(round(end / STEP), 0) for end in ends] for ends in ((cell.left, cell.right), (cell.top, cell.bottom))
-        )
-        window = slice(top, max(bottom, top)), slice(left, max(right, left))
-        points = self.count[window] * (1 - self.raised[window])
-        return np.array([points.sum(), (points * self.level_m[window]).sum()])
 
     def edge_evidence(self, axis: int, block: int, columns: int, rows: int) -> "Edges":
         """Ends and steps of the plane, as z-scores 0..6 on (blocks, positions) of the grid, like colour evidence."""

@@ -7,7 +7,6 @@ import numpy as np
 
 from r2c2r_core.arrays import Image
 from r2c2r_core.segment.mosaics.edge_odds import edge_odds, seam_odds
-from r2c2r_core.segment.mosaics.edges import as_lab
 from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
 from r2c2r_core.segment.mosaics.lines import Evidence, ScoredTile, find_roll, frame_slide, gather, scored
 from r2c2r_core.segment.mosaics.orthomosaic import (
@@ -25,10 +24,7 @@ from r2c2r_core.segment.mosaics.orthomosaic import (
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief, measure_relief
 from r2c2r_core.segment.planes import PlaneRegion
-from r2c2r_core.segment.runs.contrast import Contrast
-from r2c2r_core.segment.runs.face_frames import inset_fronts
 from r2c2r_core.segment.runs.panels import cut_panels
-from r2c2r_core.segment.runs.stiles import whole_frames
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -54,8 +50,7 @@ class Run:
     horizontal: Evidence
     mosaic: Image
     relief: Relief
-    seams: PanelOdds  # log-odds of the network alone
-    odds: PanelOdds  # with lines and depth evidence
+    odds: PanelOdds  # of the network, lines and depth
     seen: np.ndarray  # grid cells the scan has depth for
     panes: np.ndarray  # grid cells of glass in a frame
     cells: tuple[Cell, ...]
@@ -121,20 +116,16 @@ def run_on(
         for tile in tiles:
             tile.shift = (0.0, 0.0)
     mosaic = blend(tiles if poses_agree else tiles[: max(len(tiles) // 2, 8)])
-    seams = seam_odds(mosaic, relief)
-    odds = edge_odds(seams, mosaic, relief, *lines)
+    odds = edge_odds(seam_odds(mosaic, relief), mosaic, relief, *lines)
     vertical, horizontal = (_with_edges(found, relief, axis, grid) for axis, found in enumerate(lines))
     if cells is None:
-        cut = cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), grid.cell_m)
-        contrast = Contrast(as_lab(mosaic)[0][..., 0])
-        inset = inset_fronts(contrast, relief, odds, cut, grid.cell_m)
-        cells = tuple(whole_frames(odds, inset, grid.cell_m, (vertical, horizontal), contrast, relief))
+        cells = tuple(cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), grid.cell_m))
     flags = relief.on_plane(), relief.glazed()
     seen, panes = (each.repeat(STEP, axis=0).repeat(STEP, axis=1)[: grid.rows, : grid.columns] for each in flags)
     handles = tuple(find_handle(odds, relief, cell) for cell in cells)
     slides = {tile.frame_index: tile.shift for tile in tiles}
     levels = vertical, horizontal
-    return Run(region, grid, roll_rad, *levels, mosaic, relief, seams, odds, seen, panes, cells, handles, poses_agree, slides)
+    return Run(region, grid, roll_rad, *levels, mosaic, relief, odds, seen, panes, cells, handles, poses_agree, slides)
 
 
 class _Views:

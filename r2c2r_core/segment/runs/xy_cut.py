@@ -202,21 +202,6 @@ class LineField:
         share = self.front[0][self._span(cell, 0), self._span(cell, 1)]
         return bool(share.size and share.mean() > 0.5 and min(share.shape) * self.cell_m > self.params.shortest_m)
 
-    def likeliest(self, cell: Cell, axis: int, start: float, stop: float) -> tuple[float, float] | None:
-        """Position and mean log-odds of the likeliest straight line over the span of a cell, whatever lies beside it."""
-        first, last = max(int(start // STEP), 0), round(stop / STEP)
-        near = self.odds[axis][self._span(cell, axis), first:last]
-        if not near.size:
-            return None
-        odds = cv2.dilate(near, np.ones((1, 3), np.uint8)).mean(axis=0)
-        best = int(np.argmax(odds))
-        return (first + best + 0.5) * STEP, float(odds[best])
-
-    def is_possible(self, cell: Cell, axis: int, position: float) -> bool:
-        """Whether a straight line near a position over the span of a cell may be an edge by its log-odds."""
-        found = self.likeliest(cell, axis, position - STEP, position + STEP)
-        return found is not None and found[1] > self.params.possible
-
     def best_uncut(self, cell: Cell, inset_m: float, faintest: float) -> float:
         """Log-odds, with sizes and handles, of the likeliest possible line at least `inset_m` within a cell; -inf without one.
 

@@ -1,12 +1,11 @@
-"""Colour edges of a panel: where depth ends before them, and below the shadow of a worktop."""
+"""Colour edges of a panel: near its cut, and below the shadow of a worktop."""
 
 import cv2
 import numpy as np
 import pytest
 
 from r2c2r_core.segment.mosaics.edges import Surface, as_lab, panel_edges
-from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
-from r2c2r_core.segment.mosaics.panel_net import PanelOdds
+from r2c2r_core.segment.mosaics.orthomosaic import Cell
 
 CELL_M = 0.0025
 WALL, BLUE, STONE = (225, 225, 215), (70, 100, 130), (120, 120, 125)
@@ -36,43 +35,25 @@ def edges(image: np.ndarray, cut: Cell, on_plane: Cell, *heights: tuple[Cell, fl
 
 
 def test_an_edge_follows_the_colour_change_where_depth_ends_3_cm_short() -> None:
-    short = Cell(72, 72, 248, 288)
-    true = pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
-    assert edges(mosaic((PANEL, BLUE)), short, short) == true  # the cut followed depth
-    assert edges(mosaic((PANEL, BLUE)), PANEL, short) == true  # the cut followed colour
+    assert edges(mosaic((PANEL, BLUE)), PANEL, Cell(72, 72, 248, 288)) == pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
 
 
-def test_a_black_door_ends_at_its_cut_above_an_equally_black_plinth() -> None:
-    """The plinth gets brighter 25 mm lower: without depth, that would be the door's edge."""
-    black, lit = (12, 12, 14), (60, 60, 64)
-    image, cut = mosaic((PANEL, black), (Cell(60, 300, 260, 340), black), (Cell(60, 310, 260, 340), lit)), PANEL
-    assert edges(image, cut, cut)[3] == pytest.approx(310, abs=EDGE_CELLS)
-    assert edges(image, cut, cut, (Cell(60, 300, 260, 340), -0.03))[3] == pytest.approx(300, abs=EDGE_CELLS)
+def test_an_edge_stays_at_its_cut_where_nothing_shows_near_it() -> None:
+    ivory, tile = (235, 234, 230), (Cell(60, 40, 260, 47), (205, 205, 200))  # 3 cm beyond
+    assert edges(mosaic(tile, background=ivory), PANEL, PANEL)[1] == 60
 
 
-def test_a_network_edge_is_kept_despite_a_tile_edge_3_cm_beyond() -> None:
-    ivory, tile = (235, 234, 230), (Cell(60, 40, 260, 47), (205, 205, 200))
-    image = mosaic(tile, background=ivory)
-    thought = [np.full((image.shape[0] // STEP, image.shape[1] // STEP), -4.0, np.float32) for _ in range(4)]
-    nothing = np.zeros(image.shape[:2])
-
-    def top() -> float:
-        return panel_edges(PANEL, Surface(*as_lab(image), nothing, nothing, PanelOdds(*thought)), CELL_M).top
-
-    assert top() == pytest.approx(47, abs=EDGE_CELLS)
-    thought[1][round(PANEL.top) // STEP] = 2
-    assert top() == pytest.approx(PANEL.top, abs=EDGE_CELLS)
+def test_the_shadow_on_a_face_frame_does_not_move_the_front_under_it() -> None:
+    """A worktop darkens the rail over an inset front, more so the nearer it is; the front begins where the shadow ends."""
+    worktop = (Cell(40, 30, 280, 50), STONE)
+    shade = [(Cell(60, row, 260, row + 1), in_shade(WALL, 0.3 + 0.03 * (row - 50))) for row in range(50, 60)]
+    image = mosaic((Cell(60, 60, 260, 300), WALL), worktop, *shade)
+    assert edges(image, PANEL, PANEL, (worktop[0], 0.02))[1] == pytest.approx(60, abs=EDGE_CELLS)
 
 
 def test_a_cut_10_mm_outside_the_panel_moves_to_the_panel_edge() -> None:
     outside = Cell(56, 56, 264, 304)
     assert edges(mosaic((PANEL, BLUE)), outside, outside) == pytest.approx((60, 60, 260, 300), abs=EDGE_CELLS)
-
-
-def test_a_faint_gap_wins_over_the_clearer_end_of_the_face_frame() -> None:
-    """The gap around an inset front has less contrast than the end of the face frame against the wall, 20 mm further."""
-    framed = mosaic((Cell(52, 60, 260, 300), BLUE), (Cell(59, 60, 60, 300), (55, 80, 105)), background=WALL)
-    assert edges(framed, Cell(57, 60, 260, 300), Cell(52, 60, 260, 300))[0] == pytest.approx(60, abs=EDGE_CELLS)
 
 
 def test_a_front_that_begins_in_a_gap_at_the_mosaics_end_begins_there() -> None:
@@ -121,31 +102,6 @@ def test_a_shadow_under_a_white_worktop_is_not_taken_for_a_gap() -> None:
     image[60:80, 60:260] *= shade[:, None, None] ** (1 / 2.2)
     found = edges(cv2.GaussianBlur(image, (0, 0), 0.7).astype(np.uint8), PANEL, PANEL, (Cell(40, 46, 280, 60), 0.02))
     assert found[1] == pytest.approx(60, abs=EDGE_CELLS)
-
-
-def test_a_panel_cut_beyond_a_dark_gap_ends_before_the_gap() -> None:
-    gap, lower = Cell(60, 300, 260, 306), Cell(60, 306, 260, 350)
-    image = mosaic((PANEL, BLUE), (gap, in_shade(BLUE, 0.02)), (lower, BLUE))
-    assert edges(image, Cell(60, 60, 260, 306), PANEL)[3] == pytest.approx(300, abs=1.0)
-
-
-CHANNEL = Cell(60, 45, 260, 60)
-
-
-@pytest.mark.parametrize("rail", [(150, 150, 150), (30, 32, 35)])
-def test_a_front_below_a_recessed_channel_starts_where_depth_meets_its_plane(rail: tuple[int, int, int]) -> None:
-    upper, recess, face = Cell(60, 0, 260, 45), Cell(60, 45, 260, 52), Cell(60, 52, 260, 60)
-    image = mosaic((PANEL, BLUE), (upper, BLUE), (recess, rail), (face, in_shade(BLUE, 0.8)))
-    depth = ((upper, 0.0), (recess, -0.022), (face, -0.011))
-    for cut in (50, 54, 60):
-        assert edges(image, Cell(60, cut, 260, 300), PANEL, *depth)[1] == pytest.approx(60, abs=1.5)
-
-
-def test_a_front_above_a_recessed_channel_ends_where_depth_leaves_its_plane() -> None:
-    recess, face, lower = Cell(60, 300, 260, 307), Cell(60, 307, 260, 315), Cell(60, 315, 260, 360)
-    image = mosaic((PANEL, BLUE), (recess, (150, 150, 150)), (face, in_shade(BLUE, 0.8)), (lower, BLUE))
-    depth = ((recess, -0.022), (face, -0.011), (lower, 0.0))
-    assert edges(image, Cell(60, 60, 260, 307), PANEL, *depth)[3] == pytest.approx(300, abs=1.5)
 
 
 def test_a_front_ends_above_a_channel_whose_top_is_hidden_from_depth() -> None:
