@@ -22,6 +22,7 @@ from r2c2r_core.segment.fronts.drawn import FoundDrawn, drawn_front, painted_fro
 from r2c2r_core.segment.fronts.found import FoundFront
 from r2c2r_core.segment.fronts.front import NOWHERE, Front, depth_behind, find_front, seen_sides
 from r2c2r_core.segment.fronts.sliding import sliding_chance
+from r2c2r_core.segment.mosaics.handles import shared_band
 from r2c2r_core.segment.mosaics.orthomosaic import make_grid
 from r2c2r_core.segment.motion.carried import drawer_boards, drawer_floor, seen_from_drawer
 from r2c2r_core.segment.planes import PlaneRegion, region_at, regions_at
@@ -59,7 +60,7 @@ def find_object(
         dark_in = _may_be_dark(prepared, positives, closed[0])
         found = _front(prepared, category, np.array(closed), negatives.points, others, dark_in)
         if found is not None:
-            return found
+            return replace(found, warnings=_handle_doubts(found.front, prompt.name))
     if category.kind == "appliance" and not category.no_front:
         appliance = _appliance(prepared, prompt, category, negatives.points, others)
         if appliance is not None:
@@ -172,6 +173,14 @@ def _front(
     best = replace(best, sides=seen_sides(best, prepared.scene))
     slides = sliding_chance(best, prepared.planes) if category.opens == "side" else 0.0
     return FoundFront(best, prepared.scene, category, fit=_fit(best, category), slides=slides)
+
+
+def _handle_doubts(front: Front, name: str) -> tuple[str, ...]:
+    """Warning of a front without a handle in a row of fronts that have one."""
+    run = front.run
+    if front.handle is not None or shared_band(run.odds, run.relief, run.cells, run.handles, front.cell) is None:
+        return ()
+    return (f"{name} probably has a handle like its neighbours, but none was found: draw it in the elevation",)
 
 
 def _may_be_dark(prepared: PreparedCapture, positives: Hits, closed: Vector3) -> Sequence[int]:

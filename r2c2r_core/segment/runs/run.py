@@ -7,7 +7,7 @@ import numpy as np
 
 from r2c2r_core.arrays import Image
 from r2c2r_core.segment.mosaics.edge_odds import edge_odds, seam_odds
-from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
+from r2c2r_core.segment.mosaics.handles import GridHandle, find_handles
 from r2c2r_core.segment.mosaics.lines import Evidence, ScoredTile, find_roll, frame_slide, gather, scored
 from r2c2r_core.segment.mosaics.orthomosaic import (
     STEP,
@@ -122,7 +122,7 @@ def run_on(
         cells = tuple(cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), grid.cell_m))
     flags = relief.on_plane(), relief.glazed()
     seen, panes = (each.repeat(STEP, axis=0).repeat(STEP, axis=1)[: grid.rows, : grid.columns] for each in flags)
-    handles = tuple(find_handle(odds, relief, cell) for cell in cells)
+    handles = find_handles(odds, relief, cells)
     slides = {tile.frame_index: tile.shift for tile in tiles}
     levels = vertical, horizontal
     return Run(region, grid, roll_rad, *levels, mosaic, relief, odds, seen, panes, cells, handles, poses_agree, slides)

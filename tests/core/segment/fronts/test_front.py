@@ -174,6 +174,18 @@ def test_a_panel_clicked_for_two_objects_is_split_at_a_seam(boxes: Boxes, cache:
         np.testing.assert_allclose(panel.world_from_front.translation, own.world_from_front.translation, atol=6e-3)
 
 
+def test_a_front_without_a_handle_between_fronts_with_one_has_a_warning(boxes: Boxes, cache: Path) -> None:
+    session, (_, asked) = open_session(boxes[0], cache), two_doors(boxes[0])
+    assert isinstance(session, GeometricSession)
+    found = session.find(asked)
+    assert isinstance(found, FoundFront)
+    assert found.warnings == ()
+    run = found.front.run
+    run.handles = tuple(None if handle == found.front.handle else handle for handle in run.handles)
+    (line,) = session.find(dataclasses.replace(asked, name="bare")).warnings
+    assert line.startswith("bare probably has a handle like its neighbours")
+
+
 def test_separate_neighbours_do_not_dispute_a_panel(session: GeometricSession, boxes: Boxes) -> None:
     assert session.disputed(two_doors(boxes[0])) == {}
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from r2c2r_core.segment.mosaics.handles import find_handle
+from r2c2r_core.segment.mosaics.handles import find_handle, find_handles, shared_band
 from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief
@@ -88,3 +88,58 @@ def test_a_bar_among_printed_marks_is_found_by_its_likelihood() -> None:
     handle = find_handle(*found((*bar, 2.0), *((*mark, 1.5) for mark in marks), raised=bar), PANEL)
     assert handle is not None
     assert (handle.left, handle.right, handle.top, handle.bottom) == (40 * STEP, 43 * STEP, 30 * STEP, 60 * STEP)
+
+
+def test_a_bar_is_grown_from_its_likely_cells_through_fainter_ones_along_it() -> None:
+    core, bar, shadow = (slice(30, 36), slice(60, 62)), (slice(20, 50), slice(60, 62)), (slice(20, 50), slice(56, 60))
+    handle = find_handle(*found((*shadow, -1.0), (*bar, -1.0), (*core, 0.5)), PANEL)
+    assert handle is not None
+    assert (handle.left, handle.right, handle.top, handle.bottom) == (60 * STEP, 62 * STEP, 20 * STEP, 50 * STEP)
+    assert handle.confidence == pytest.approx(1 / (1 + np.exp(-0.5)))  # of its likely cells
+    sure = find_handle(*found((*bar, -1.0), (*core, 1.5)), PANEL)
+    assert sure is not None
+    assert (sure.top, sure.bottom) == (30 * STEP, 36 * STEP)  # what is so much fainter is not the bar
+
+
+def test_a_faint_line_to_the_end_of_the_panel_is_not_part_of_a_bar() -> None:
+    core, line = (slice(30, 36), slice(60, 62)), (slice(14, 80), slice(60, 62))
+    handle = find_handle(*found((*line, -1.0), (*core, 0.5)), PANEL)
+    assert handle is not None
+    assert (handle.top, handle.bottom) == (30 * STEP, 36 * STEP)
+
+
+def test_a_bar_that_depth_shows_ends_where_it_ends_in_depth() -> None:
+    core, line, bar = (slice(30, 40), slice(60, 62)), (slice(20, 70), slice(60, 62)), (slice(28, 44), slice(60, 62))
+    handle = find_handle(*found((*line, -1.0), (*core, 0.5), raised=bar), PANEL)
+    assert handle is not None
+    assert (handle.top, handle.bottom) == (28 * STEP, 44 * STEP)
+
+
+def three_doors(odds: float) -> tuple[PanelOdds, Relief, list[Cell]]:
+    """Doors side by side; bars of the outer two are likely, and that of the middle one has these odds, and so has a mark."""
+    bars = [(slice(20, 22), slice(left + 5, left + 15)) for left in (0, 25, 50)]
+    likely = [(*bar, value) for bar, value in zip(bars, (2.0, odds, 2.0), strict=True)]
+    cells = [Cell(left * STEP, 10 * STEP, (left + 25) * STEP, 110 * STEP) for left in (0, 25, 50)]
+    return *found(*likely, (slice(90, 94), slice(30, 45), -0.1)), cells
+
+
+def test_a_fainter_handle_counts_at_the_height_of_its_row() -> None:
+    odds, relief, cells = three_doors(-0.3)
+    assert find_handle(odds, relief, cells[1]) is None
+    handle = find_handles(odds, relief, cells)[1]
+    assert handle is not None
+    assert (handle.left, handle.right, handle.top, handle.bottom) == (30 * STEP, 40 * STEP, 20 * STEP, 22 * STEP)
+    assert handle.confidence == pytest.approx(1 / (1 + np.exp(0.3)))
+    assert find_handles(odds, relief, cells[:2])[1] is None  # one of two is not most
+    assert find_handles(*three_doors(-0.6))[1] is None
+
+
+def test_only_fronts_level_with_each_other_share_a_height() -> None:
+    odds, relief, cells = three_doors(-0.6)
+    handles = find_handles(odds, relief, cells)
+    band = shared_band(odds, relief, cells, handles, cells[1])
+    assert band is not None
+    assert band.top < 20 * STEP < 22 * STEP < band.bottom < 50 * STEP
+    assert shared_band(odds, relief, cells, handles, Cell(25 * STEP, 10 * STEP, 50 * STEP, 90 * STEP)) is None
+    walls = PanelOdds(odds.upright, odds.level, odds.handle, -odds.front)
+    assert shared_band(walls, relief, cells, handles, cells[1]) is None
