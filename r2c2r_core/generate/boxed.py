@@ -14,7 +14,7 @@ from r2c2r_core.generate.shape import Shape
 from r2c2r_core.generate.variation import Variation
 from r2c2r_core.geometry.meshes import box_mesh, unite
 from r2c2r_core.geometry.transforms import Rigid3
-from r2c2r_core.kitchen.depth import DepthBehind, DepthSource, depths_behind, distinct, next_sizes
+from r2c2r_core.kitchen.depth import DepthBehind, DepthSource, depths_behind, distinct, next_sizes, sigma_m
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.tuning import param, tuned
@@ -35,9 +35,6 @@ class Params:
     """Tuned parameters of box-shaped furniture: when depth and faces count as measured."""
 
     front_zone_m: float = param(0.03, "m", "Distance behind the outer face within which mesh faces belong to the front")
-    wall_spread: float = param(
-        0.2, "ratio", "Fraction of the sampled depth variation that is applied to a box that ends at a wall"
-    )
     block_error: float = param(0.25, "ratio", "Error assigned to a handle drawn as a solid block, relative to its protrusion")
 
 
@@ -53,7 +50,8 @@ def front_hypotheses(evidence: Evidence, front: FrontPanel) -> tuple[Hypothesis,
         at_front = made.vertices_local[made.faces][:, :, 1].max(axis=1) < tuned(Params).front_zone_m
         masked = at_front | (evidence.track.kind == "appliance")  # masks of fronts leave out their carcass
         error = abs(depth - depths[0].depth_m) + _handle_error(relief(variation), handle)
-        return replace(made, maskable=masked, parameters={**made.parameters, "depth_m": depth}, unseen_error_m=error)
+        measures = {"depth_m": depth, "behind_sigma_m": sigma_m(behind.source)}
+        return replace(made, maskable=masked, parameters=made.parameters | measures, unseen_error_m=error)
 
     return _depths_and_handles(depths, front, shape)
 
@@ -106,6 +104,6 @@ def _handle_error(relief: Relief, style: HandleStyle) -> float:
 
 
 def _scale(behind: DepthBehind, variation: Variation) -> float:
-    """Depth factor of a draw: the full spread for a usual depth, less at a wall, none for an observed or catalogue depth."""
-    spread = {"wall": tuned(Params).wall_spread, "worktop": 1.0, "category": 1.0}
-    return 1.0 + spread.get(behind.source, 0.0) * (variation.depth_scale - 1.0)
+    """Depth factor of a draw: the full spread for a usual depth, less for a surer one, none if observed or from a catalogue."""
+    spread = 0.0 if behind.source in ("box", "catalogue") else sigma_m(behind.source) / sigma_m("category")
+    return 1.0 + spread * (variation.depth_scale - 1.0)

@@ -1,12 +1,13 @@
 """Depth of a front for every stage: from the room, the worktop above, or the category.
 
 The depth of a cabinet behind its front is not visible. `front_depth` is the room's constraint; the shapes that `generate` ranks
-extend to each of `depths_behind`; the chosen depth is limited to plausible values by `believable`.
+extend to each of `depths_behind`; the chosen depth is limited to plausible values by `believable`; the units of one run vote,
+each by the `sigma_m` of its source (synthesize/unit_runs.py).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -28,6 +29,12 @@ class Params:
     alike_m: float = param(0.015, "m", "Maximum difference between depths that count as one candidate")
     least_worktop: float = param(
         0.75, "share", "Minimum depth of a worktop relative to the category's: a shorter level sheet is a shelf or a board"
+    )
+    sigmas_m: tuple[float, float, float, float, float] = param(
+        (0.01, 0.03, 0.05, 0.15, 0.15),
+        "m",
+        "Standard deviation of a depth from an observed box, wall, worktop, category and catalogue, in this order",
+        source="a fused surface; pipes behind backs; a worktop's overhang on an island; a quarter of the range of depths sold",
     )
     wall_gap_m: float = param(0.005, "m", "Gap between a wall and a unit's back")
     to_wall_m: float = param(0.03, "m", "Distance between a back and a wall below which it is taken to touch the wall")
@@ -73,22 +80,22 @@ class DepthBehind(NamedTuple):
     source: DepthSource
 
 
-def believable(depth_m: float, behind: FrontDepth, allowed: Size, *, seen_apart: bool) -> tuple[float, bool]:
-    """Depth limited to the wall, or replaced if implausible, and whether it is only the category's usual one.
+def sigma_m(source: DepthSource) -> float:
+    """Standard deviation of a depth from this source."""
+    return tuned(Params).sigmas_m[get_args(DepthSource).index(source)]
 
-    Args:
-        depth_m: Depth of the chosen shape.
-        behind: Prior depth of its front.
-        allowed: Range of depths of its category.
-        seen_apart: Whether its sides are seen, as a free-standing appliance's are: it may stand off the wall, not in it.
 
+def believable(depth_m: float, behind: FrontDepth, allowed: Size, *, seen_apart: bool) -> tuple[float, DepthSource | None]:
+    """Depth limited to the wall, or replaced if implausible, and its source; None where it is the shape's own.
+
+    With `seen_apart`, its sides are seen, as a free-standing appliance's are: it may stand off the wall, not in it.
     """
     near_m = 0.0 if seen_apart else tuned(Params).to_wall_m
-    if behind.wall_m is not None and depth_m > behind.wall_m - near_m:
-        depth_m = behind.wall_m
-    if allowed.holds(depth_m):
-        return depth_m, False
-    return behind.depth_m, behind.wall_m is None
+    possible_m = float(np.clip(depth_m, allowed.low, allowed.high))
+    plausible = abs(possible_m - depth_m) < tuned(Params).alike_m  # a mesh is placed to millimetres
+    if behind.wall_m is not None and (depth_m > behind.wall_m - near_m or not plausible):
+        return behind.wall_m, "wall"
+    return (possible_m, None) if plausible else (behind.usual_m, "category")
 
 
 def depths_behind(capture: Capture, front: Rectangle3, category: Category) -> tuple[DepthBehind, ...]:

@@ -6,6 +6,7 @@ measured separately; the segmenter's measurements over all frames (a front's rec
 the axes they cover.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -16,7 +17,7 @@ from r2c2r_core.geometry.boxes import upright_box
 from r2c2r_core.geometry.free_boxes import powell_box, smallest_box
 from r2c2r_core.geometry.transforms import Rigid3, front_rotation
 from r2c2r_core.kitchen.category import Category, Size
-from r2c2r_core.kitchen.depth import FrontDepth, believable, front_depth
+from r2c2r_core.kitchen.depth import FrontDepth, believable, front_depth, sigma_m
 from r2c2r_core.kitchen.depth import Params as DepthParams
 from r2c2r_core.kitchen.fronts import front_y
 from r2c2r_core.kitchen.names import category_of
@@ -81,6 +82,7 @@ class MeasuredObject:
     world_from_object: Rigid3
     dimensions_m: Vector3
     sources: tuple[Source, Source, Source]
+    depth_sigma_m: float = 1.0  # standard deviation of a unit's depth; 1 m: nothing is known
     handle: FrontHandle | None
     handles: tuple[FrontHandle, ...] = ()  # all handles, where several fronts may be one object
     motions: tuple[JointMotion, ...] = ()  # of each leaf filmed open, at its placed pose before the layout
@@ -127,6 +129,7 @@ def measure_object(
     handle = None
     front = track.front if track.front is not None and _fits(track.front, high - low, warnings) else None
     sources: list[Source] = ["measured", "inferred", "measured"]
+    sigma = sigma_m("box")
     if front is not None:
         low, high = _with_front(low, high, front, rotation)
         handle = front.handle
@@ -137,7 +140,7 @@ def measure_object(
     elif (observed_m := _observed_depth(track, float(high[1] - low[1]))) is not None:
         high, sources[1] = np.array([high[0], low[1] + observed_m, high[2]]), "measured"
     else:
-        low, high, sources[1] = _believable_depth(capture, track, spec, low, high, rotation)
+        high, sources[1], sigma = _believable_depth(capture, track, asset, spec, low, high, rotation)
     if track.kind == "appliance" and _foot_hidden(capture, low):
         sources[2] = "inferred"
     if handle is None and spec.opens not in ("rigid", "fixed"):
@@ -150,6 +153,7 @@ def measure_object(
         world_from_object=pose,
         dimensions_m=high - low,
         sources=(sources[0], sources[1], sources[2]),
+        depth_sigma_m=sigma if override.candidate is None else sigma_m("box"),  # a person chose the depth with the shape
         handle=handle,
         handles=handles_of_mesh(samples, rotation, low, high) if spec.several_fronts else (),
         motions=track.motions,
@@ -254,12 +258,16 @@ def _with_box(low: Vector3, high: Vector3, track: MaskTrack, rotation: np.ndarra
 
 
 def _believable_depth(
-    capture: Capture, track: MaskTrack, spec: Category, low: Vector3, high: Vector3, rotation: np.ndarray
-) -> tuple[Vector3, Vector3, Source]:
-    """The range with a plausible depth, and its source."""
+    capture: Capture, track: MaskTrack, asset: MeshAsset, spec: Category, low: Vector3, high: Vector3, rotation: np.ndarray
+) -> tuple[Vector3, Source, float]:
+    """High end of the range with a plausible depth, its source, and its standard deviation."""
     behind = depth_behind(capture, rotation, low, high, spec.depth)
-    depth, usual = believable(float(high[1] - low[1]), behind, spec.depth, seen_apart=track.kind != "front")
-    return low, np.array([high[0], low[1] + depth, high[2]]), "default" if usual else "inferred"
+    depth, replaced = believable(float(high[1] - low[1]), behind, spec.depth, seen_apart=track.kind != "front")
+    high = np.array([high[0], low[1] + depth, high[2]])
+    if track.kind == "front" and spec.opens != "fixed" and _side_ends(capture, low, high, rotation):
+        return high, "measured", sigma_m("box")
+    sigma = asset.parameters.get("behind_sigma_m", sigma_m("category")) if replaced is None else sigma_m(replaced)
+    return high, "default" if replaced == "category" else "inferred", sigma
 
 
 def depth_behind(capture: Capture, rotation: np.ndarray, low: Vector3, high: Vector3, depth: Size) -> FrontDepth:
@@ -290,13 +298,20 @@ def _observed_depth(track: MaskTrack, depth_m: float) -> float | None:
     return observed_m if abs(depth_m - observed_m) < tuned(DepthParams).alike_m else None
 
 
-def _face_seen(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarray) -> bool:
-    """Whether the scan shows a side or the top from front to back, so that the depth was observed."""
+def _side_ends(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarray) -> bool:
+    """Whether the scan shows a side of a unit from front to back, but not 5 cm beyond, so that the depth was observed."""
+    beyond = np.array([low[0], high[1] + 0.02, low[2]]), np.array([high[0], high[1] + 0.07, high[2]])
+    return _face_seen(capture, low, high, rotation, (0,)) and not _face_seen(capture, *beyond, rotation, (0,))
+
+
+def _face_seen(capture: Capture, low: Vector3, high: Vector3, rotation: np.ndarray, axes: Sequence[int] = (0, 2)) -> bool:
+    """Whether the scan shows a side (axis 0) or the top (2) from front to back, so that the depth was observed."""
     points = capture.surface.vertices_world @ rotation
     margin = 0.2 * (high - low)
     points = points[(points[:, 1] > low[1] - 0.02) & (points[:, 1] < high[1] + 0.02)]
     bins = int(np.clip(0.8 * (high[1] - low[1]) / capture.surface.voxel_m, 3, 12))
-    for across, other, faces in ((2, 0, (low[0], high[0])), (0, 2, (high[2],))):
+    for other in axes:
+        across, faces = 2 - other, (low[0], high[0]) if other == 0 else (high[2],)
         inner = points[(points[:, across] > low[across] + margin[across]) & (points[:, across] < high[across] - margin[across])]
         for face in faces:
             y = inner[np.abs(inner[:, other] - face) < 0.02, 1]
@@ -325,6 +340,7 @@ def _corrected(measured: MeasuredObject, override: ObjectOverride) -> MeasuredOb
             dimensions_m=grown,
             world_from_object=pose,
             sources=("person", "person", "person"),
+            depth_sigma_m=sigma_m("box"),
             fixed_by_person=True,
         )
     if override.pose is not None:

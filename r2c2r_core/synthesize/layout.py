@@ -21,6 +21,7 @@ from r2c2r_core.synthesize.laps import lap_of
 from r2c2r_core.synthesize.runs import align_runs
 from r2c2r_core.synthesize.solve import solved, strain
 from r2c2r_core.synthesize.ties import ties_of
+from r2c2r_core.synthesize.unit_runs import with_one_back
 from r2c2r_core.tuning import param, tuned
 
 _log = logging.getLogger(__name__)
@@ -61,7 +62,7 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
     with spared("the search for impossible objects failed", unseen):
         outliers = outliers_of(objects)
     objects = [item for item in objects if item.name not in outliers]
-    placed = list(leave_fillers(align_runs(objects, manhattan_yaw_rad)))
+    placed = with_one_back(leave_fillers(align_runs(objects, manhattan_yaw_rad)))
     placed = [settled(item, placed, floor_found=floor_found) for item in placed]
     placed, warnings = solved_apart(placed)
     warnings = [*unseen, *warnings]

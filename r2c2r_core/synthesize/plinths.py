@@ -12,6 +12,7 @@ from r2c2r_core.synthesize.facets import Colour, Facets, most_common
 from r2c2r_core.synthesize.slabs import Params as SlabsParams
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.unit_runs import Interval, UnitRun, grouped, heights, is_front
+from r2c2r_core.synthesize.unit_runs import Params as UnitRunsParams
 from r2c2r_core.tuning import param, tuned
 
 
@@ -34,7 +35,6 @@ class Params:
     )
     evidence: float = param(0.25, "share", "Minimum fraction of its face that the scan must show")
     facing: float = param(0.9, "cosine", "Minimum cosine between a surface normal and the fronts' direction")
-    seam_m: float = param(0.03, "m", "Maximum gap between units on one board")
     dull: float = param(0.6, "ratio", "Brightness of an unobserved plinth relative to the fronts, as it is in the shade")
     unseen: tuple[float, float, float] = param((0.8, 0.8, 0.8), "colour", "Colour of fronts that the scan does not show either")
 
@@ -79,7 +79,7 @@ def plinths(facets: Facets, run: UnitRun, objects: Sequence[MeasuredObject], tak
 
 def _rows(run: UnitRun) -> Iterator[Interval]:
     """Stretches of units side by side."""
-    params = tuned(Params)
+    params = tuned(UnitRunsParams)
     (low, high), *rest = run.stretches
     for start, end in rest:
         if start > high + params.seam_m:

@@ -75,7 +75,7 @@ def solved(
 ) -> list[MeasuredObject]:
     """The objects after the minimum change that satisfies `ties`, with a gap between the pairs in `apart`."""
     items = list(measured)
-    for group in _groups(len(items), [*((t.first.item, t.second.item) for t in ties), *apart]):
+    for group in groups(len(items), [*((t.first.item, t.second.item) for t in ties), *apart]):
         place = {item: k for k, item in enumerate(group)}
         own_ties = [_renumbered(tie, place) for tie in ties if tie.first.item in place]
         own_pairs = [(place[a], place[b]) for a, b in apart if a in place]
@@ -117,7 +117,7 @@ def _solved(
     return [item if item.fixed_by_person else _with_faces(item, changed[6 * k : 6 * k + 6]) for k, item in enumerate(items)]
 
 
-def _groups(count: int, links: Sequence[tuple[int, int]]) -> list[list[int]]:
+def groups(count: int, links: Sequence[tuple[int, int]]) -> list[list[int]]:
     """Connected components of ties and overlaps; isolated objects are left out."""
     if not links:
         return []

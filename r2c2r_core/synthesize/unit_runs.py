@@ -1,14 +1,18 @@
-"""Runs of base units side by side, which share a worktop above and a plinth below."""
+"""Runs of units side by side or stacked, which share one back, and of base units, a worktop above and a plinth below."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from r2c2r_core.arrays import Matrix3, Points
 from r2c2r_core.geometry.boxes import box_corners
+from r2c2r_core.kitchen.depth import sigma_m
 from r2c2r_core.synthesize.dimensions import MeasuredObject
-from r2c2r_core.synthesize.runs import built_in
+from r2c2r_core.synthesize.edits import trimmed
+from r2c2r_core.synthesize.runs import built_in, weighted_median
+from r2c2r_core.synthesize.solve import groups
 from r2c2r_core.tuning import param, tuned
 
 Interval = tuple[float, float]
@@ -16,9 +20,10 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Tuned tolerances of units under one worktop."""
+    """Tuned tolerances of units of one run."""
 
     flush_m: float = param(0.06, "m", "Maximum depth difference between their fronts")
+    seam_m: float = param(0.03, "m", "Maximum gap between units side by side or stacked: more than an end panel")
     step_m: float = param(0.03, "m", "Maximum height difference between their tops")
 
 
@@ -50,6 +55,38 @@ class UnitRun:
     def most(self, axis: int) -> float:
         """Maximum of the units along an axis: their backs for y, their tops for z."""
         return max(self.interval(unit, axis)[1] for unit in self.units)
+
+
+def with_one_back(objects: Sequence[MeasuredObject]) -> list[MeasuredObject]:
+    """The objects, units of one run reaching back to one plane: the median of theirs, weighted by precision.
+
+    An oven is thereby as deep as its unit. A unit whose depth was observed or given by a person votes, and keeps it.
+    """
+    items = list(objects)
+    units = [i for i, item in enumerate(items) if is_front(item)]
+    for run in groups(len(items), [(i, j) for i, j in combinations(units, 2) if _adjoin(items[i], items[j])]):
+        backs = np.array([items[i].dimensions_m[1] - items[i].front_centre @ items[run[0]].outward for i in run])
+        back = weighted_median(backs, np.array([items[i].depth_sigma_m for i in run]) ** -2.0)
+        for i, own in zip(run, backs, strict=True):
+            items[i] = _deepened(items[i], float(back - own))
+    return items
+
+
+def _adjoin(a: MeasuredObject, b: MeasuredObject) -> bool:
+    """Whether two fronts are side by side or stacked, approximately in one plane."""
+    apart = np.abs(a.world_from_object.rotation.T @ (b.front_centre - a.front_centre))
+    gaps = (apart - (a.dimensions_m + b.dimensions_m) / 2)[[0, 2]]
+    return flush(a, b) and bool(gaps.max() < tuned(Params).seam_m and gaps.min() < 0.0)
+
+
+def _deepened(item: MeasuredObject, by_m: float) -> MeasuredObject:
+    """The unit with its back moved and its mesh in place; unchanged where its depth is known or would be implausible."""
+    known = item.fixed_by_person or item.depth_sigma_m <= sigma_m("box")
+    if known or not item.spec.depth.holds(float(item.dimensions_m[1]) + by_m):
+        return item
+    deeper = trimmed(item, 1, 1.0, -by_m)
+    shift = deeper.world_from_object @ item.world_from_object.inverse
+    return replace(deeper, placed_pose=shift @ item.placed_pose)
 
 
 def is_front(item: MeasuredObject) -> bool:

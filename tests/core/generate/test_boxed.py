@@ -11,6 +11,7 @@ from r2c2r_core.generate.evidence import gather_evidence
 from r2c2r_core.generate.variation import draw_variation
 from r2c2r_core.geometry.meshes import face_normals, is_manifold, is_watertight, volume
 from r2c2r_core.kitchen.categories import DEPTHS_SOLD_M
+from r2c2r_core.kitchen.depth import sigma_m
 from tests.core.generate.scenes import box_shape
 
 
@@ -78,6 +79,13 @@ def test_the_reported_depth_of_a_candidate_is_that_of_its_mesh(front_scene, seed
     sold = [shape.vertices_local[:, 1].max() for shape, _, told in cards if "sold" in told]
     assert sold
     assert all(min(abs(depth - listed) for listed in DEPTHS_SOLD_M) < 1e-6 for depth in sold)
+
+
+def test_a_candidate_reports_the_precision_of_the_source_of_its_depth(front_scene):
+    evidence = gather_evidence(*front_scene, 6)
+    cards = [Completion().measured(evidence, f"c{k}", 0) for k in range(4)]
+    sigmas = {told.split(", ")[1]: shape.parameters["behind_sigma_m"] for shape, _, told in cards if "deep" in told}
+    assert sigmas["to the wall behind it"] == sigma_m("wall") < sigma_m("worktop") < sigmas["the next size sold"]
 
 
 def test_an_appliance_has_the_measured_box(appliance_scene):

@@ -59,6 +59,12 @@ def test_an_implausible_depth_is_replaced_by_the_category_default() -> None:
     assert found.dimensions_m[1] == pytest.approx(0.58)
 
 
+def test_a_depth_millimetres_beyond_the_largest_sold_is_limited_and_not_replaced() -> None:
+    found = measure(Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.804, 0.7)))
+    assert found.dimensions_m[1] == pytest.approx(0.80)
+    assert found.sources[1] == "inferred"
+
+
 def test_a_size_and_pose_set_by_a_person_override_measurements() -> None:
     pose = np.eye(4)
     pose[:3, 3] = (1.0, 2.0, 0.4)
@@ -73,6 +79,16 @@ def test_a_size_set_by_a_person_keeps_the_front_face_in_place() -> None:
     unit = Unit("a", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7))
     found = measure(unit, override=ObjectOverride(dimensions_m=np.array([0.5, 0.4, 0.6])))
     np.testing.assert_allclose(found.front_centre, [0.0, -0.29, 0.5], atol=1e-6)
+
+
+@pytest.mark.parametrize(("seen_to_m", "source"), [(0.58, "measured"), (0.40, "inferred"), (0.80, "inferred")])
+def test_the_depth_of_a_unit_is_measured_only_if_its_side_is_seen_to_end_there(seen_to_m: float, source: str) -> None:
+    track, placement, asset = placed_unit(Unit("a", "cabinet", (0, 0.29, 0.5), (0.6, 0.58, 0.7)), np.random.default_rng(0))
+    scan, (y, z) = capture(), np.meshgrid(np.arange(0.0, seen_to_m, 0.01), np.arange(0.16, 0.84, 0.01))
+    side = np.column_stack([np.full(y.size, -0.3), y.ravel(), z.ravel()])
+    scan = replace(scan, surface=replace(scan.surface, vertices_world=side))
+    found = measure_object(scan, track, placement, asset, category_of("cabinet"), ObjectOverride())
+    assert found.sources[1] == source
 
 
 CARTON = Unit("a", "box", (0, 0, 1.0), (0.19, 0.08, 0.29), kind="thing")
