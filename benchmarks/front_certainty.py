@@ -31,13 +31,13 @@ from r2c2r_core.segment.contradictions import Params
 RESULTS = Path(__file__).resolve().parent / "front_certainty.json"
 RIGHT_MM, RIGHT_SHARE = 10.0, 0.025
 PRIOR = 1.0  # precision of the coefficients' prior, in units of each feature's standard deviation
-NAMES = ("faintest", "change", "seam", "size", "offset")
+NAMES = ("faintest", "seam", "offset")
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A face as found: the model's features (5,), and whether all of its edges are right."""
+    """A face as found: the model's features (3,), and whether all of its edges are right."""
 
     kitchen: str
     seen: np.ndarray

@@ -1,4 +1,4 @@
-"""Logistic model of the probability that a front is right, from its faintest edge, an uncut seam and its category's sizes."""
+"""Logistic model of the probability that a front is right, from its faintest edge and an uncut seam."""
 
 from dataclasses import dataclass
 
@@ -9,44 +9,34 @@ from r2c2r_core.kitchen.category import Category
 from r2c2r_core.model.track import FrontPanel
 from r2c2r_core.tuning import param, tuned
 
-_FITTED = "fitted on 354 faces in 21 kitchens of four makers: benchmarks/front_certainty.py"
+_FITTED = "fitted on 318 faces in 24 kitchens of five makers: benchmarks/front_certainty.py"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """Tuned parameters (weights) of the logistic model."""
 
-    faintest: float = param(0.497, "ratio", "Weight of the log-odds of the faintest edge", source=_FITTED)
-    change: float = param(0.25, "ratio", "Weight of the logarithm of the least colour change along an edge", source=_FITTED)
+    faintest: float = param(0.697, "ratio", "Weight of the log-odds of the faintest edge", source=_FITTED)
     seam: float = param(
-        3.921, "ratio", "Weight of the logarithm of the probability that no unexpected seam is inside", source=_FITTED
+        3.955, "ratio", "Weight of the logarithm of the probability that no unexpected seam is inside", source=_FITTED
     )
-    size: float = param(-0.331, "ratio", "Weight of the squared deviation from the category's usual size", source=_FITTED)
-    offset: float = param(-0.544, "log", "Constant term of the log-odds", source=_FITTED)
-    unlikeliest: float = param(
-        30.0, "ratio", "Maximum squared deviation from the usual size that counts", source="5.5 standard deviations"
-    )
+    offset: float = param(-0.522, "log", "Constant term of the log-odds", source=_FITTED)
 
 
 def front_certainty(front: FrontPanel, category: Category) -> float:
     """Probability that each edge is within 10 mm, or 2.5 % of that side, of its true place; 1 for a drawn front."""
     params = tuned(Params)
-    weights = np.array([params.faintest, params.change, params.seam, params.size, params.offset])
+    weights = np.array([params.faintest, params.seam, params.offset])
     return probability(float(evidence(front, category) @ weights)) if front.edges else 1.0
 
 
 def evidence(front: FrontPanel, category: Category) -> np.ndarray:
-    """Features (5,) in the order of the model's weights; the last one is 1."""
-    wide, high = float(category.width.deviation(front.width_m)), float(category.height.deviation(front.height_m))
-    if category.opens in ("side", "pair"):
-        high = min(high, 0.0)  # tall doors are called cabinets too
+    """Features (3,) in the order of the model's weights; the last one is 1."""
     shown = 3 if category.stands else 4  # the lower edge of what stands on the floor lies in shadow
     return np.array(
         [
             log_odds(min(front.edges[:shown])),
-            np.log(max(min(front.changes[:shown]), 1.0)),
             np.log(1 - min(unexpected_seam(front, category), 0.999)),
-            min(wide**2 + high**2, tuned(Params).unlikeliest),
             1.0,
         ]
     )

@@ -39,6 +39,9 @@ class Params:
     odd_handle: float = param(
         0.2, "share", "Factor of that fraction among parts with a handle: pull-outs, wide fronts", gt=0, lt=1
     )
+    handled_m: tuple[float, float] = param(
+        (0.12, 0.07), "m", "Minimum width and height of a part with a handle", source="units from 0.15 m, drawers from 0.08 m"
+    )
     size_weight: float = param(
         0.5, "ratio", "Weight of the size prior: the network has learned part of it from its training data"
     )
@@ -203,7 +206,7 @@ class LineField:
         return bool(share.size and share.mean() > 0.5 and min(share.shape) * self.cell_m > self.params.shortest_m)
 
     def best_uncut(self, cell: Cell, inset_m: float, faintest: float) -> float:
-        """Log-odds, with sizes and handles, of the likeliest possible line at least `inset_m` within a cell; -inf without one.
+        """Log-odds, without sizes, of the likeliest possible line at least `inset_m` within a cell; -inf without one.
 
         Its faintest part counts (that quantile): a seam runs from edge to edge, the inner edge of a frame ends at rails.
         """
@@ -213,7 +216,7 @@ class LineField:
             start, stop = round(low / STEP + inset), min(round(high / STEP - inset), self.odds[axis].shape[1])
             paths = self._paths(cell, axis, start, stop)
             if paths is not None:
-                odds = np.quantile(paths.odds, faintest, axis=0) + self._prior(cell, axis, start, stop)
+                odds = np.quantile(paths.odds, faintest, axis=0)
                 best = max(best, float(odds[self._unbroken(cell, axis, paths)].max(initial=-np.inf)))
         return best
 
@@ -346,10 +349,12 @@ class LineField:
         usual, spread = (
             (params.usual_width_m, params.width_spread) if axis == 0 else (params.usual_height_m, params.height_spread)
         )
-        z = np.log(np.maximum(cells, 1) * self.cell_m / usual) / spread
+        size_m = np.maximum(cells, 1) * self.cell_m
+        z = np.log(size_m / usual) / spread
         normal = np.exp(-0.5 * z * z) / (spread * np.sqrt(2 * np.pi))
         odd = np.where(handles > 0, params.odd_share * params.odd_handle, params.odd_share)
-        return np.asarray(np.log((1 - odd) * normal + odd * _ODD_DENSITY))
+        density = np.where((handles > 0) & (size_m < params.handled_m[axis]), _NEVER, (1 - odd) * normal + odd * _ODD_DENSITY)
+        return np.asarray(np.log(density))
 
     def _span(self, cell: Cell, axis: int) -> slice:
         low, high = across(cell, 1 - axis)
@@ -364,6 +369,7 @@ class LineField:
         return float(at[beside].mean() + 0.5 + near @ weights / weights.sum())
 
 
+_NEVER = 1e-9
 _ODD_DENSITY = 1 / np.log(4.0 / 0.01)  # of the logarithm of a size between 1 cm and 4 m
 
 
