@@ -16,11 +16,11 @@ _FITTED = "fitted on 318 faces in 24 kitchens of five makers: benchmarks/front_c
 class Params:
     """Tuned parameters (weights) of the logistic model."""
 
-    faintest: float = param(0.697, "ratio", "Weight of the log-odds of the faintest edge", source=_FITTED)
+    faintest: float = param(0.718, "ratio", "Weight of the log-odds of the faintest edge", source=_FITTED)
     seam: float = param(
-        3.955, "ratio", "Weight of the logarithm of the probability that no unexpected seam is inside", source=_FITTED
+        3.942, "ratio", "Weight of the logarithm of the probability that no unexpected seam is inside", source=_FITTED
     )
-    offset: float = param(-0.522, "log", "Constant term of the log-odds", source=_FITTED)
+    offset: float = param(-0.387, "log", "Constant term of the log-odds", source=_FITTED)
 
 
 def front_certainty(front: FrontPanel, category: Category) -> float:

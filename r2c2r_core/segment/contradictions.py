@@ -76,7 +76,7 @@ class Params:
         "Probability that a front is right, below which it is questioned",
         ge=0,
         le=1,
-        source="below it are 48 of 64 wrong and 17 of 254 right faces of 24 kitchens, each held out",
+        source="below it are 48 of 64 wrong and 18 of 254 right faces of 24 kitchens, each held out",
     )
     in_wall_m: float = param(
         0.04,
