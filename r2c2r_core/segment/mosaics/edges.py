@@ -153,12 +153,29 @@ def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> 
     first = k = start - max(start - reach, 0)
     while k > 0 and even[k - 1] and params.darkest_shade < shade[k - 1] < shade[k] - 0.005:
         k -= 1
+    mixed = k
+    while mixed > 0 and params.darkest_shade < shade[mixed - 1] < shade[mixed] - 0.005:
+        mixed -= 1  # with the surface above the panel
     darkened = shade[k] < params.least_shade
+    other = not (even & (shade > params.least_shade))[max(mixed - reach, 0) : mixed].any()
+    if darkened and even[k] and other and (up := _half_way(shade[: mixed + 1])) is not None:
+        return top - (first - mixed) - up
     while darkened and k > 0 and even[k - 1] and shade[k - 1] > shade[k]:
         k -= 1
     beyond = slice(max(k - reach, 0), k)
     gap = bool((even[beyond] & (shade[beyond] > params.least_shade)).any())  # between two panels of one colour
     return top - (first - k) if darkened and not gap else top
+
+
+def _half_way(shade: np.ndarray) -> float | None:
+    """Distance before the last, darkest position with light half way to the uneven light beyond; None where that is dark."""
+    usual = float(np.median(shade[:-3])) if len(shade) > 3 else 0.0
+    if usual <= shade[-1] / tuned(Params).least_shade:
+        return None
+    half = (usual + shade[-1]) / 2
+    back = int(np.argmax(shade[::-1] >= half))
+    lower, upper = float(shade[-back]), float(shade[-back - 1])
+    return back - 1 + (half - lower) / (upper - lower)
 
 
 def _shading(lab: np.ndarray, usual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
