@@ -43,6 +43,9 @@ class Params:
     """Tuned parameters of the choice of method."""
 
     small_m: float = param(0.25, "m", "Radius below which objects are carved by silhouettes")
+    flat_m: float = param(
+        0.02, "m", "Maximum of a category's smallest height for its objects to lie in a worktop, as a glass hob does"
+    )
     as_painted: float = param(
         0.92, "share", "Minimum overlap with the clicked object of a painted mask that only corrects its frame", ge=0, le=1
     )
@@ -261,7 +264,8 @@ def _thing(
     scene: Scene, structure: tuple[PlaneRegion, ...], prompt: ObjectPrompt, config: ThingConfig, hits: Hits, negatives: Points
 ) -> FoundThing | None:
     """Object under the clicks; `structure` are flat parts that it may touch but does not contain."""
-    if glass := level_holes(scene, hits.clicks):
+    flat = config.lowest_m <= tuned(Params).flat_m
+    if flat and (glass := level_holes(scene, hits.clicks)):
         hob = find_painted(scene, glass, config)
         if hob is not None:
             return FoundThing(hob, scene)

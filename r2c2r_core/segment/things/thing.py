@@ -92,6 +92,7 @@ class ThingConfig:
     on_floor: bool = False
     flat_top: bool = False
     solid_gap_m: float = 0.0  # between parts that count as joined where nothing is seen between them
+    lowest_m: float = 0.0
     tallest_m: float = 1.1
     stands: bool = True  # on a support; else it hangs, or is built in
     support_z_m: float | None = None  # height of its support (world), where that is known
@@ -108,6 +109,7 @@ def sized_as(category: Category) -> ThingConfig:
         stands=category.stands,
         solid_gap_m=tuned(Params).canopy_m if category.no_front else 0.0,
         flat_top=category.flat_top,
+        lowest_m=category.height.low,
         tallest_m=category.height.high,
     )
 

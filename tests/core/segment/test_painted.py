@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from r2c2r_core.arrays import Mask
+from r2c2r_core.errors import ObjectNotSeen
 from r2c2r_core.geometry.camera import project
 from r2c2r_core.geometry.masks import mask_iou, pack_mask, unpack_mask
 from r2c2r_core.model.capture import Capture
@@ -72,6 +73,14 @@ def test_a_click_on_a_glass_hob_finds_the_hob_in_all_frames(tmp_path: Path) -> N
         assert mask_iou(unpack_mask(track.masks[frame.index]), outlined(capture, corners, frame.index)) > 0.65
     assert track.box is not None
     np.testing.assert_allclose(np.sort(track.box.dimensions_m[:2]), [0.3, 0.3], atol=0.03)
+
+
+def test_a_click_on_a_bottle_beside_missing_depth_takes_no_part_of_the_worktop(tmp_path: Path) -> None:
+    """A bottle's dark foot lacks depth like the worktop around it, but no bottle lies flat in a worktop."""
+    capture = with_hob(opening=False)
+    session = open_session(capture, tmp_path)
+    with pytest.raises(ObjectNotSeen):
+        track_object(session, prompt("bottle", "bottle", click_on(capture, (0.35, 0.0, TABLE_M), 0)))
 
 
 def test_a_painted_rectangle_replaces_the_front_under_the_click(session: GeometricSession, boxes: Boxes) -> None:
