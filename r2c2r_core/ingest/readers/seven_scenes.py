@@ -4,19 +4,14 @@ Depth is uint16 millimetres (0 and 65535 unknown), registered to colour; poses a
 rotations off by up to 4e-4; pixel centres lie at integers; gravity-direction.txt points down.
 """
 
-import numpy as np
-
-from r2c2r_core.arrays import Vector3
-from r2c2r_core.errors import CaptureError
 from r2c2r_core.ingest.files import Files
 from r2c2r_core.ingest.readers.frames import Found, joined_recording, read_poses
 from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.stored_depth import ENDING
-from r2c2r_core.ingest.readers.texts import read_calibration, read_numbers
+from r2c2r_core.ingest.readers.texts import GRAVITY, gravity_up, read_calibration
 
 _INTRINSICS = "intrinsics_color.txt"
-_GRAVITY = "gravity-direction.txt"
 _COLOUR = r"color/(?:frame-)?(\d+)(?:\.color)?\.(?i:jpe?g|png)"
 _DEPTH = rf"depth/(?:frame-)?(\d+)(?:\.depth)?\.{ENDING}"
 _POSE = r"pose/(?:frame-)?(\d+)(?:\.pose)?\.txt"
@@ -27,20 +22,9 @@ def open_seven_scenes(files: Files) -> Recording:
     colour, depth, poses = (numbered(files.names(), pattern) for pattern in (_COLOUR, _DEPTH, _POSE))
     rgb_camera = read_calibration(files, _INTRINSICS, first_size(files, colour.values()))
     found = Found(colour=colour, depth=depth, poses=read_poses(files, poses))
-    up = _up(files)
-    others = [_INTRINSICS, *poses.values(), *([_GRAVITY] if up is not None else [])]
+    up = gravity_up(files, GRAVITY)
+    others = [_INTRINSICS, *poses.values(), *([GRAVITY] if up is not None else [])]
     return joined_recording(files, found, lambda _: rgb_camera, format="7-Scenes folder", up_capture=up, other_names=others)
-
-
-def _up(files: Files) -> Vector3 | None:
-    if _GRAVITY not in files.names():
-        return None
-    down = read_numbers(files.read(_GRAVITY))
-    if down is None or down.size != 3 or not 1e-6 < np.linalg.norm(down) < np.inf:  # a length may overflow, too
-        raise CaptureError(
-            f"{files.source}/{_GRAVITY}: expected three numbers pointing down", hint="correct or remove the file"
-        )
-    return np.asarray(-down / np.linalg.norm(down))
 
 
 READER = Reader(

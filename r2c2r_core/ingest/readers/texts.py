@@ -6,13 +6,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from r2c2r_core.arrays import Matrix3
+from r2c2r_core.arrays import Matrix3, Vector3
 from r2c2r_core.documents import parse_json
 from r2c2r_core.errors import CaptureError
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3, nearest_rotation
 from r2c2r_core.ingest.files import Files
 
+GRAVITY = "gravity-direction.txt"  # of 7-Scenes and 3DMatch folders
 S = TypeVar("S")
 T = TypeVar("T")
 
@@ -23,6 +24,16 @@ def read_numbers(content: bytes) -> np.ndarray | None:
         return np.array([float(word) for word in content.decode().replace(",", " ").split()])
     except ValueError:  # UnicodeDecodeError is one too
         return None
+
+
+def gravity_up(files: Files, name: str) -> Vector3 | None:
+    """Up by a text of three numbers that point down; None without that file. Raises CaptureError."""
+    if name not in files.names():
+        return None
+    down = read_numbers(files.read(name))
+    if down is None or down.size != 3 or not 1e-6 < np.linalg.norm(down) < np.inf:  # a length may overflow, too
+        raise CaptureError(f"{files.source}/{name}: expected three numbers pointing down", hint="correct or remove the file")
+    return np.asarray(-down / np.linalg.norm(down))
 
 
 def finite_numbers(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:

@@ -2,7 +2,7 @@
 
 3DMatch (and tsdf-fusion) has camera-intrinsics.txt and depth registered to colour. 7-Scenes has neither: depth is a Kinect's
 own, f = 585, about 20 px away from colour, whose f is 525. uint16 millimetres, 0 and 65535 unknown; poses are 4x4
-camera-to-world with OpenCV axes; pixel centres lie at integers.
+camera-to-world with OpenCV axes; pixel centres lie at integers; gravity-direction.txt, if there, points down.
 """
 
 import re
@@ -13,7 +13,7 @@ from r2c2r_core.ingest.readers.frames import Found, joined_recording, read_poses
 from r2c2r_core.ingest.readers.images import first_size, numbered
 from r2c2r_core.ingest.readers.protocol import Part, Reader, Recording
 from r2c2r_core.ingest.readers.stored_depth import ENDING, depth_size
-from r2c2r_core.ingest.readers.texts import integer_centred, read_calibration
+from r2c2r_core.ingest.readers.texts import GRAVITY, gravity_up, integer_centred, read_calibration
 
 _INTRINSICS = "camera-intrinsics.txt"
 _UNREGISTERED = "no camera-intrinsics.txt: read as 7-Scenes, whose depth is not registered to colour (about 20 px)"
@@ -30,6 +30,8 @@ def open_threedmatch(files: Files) -> Recording:
     rgb_camera, depth_camera, others, notices = _cameras(files, prefix, *sizes)
     if len(folders) > 1:
         notices.append(f"of {len(folders)} sequences {folders[0]} is read; to read another one, give its folder")
+    gravity = prefix + GRAVITY if prefix + GRAVITY in files.names() else GRAVITY
+    up = gravity_up(files, gravity)
     found = Found(colour=colour, depth=depth, poses=read_poses(files, poses))
     return joined_recording(
         files,
@@ -38,7 +40,8 @@ def open_threedmatch(files: Files) -> Recording:
         lambda _: depth_camera,
         format="3DMatch / 7-Scenes sequence",
         notices=notices,
-        other_names=(*others, *poses.values()),
+        up_capture=up,
+        other_names=(*others, *poses.values(), *([gravity] if up is not None else [])),
     )
 
 

@@ -65,7 +65,7 @@ WRITERS = {
     "arti4d": write_arti4d,
 }
 KINDS = ("r3d", "r3d-folder", "exr", "exr-below", *WRITERS, "7scenes-zip", "stray-zip", "polycam-zip", "3dmatch-zip")
-KNOW_NO_GRAVITY = ("3dmatch", "3dmatch-zip", "redwood", "arti4d")
+KNOW_NO_GRAVITY = ("redwood", "arti4d")
 INTERPOLATED = ("tum", "arkitscenes")
 
 

@@ -168,7 +168,7 @@ def write_scannetpp(folder: Path, room: TinyRoom, *, aligned: bool = True) -> Pa
 
 
 def write_threedmatch(folder: Path, room: TinyRoom, *, intrinsics: bool = True, sequences: int = 1) -> Path:
-    """A 3DMatch scene: sequences below it, with their calibration in it; rotations are off by 2e-4."""
+    """A 3DMatch scene: sequences below it, with their calibration and gravity in it; rotations are off by 2e-4."""
     for s in range(sequences):
         sequence = folder / f"seq-{s + 1:02d}"
         sequence.mkdir(parents=True)
@@ -182,6 +182,7 @@ def write_threedmatch(folder: Path, room: TinyRoom, *, intrinsics: bool = True, 
             np.savetxt(sequence / f"frame-{k:06d}.pose.txt", matrix)
     if intrinsics:
         np.savetxt(folder / "camera-intrinsics.txt", integer_centred(room.camera))
+    np.savetxt(folder / "gravity-direction.txt", TILTED.rotation @ [0.0, 0.0, -1.0])
     return folder
 
 
