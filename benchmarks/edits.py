@@ -27,7 +27,7 @@ from r2c2r_core.segment.mosaics.edges import Surface, panel_edges
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 
 RESULTS = Path(__file__).resolve().parent / "edits.json"
-STEPS = ("cut", "panel_edges")
+STEPS = ("cut", "panel_edges", "clear_of_strips")
 MOVED_MM, CAP_MM = 3.0, 100.0
 
 
@@ -53,11 +53,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def trace(kitchen: Path, folder: Path, clicks: int) -> Iterator[np.ndarray]:
     """Edge errors in mm (steps, 4) of each click; infinite where no front was found."""
     session, capture = opened_recording(recording_in(kitchen), folder)
-    rng, cuts = np.random.default_rng(zlib.crc32(kitchen.name.encode())), list[Cell]()
+    rng, cuts = np.random.default_rng(zlib.crc32(kitchen.name.encode())), list[tuple[Cell, Cell]]()
 
     def recorded(cell: Cell, surface: Surface, cell_m: float) -> Cell:
-        cuts.append(cell)
-        return panel_edges(cell, surface, cell_m)
+        refined = panel_edges(cell, surface, cell_m)
+        cuts.append((cell, refined))
+        return refined
 
     with patch("r2c2r_core.segment.fronts.front.panel_edges", recorded):
         for true in true_fronts(kitchen / "truth.json", capture.world_from_capture):
@@ -66,7 +67,7 @@ def trace(kitchen: Path, folder: Path, clicks: int) -> Iterator[np.ndarray]:
                 if found is None or not cuts:
                     yield np.full((len(STEPS), 4), np.inf)
                 else:
-                    yield np.stack([_errors(true, found, cell) for cell in (cuts[-1], found.cell)])
+                    yield np.stack([_errors(true, found, cell) for cell in (*cuts[-1], found.cell)])
 
 
 def _found(session: Any, prompt: ObjectPrompt) -> Front | None:

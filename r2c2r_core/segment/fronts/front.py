@@ -20,6 +20,8 @@ from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid, joined
+from r2c2r_core.segment.mosaics.panel_net import SUREST
+from r2c2r_core.segment.mosaics.strips import clear_of_strips
 from r2c2r_core.segment.motion.board import hand_px, patches_unlike
 from r2c2r_core.segment.occlusion import Facet, Tolerance, at_size, visible_mask
 from r2c2r_core.segment.occlusion import Params as SightParams
@@ -89,6 +91,7 @@ class Front:
     handle: GridHandle | None
     depth_m: float  # to the wall behind, or the usual depth
     sides: tuple[HingeSide, ...] = ()  # faces of the carcass in view
+    strips: tuple[bool, bool] = (False, False)  # whether its upper, lower edge is that of a strip of another material
 
     @property
     def outline(self) -> Rectangle3:
@@ -124,8 +127,11 @@ def find_front(
         cell = _without(cell, float(column), float(row), run, on)
     cell = _own_part(cell, on, run.grid.cells_of(near_plane(run.grid, others)), run)
     handle = next((handle for part in cells if (handle := _handle_on(run, part)) is not None), None)
-    panel = panel_edges(cell, surface_of(run.mosaic, run.relief), run.grid.cell_m)
-    return Front(run, panel, own_handle(handle, panel), 0.0)
+    surface = surface_of(run.mosaic, run.relief)
+    refined = panel_edges(cell, surface, run.grid.cell_m)
+    panel = clear_of_strips(refined, surface, run.grid.cell_m)
+    strips = panel.top != refined.top, panel.bottom != refined.bottom
+    return Front(run, panel, own_handle(handle, panel), 0.0, strips=strips)
 
 
 def own_handle(handle: GridHandle | None, panel: Cell) -> GridHandle | None:
@@ -395,8 +401,8 @@ def _edge_strengths(front: Front, changes: Iterable[float]) -> tuple[float, ...]
     """
     params, odds = tuned(Params), front.run.odds.of_edges(front.cell)
     return tuple(
-        min(probability(each), 1.0 if change >= params.edge_lab else params.unseen_edge)
-        for each, change in zip(odds, changes, strict=True)
+        min(probability(SUREST if strip else own), 1.0 if change >= params.edge_lab else params.unseen_edge)
+        for own, strip, change in zip(odds, (False, False, *front.strips), changes, strict=True)
     )
 
 

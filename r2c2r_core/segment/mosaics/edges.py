@@ -148,7 +148,7 @@ def _above_shadow(top: float, bottom: float, lab: np.ndarray, cell_m: float) -> 
     start, reach = round(top), round(params.shadow_m / cell_m)
     below = slice(start + reach // 2, max(round((top + bottom) / 2), start + reach // 2 + 1))
     rows = np.median(middle[max(start - reach, 0) : start + reach // 2 + 1], axis=1)
-    shade, unevenness = _shading(rows, np.median(middle[below].reshape(-1, 3), axis=0))
+    shade, unevenness = shading(rows, np.median(middle[below].reshape(-1, 3), axis=0))
     even = unevenness < params.even_shade
     first = k = start - max(start - reach, 0)
     while k > 0 and even[k - 1] and params.darkest_shade < shade[k - 1] < shade[k] - 0.005:
@@ -178,7 +178,7 @@ def _half_way(shade: np.ndarray) -> float | None:
     return back - 1 + (half - lower) / (upper - lower)
 
 
-def _shading(lab: np.ndarray, usual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def shading(lab: np.ndarray, usual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Light of colours (n, 3) relative to a reference colour (3,), and its unevenness over red, green and blue.
 
     A shadow darkens a surface by one factor in all channels: its unevenness is 0.
