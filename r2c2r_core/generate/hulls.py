@@ -69,8 +69,6 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
         known = carved(variation)
         field = sheet_field(known.carving, known.field)
         shell = _surfaced(known, field, mirrored=float(known.mirrored))
-        if support is not None:  # there is air under its slab
-            return _less_likely(shell, known, field, support)
         return replace(shell, unseen_error_m=emptied_height(known.carving, known.field, field))
 
     def bars(variation: Variation) -> Shape:
@@ -92,7 +90,8 @@ def carved_family(evidence: Evidence, everything: Variation, *, is_round: bool) 
         family.insert(0, Hypothesis("carved, its back as round as its front", turned))
     if known.mirrored:
         family.append(Hypothesis("carved, not mirrored", unmirrored))
-    if np.ptp(known.carving.seen.points, axis=0).min() > tuned(Params).least_sheets * tuned(CarvedParams).sheet_m:
+    thick = np.ptp(known.carving.seen.points, axis=0).min() > tuned(Params).least_sheets * tuned(CarvedParams).sheet_m
+    if thick and support is None:  # a slab on legs is no board in the air
         family.append(Hypothesis("as thin as a board where its back was not observed", sheet))
     if support is not None:
         family.insert(0, Hypothesis(ON_LEGS, lambda variation: _on_legs(carved(variation), support)))
