@@ -17,6 +17,7 @@ from r2c2r_core.align.sweep import sweep_loosest
 from r2c2r_core.align.view import View
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.transforms import Similarity3, rotation_between
+from r2c2r_core.kitchen.names import named
 from r2c2r_core.model.track import FrontPanel, MaskTrack
 from r2c2r_core.progress import Progress
 from r2c2r_core.tuning import param, tuned
@@ -160,9 +161,19 @@ def _finish(trial: Trial, case: Case) -> Trial:
     evidence = (case.shape, case.observation, anchors_for(case.track, case.shape, trial.hypothesis.up_mesh), case.lifted)
     pose = refine(trial.pose, *evidence, free_scale=True, iterations=10, loose=0.02)
     pose = refine(pose, *evidence, free_scale=False, iterations=4, loose=0.012)
-    pose = sweep_loosest(pose, *evidence)
+    pose = _level_on_legs(sweep_loosest(pose, *evidence), case)
     finished = _judged(trial.hypothesis._replace(pose=pose), case, case.observation.views)
     return trial if finished.judgement.score < trial.judgement.score - tuned(Params).scatter else finished
+
+
+def _level_on_legs(pose: Similarity3, case: Case) -> Similarity3:
+    """Pose of a table or chair with all its feet on one level, where it leans by less than the scan's level may be off."""
+    if not named(case.track.category)[0].on_legs or not case.shape.bases:
+        return pose
+    base = _nearest_base(pose, case.shape)
+    if _angle_to_base(pose, base) > tuned(Params).upright_deg:
+        return pose
+    return turned_about_middle(pose, rotation_between(pose.rotation @ base, _UP), case.shape)
 
 
 def _refined(hypothesis: Hypothesis, case: Case) -> Hypothesis:
