@@ -24,6 +24,9 @@ ASSETS, MESHES = "assets", "meshes"
 """Folder of all objects, and folder of the meshes within one object's own."""
 
 
+NOTED_MOVE_M = 0.015  # a support and what stands on it are each measured to about 1 cm
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Body:
     """One link to be written; geometry in its own frame."""
@@ -42,6 +45,7 @@ class Body:
     folder: str  # of its meshes, relative to the written file
     texture: str | None  # file in the folder; bodies of one object share equal textures
     is_support: bool = False  # a plate of support.py, not part of the object
+    lowered_m: float = 0.0  # by which support.py moved it down onto its support
 
     @property
     def texture_file(self) -> str | None:
@@ -89,8 +93,11 @@ class Plan:
 
     def notes(self, object_name: str) -> tuple[str, ...]:
         """Notes for the user about the export of an object."""
-        plate = any(body.is_support and body.object_name == object_name for body in self.bodies)
-        return ("none of the named objects supports it: a thin plate was added under it",) if plate else ()
+        own = [body for body in self.bodies if body.object_name == object_name]
+        plate = ["none of the named objects supports it: a thin plate was added under it" for body in own if body.is_support]
+        far = max((body.lowered_m for body in own), key=abs, default=0.0)
+        moved = f"was moved {'down' if far > 0 else 'up'} by {1000 * abs(far):.0f} mm onto what is under it: check its height"
+        return (*plate, moved) if abs(far) > NOTED_MOVE_M else tuple(plate)
 
 
 def plan_bundle(scene: ArticulatedScene) -> Plan:

@@ -13,6 +13,7 @@ import numpy as np
 from r2c2r_core.arrays import Points
 from r2c2r_core.export.plan import WORLD, Body, Plan, collider_corners_world
 from r2c2r_core.failing import apart
+from r2c2r_core.geometry.gaps import last_contact
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.materials import CHIPBOARD
 from r2c2r_core.model.scene import Box, Inertial, Link
@@ -20,7 +21,8 @@ from r2c2r_core.model.scene import Box, Inertial, Link
 PLATE_M = 0.01
 _FOOT_M = 0.02  # height above the lowest point within which colliders form the base
 _GAP_M = 1e-4  # no contact at rest, no visible fall
-_HIGHER_M, _LOWER_M = 0.02, 0.012  # range of a supporting surface above or below the base
+_HIGHER_M, _LOWER_M = 0.02, 0.035  # range of a supporting surface above or below the base: a tilted table top spans 3 cm
+_UP = np.array([0.0, 0.0, 1.0])
 _SHARE = 0.3  # minimum fraction of the base's corners on a support
 
 
@@ -42,9 +44,9 @@ def _support(thing: Body, bodies: Mapping[str, Body], floor_z_m: float) -> tuple
     if thing.parent != WORLD:  # a drawer carries it
         return {}, []
     others = [c for body in bodies.values() if body.object_name != thing.object_name for c in collider_corners_world(body)]
-    under_m = _carried_at(points, others, floor_z_m)
-    if under_m is not None:
-        lift = under_m + _GAP_M - float(points[:, 2].min())
+    gap_m = _gap_below(collider_corners_world(thing), others, floor_z_m)
+    if gap_m is not None:
+        lift = _GAP_M - gap_m
         return {body.name: _lifted(body, lift) for body in bodies.values() if body.object_name == thing.object_name}, []
     plate = _plate(thing, points)
     moving = [body for body in bodies.values() if body.free or body.joint is not None]
@@ -52,28 +54,35 @@ def _support(thing: Body, bodies: Mapping[str, Body], floor_z_m: float) -> tuple
     return {}, [] if in_the_way else [plate]
 
 
-def _carried_at(points: Points, others: Sequence[Points], floor_z_m: float) -> float | None:
-    """Height of the highest floor or collider top near the base, under its middle or enough of its corners."""
+def _gap_below(parts: Sequence[Points], others: Sequence[Points], floor_z_m: float) -> float | None:
+    """Gap between the object's colliders and the floor or the colliders that carry it; None where nothing does.
+
+    They carry it if they lie under its middle or under enough corners of its base; negative where it has sunk into them.
+    """
+    points = np.concatenate(parts)
     bottom = float(points[:, 2].min())
-    heights = [floor_z_m] if abs(bottom - floor_z_m) <= _LOWER_M else []
+    gaps = [bottom - floor_z_m] if abs(bottom - floor_z_m) <= _LOWER_M else []
     foot = points[points[:, 2] < bottom + _FOOT_M, :2]
     probes = np.concatenate([foot, points[:, :2].mean(axis=0, keepdims=True)])
     under = np.zeros(len(probes), dtype=bool)
-    tops = []
+    carrying = []
     for corners in others:
-        top = float(corners[:, 2].max())
-        if -_LOWER_M <= top - bottom <= _HIGHER_M and (below := _inside_plan(probes, corners[:, :2])).any():
-            under |= below
-            tops.append(top)
+        reached = corners[:, 2].min() < bottom + _HIGHER_M and corners[:, 2].max() > bottom - _LOWER_M
+        if reached and (below := _inside_plan(probes, corners[:, :2])).any():
+            rises = [rise for own in parts if (rise := last_contact(own, corners, _UP)) is not None]
+            near = [-rise for rise in rises if -_LOWER_M <= rise <= _HIGHER_M]
+            under |= below & bool(near)
+            carrying += near
     if under[-1] or under[:-1].mean() > _SHARE:
-        heights += tops
-    return max(heights, default=None)
+        gaps += carrying
+    return min(gaps, default=None)
 
 
 def _lifted(body: Body, lift_m: float) -> Body:
     """The body moved vertically."""
     raised = Rigid3(np.eye(3), np.array([0.0, 0.0, lift_m])) @ body.world_from_body
-    return replace(body, world_from_body=raised, parent_from_body=raised if body.parent == WORLD else body.parent_from_body)
+    from_parent = raised if body.parent == WORLD else body.parent_from_body
+    return replace(body, world_from_body=raised, parent_from_body=from_parent, lowered_m=-lift_m)
 
 
 def _colliders(body: Body) -> Points:

@@ -78,6 +78,7 @@ SIMULATION_RULES: dict[str, Rule] = {
     "collider-far": Rule("warning", "the visible surface and the colliders differ"),
     "together": Rule("warning", "parts of two joints meet when both are open, as in many real kitchens"),
     "travel": Rule("error", "a joint jams under a hand's force"),
+    "hover": Rule("error", "a free object touches nothing and falls when the simulation starts"),
     "drift": Rule("error", "an untouched object falls or creeps"),
     "unstable": Rule("error", "the simulation diverges"),
     "overlap": Rule("warning", "fixed parts of two objects overlap"),

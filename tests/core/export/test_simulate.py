@@ -167,6 +167,16 @@ def test_an_unsupported_object_that_falls_is_reported_as_drift(tmp_path: Path) -
     assert found.most_drift_m > 0.5
 
 
+def test_an_object_that_hangs_in_the_air_is_named_with_its_gap(tmp_path: Path) -> None:
+    scene = ArticulatedScene(name="t", objects=(counter("k"), bottle("b", bottom_z=0.91)), layout_moves_m={}, warnings=())
+    scene_xml = write_folder(scene, tmp_path / "hanging") / "scene.xml"
+    if "b_support" in (text := scene_xml.read_text()):
+        scene_xml.write_text(_without_body(text, "b_support"))
+    found = simulate(scene_xml)
+    assert [(f.rule, f.message) for f in found.findings] == [("hover", "hangs 45 mm over k_slab")]
+    assert found.most_drift_m > 0.03
+
+
 def test_fixed_parts_that_overlap_are_a_warning(tmp_path: Path) -> None:
     result = simulated(tmp_path, counter("a"), moved(counter("b"), z=0.02))
     assert {(f.rule, f.severity) for f in result.findings} == {("overlap", "warning")}
