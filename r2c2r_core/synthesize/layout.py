@@ -18,7 +18,7 @@ from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import moved
 from r2c2r_core.synthesize.fillers import leave_fillers
 from r2c2r_core.synthesize.laps import lap_of
-from r2c2r_core.synthesize.runs import align_runs
+from r2c2r_core.synthesize.runs import align_runs, level_runs
 from r2c2r_core.synthesize.solve import solved, strain
 from r2c2r_core.synthesize.ties import ties_of
 from r2c2r_core.synthesize.unit_runs import with_one_back
@@ -62,10 +62,11 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
     with spared("the search for impossible objects failed", unseen):
         outliers = outliers_of(objects)
     objects = [item for item in objects if item.name not in outliers]
-    placed = with_one_back(leave_fillers(align_runs(objects, manhattan_yaw_rad)))
+    objects, sloping = level_runs(align_runs(objects, manhattan_yaw_rad))
+    placed = with_one_back(leave_fillers(objects))
     placed = [settled(item, placed, floor_found=floor_found) for item in placed]
     placed, warnings = solved_apart(placed)
-    warnings = [*unseen, *warnings]
+    warnings = [*unseen, *sloping, *warnings]
     moves = {
         before.name: float(np.linalg.norm(anchor(after) - anchor(before)))
         for before, after in zip(objects, placed, strict=True)
@@ -189,7 +190,7 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
     """Index pairs whose boxes are closer than `gap_m` (`rest_gap_m` vertically on a support), and by how much.
 
     Leaves that pass each other share one body but have their own tracks: they are not separated, nor is a thing that stands in
-    a unit, behind its front.
+    a unit, behind its front, nor two free things: their colliders decide (parting.py).
     """
     if len(items) < 2:
         return []
@@ -203,6 +204,8 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
             if (items[i].fixed_by_person and items[j].fixed_by_person) or lap_of(items[i], items[j]) is not None:
                 continue
             if _stands_in(items[i], items[j]) or _stands_in(items[j], items[i]):
+                continue
+            if items[i].spec.opens == items[j].spec.opens == "rigid":
                 continue
             found.append((i, j, d))
     return found

@@ -11,6 +11,7 @@ from r2c2r_core.geometry.transforms import Rigid3, front_rotation, rotation_abou
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.edits import moved
 from r2c2r_core.synthesize.laps import lap_of
+from r2c2r_core.synthesize.solve import Params as SolveParams
 from r2c2r_core.tuning import param, tuned
 
 
@@ -20,6 +21,7 @@ class Params:
 
     same_direction_rad: float = param(float(np.deg2rad(7.0)), "rad", "Maximum angle between fronts of one direction")
     coplanar_m: float = param(0.015, "m", "Maximum distance between fronts of one plane")
+    same_plane_m: float = param(0.002, "m", "Maximum distance between aligned fronts of one plane")
     manhattan_rad: float = param(
         float(np.deg2rad(1.0)),
         "rad",
@@ -32,6 +34,9 @@ class Params:
         "Maximum angle between a free-standing front and a known direction for it to take that direction",
         source="yaw accuracy of a 0.5 m wide front whose ends are known to about 5 mm",
     )
+    apart_m: float = param(0.2, "m", "Minimum distance of two fronts, along their run, whose edges tell its slope", gt=0)
+    most_slope: float = param(0.045, "ratio", "Maximum slope of a run: steeper steps are fronts of different heights")
+    sure: float = param(3.0, "σ", "Minimum slope of a run that is levelled, relative to its standard deviation")
     long_run_m: float = param(0.8, "m", "Minimum length of a run for a line fit to determine its direction")
 
 
@@ -66,6 +71,52 @@ def align_runs(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float) -> t
         nearest = next((yaw for yaw in known if abs(_wrapped(yaw - _yaw(items[i]))) < params.parallel_rad), None)
         items[i] = items[i] if nearest is None else _facing(items[i], nearest)
     return tuple(items)
+
+
+def level_runs(objects: Sequence[MeasuredObject]) -> tuple[list[MeasuredObject], list[str]]:
+    """Aligned fronts moved vertically so that the lines of every run are level, and a notice for a person.
+
+    Bent poses and a wrong up direction make stairs of a run, whose fronts stand upright, each about its own middle. The tilt of
+    the room that best explains the slopes of all runs moves their fronts and worktops; what it leaves of a run's slope turns
+    that run about its middle. The mean height of all fronts stays.
+    """
+    planes = [plane for plane in coplanar_fronts(objects) if len(plane) > 1]
+    slopes = np.array([_slope(objects, plane) for plane in planes])
+    if not slopes.any():
+        return list(objects), []
+    along = np.array([objects[plane[0]].world_from_object.rotation[:2, 0] for plane in planes])
+    weights = np.array([weight(item) for item in objects])
+    root = np.sqrt([weights[plane].sum() for plane in planes])
+    tilt = np.linalg.lstsq(along * root[:, None], -slopes * root, rcond=1e-6)[0]  # the smallest if they do not determine it
+    places, fronts = np.array([item.front_centre[:2] for item in objects]), np.concatenate(planes)
+    rises = (places - np.average(places[fronts], axis=0, weights=weights[fronts])) @ tilt
+    for plane, axis, slope in zip(planes, along, slopes, strict=True):
+        middle = np.average(places[plane], axis=0, weights=weights[plane])
+        rises[plane] -= (slope + axis @ tilt) * (places[plane] - middle) @ axis
+    moving = {*fronts, *(i for i, item in enumerate(objects) if item.spec.opens == "fixed" and not item.fixed_by_person)}
+    items = [moved(item, np.array([0.0, 0.0, rises[i]])) if i in moving else item for i, item in enumerate(objects)]
+    most_deg, most_mm = np.degrees(np.abs(np.arctan(slopes)).max()), 1000 * np.abs(rises[fronts]).max()
+    said = f"fronts slope by up to {most_deg:.1f}° along their runs in the scan: they were levelled, by up to {most_mm:.0f} mm"
+    return items, [said]
+
+
+def _slope(objects: Sequence[MeasuredObject], plane: Sequence[int]) -> float:
+    """Slope of the tops and bottoms of a run's fronts along its x axis (Theil-Sen), 0 where it may be a measurement error."""
+    params = tuned(Params)
+    axis = objects[plane[0]].world_from_object.rotation[:, 0]
+    x = np.array([objects[i].front_centre @ axis for i in plane])
+    first, second = np.triu_indices(len(plane), 1)
+    runs, slopes = np.abs(x[second] - x[first]), list[np.ndarray]()
+    for sign in (-0.5, 0.5):
+        z = np.array([objects[i].front_centre[2] + sign * objects[i].dimensions_m[2] for i in plane])
+        slopes.append((z[second] - z[first]) / np.where(runs > params.apart_m, x[second] - x[first], np.inf))
+    found, lengths = np.concatenate(slopes), np.tile(runs, 2)
+    likely = (np.abs(found) < params.most_slope) & (lengths > params.apart_m)
+    if not likely.any():
+        return 0.0
+    slope = weighted_median(found[likely], lengths[likely])
+    error = tuned(SolveParams).measured_edge_m / (float(np.std(x)) * np.sqrt(2 * len(x)))
+    return slope if abs(slope) > params.sure * error else 0.0
 
 
 def _straightened(objects: Sequence[MeasuredObject], line: _Line, yaw_rad: float) -> list[MeasuredObject]:
@@ -142,6 +193,25 @@ def _length(items: Sequence[MeasuredObject], plane: Sequence[int], outward: Vect
     along = np.array([-outward[1], outward[0], 0.0])
     positions = [float(items[i].front_centre @ along) for i in plane]
     return max(positions) - min(positions)
+
+
+def coplanar_fronts(items: Sequence[MeasuredObject]) -> list[list[int]]:
+    """Built-in fronts grouped by plane, after `align_runs`."""
+    planes: list[list[int]] = []
+    for i, item in enumerate(items):
+        if not built_in(item) or item.spec.opens == "rigid" or item.fixed_by_person:
+            continue
+        home = next((p for p in planes if _same_plane(items[p[0]], item)), None)
+        if home is None:
+            planes.append([i])
+        else:
+            home.append(i)
+    return planes
+
+
+def _same_plane(a: MeasuredObject, b: MeasuredObject) -> bool:
+    apart = float((a.front_centre - b.front_centre) @ a.outward)
+    return float(a.outward @ b.outward) > 1 - 1e-6 and abs(apart) < tuned(Params).same_plane_m
 
 
 def built_in(item: MeasuredObject) -> bool:

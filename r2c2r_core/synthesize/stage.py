@@ -44,6 +44,7 @@ from r2c2r_core.synthesize.laps import lapped, with_hidden_edges
 from r2c2r_core.synthesize.layout import arrange, settled, with_outliers
 from r2c2r_core.synthesize.marked import as_marked, part_of
 from r2c2r_core.synthesize.opening import open_all
+from r2c2r_core.synthesize.parting import moved_apart
 from r2c2r_core.synthesize.physics import friction_shut, inertial_of_boxes, inertial_of_pieces, moved_boxes, weighing
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.surroundings import as_said, standing_clear, surroundings_of
@@ -122,6 +123,7 @@ def build_scene(
                 built.append(_fixture(item, hinges.get(item.name), overrides.of(item.name), carcass))
     if not built:
         raise StageError("no object could be built", hint="; ".join(failures.values()))
+    built = moved_apart(built)
     progress.at(0.9, "opening every joint")
     arranged = {item.name: item for item in placed if item.name not in failures}
 
@@ -249,7 +251,7 @@ def _thing(item: MeasuredObject, placement: Placement, asset: MeshAsset, seed: i
     vertices = item.placed_pose.inverse.apply(placement.world_from_mesh.apply(asset.mesh.vertices))
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     fitted = (vertices - (low + high) / 2) * (item.dimensions_m / np.maximum(high - low, 1e-6))
-    pieces = convex_pieces(fitted, asset.mesh.faces, item.dimensions_m, seed=seed)
+    pieces = convex_pieces(fitted, asset.mesh.faces, item.dimensions_m, flat_top=item.spec.flat_top, seed=seed)
     material = item.spec.material
     link = Link(
         name=f"{item.name}_base",

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from r2c2r_core.arrays import Faces, Points, Vector3
-from r2c2r_core.geometry.meshes import joined_solid
+from r2c2r_core.geometry.meshes import face_areas, face_normals, joined_solid
 from r2c2r_core.model.scene import ConvexPiece
+from r2c2r_core.synthesize.runs import weighted_median
 from r2c2r_core.synthesize.vessels import between, corners_of, staves
 from r2c2r_core.tuning import param, tuned
 
@@ -24,17 +25,24 @@ class Params:
         ge=1,
     )
     flat_m: float = param(
-        0.006, "m", "Distance from the underside within which a point belongs to it", source="reconstructed feet are uneven"
+        0.006,
+        "m",
+        "Distance from the underside or top within which a point belongs to it",
+        source="reconstructed feet are uneven",
     )
+    simplified_m: float = param(0.005, "m", "Maximum distance by which a solid is simplified before its decomposition", ge=0)
+    level_cos: float = param(0.9, "cosine", "Minimum cosine of the angle between a slab's top and up")
     most_pieces: int = param(16, "count", "Maximum number of convex pieces of an object", ge=1)
 
 
-def convex_pieces(vertices: Points, faces: Faces, dimensions_m: Vector3, *, seed: int = 0) -> tuple[ConvexPiece, ...]:
+def convex_pieces(
+    vertices: Points, faces: Faces, dimensions_m: Vector3, *, flat_top: bool = False, seed: int = 0
+) -> tuple[ConvexPiece, ...]:
     """The hull, parted where it would fill a neck; staves or a convex decomposition where it would fill a cavity.
 
-    All have one flat underside. The mesh is in the object's frame.
+    All have one flat underside and, where others stand on it, one flat top. The mesh is in the object's frame.
     """
-    shape = joined_solid(vertices, faces)
+    shape, top_m = joined_solid(vertices, faces), _level_top(vertices, faces) if flat_top else np.inf
     if shape is None or shape.volume() <= 0:
         parts = [vertices]
     elif shape.hull().volume() > tuned(Params).openness * shape.volume():
@@ -43,7 +51,7 @@ def convex_pieces(vertices: Points, faces: Faces, dimensions_m: Vector3, *, seed
         parts = corners_of(_parted(shape))
     pieces = []
     for number, points in enumerate(parts):
-        simple = _simplified(_flat_below(points, -dimensions_m[2] / 2))
+        simple = _simplified(_with_level_ends(points, -dimensions_m[2] / 2, top_m))
         if simple is not None:
             pieces.append(ConvexPiece(name=f"piece_{number}", vertices_link=simple))
     return tuple(pieces)
@@ -69,21 +77,18 @@ def _parted(shape: Any) -> list[Any]:
 
 
 def _decomposed(shape: Any, seed: int) -> list[Points]:
-    """CoACD parts; the mesh is decimated first, or it takes minutes (stack.md section 1)."""
+    """CoACD parts of a simplified solid. It is closed already: CoACD's own remeshing thickens a 2 m table by 3 cm."""
     import coacd
-    import fast_simplification
 
-    mesh = shape.to_mesh64()
+    mesh = shape.simplify(tuned(Params).simplified_m).to_mesh64()
     vertices, faces = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts)
-    if len(faces) > 1200:
-        vertices, faces = fast_simplification.simplify(vertices.astype(np.float32), faces.astype(np.int32), target_count=1200)
     coacd.set_log_level("error")
     parts = coacd.run_coacd(
         coacd.Mesh(vertices.astype(np.float64), faces.astype(np.int32)),
-        threshold=0.15,
+        threshold=0.05,
         max_convex_hull=12,
-        preprocess_resolution=20,
-        mcts_iterations=20,  # with the defaults a chair takes 26 s of CPU instead of 4, for the same volume
+        preprocess_mode="off",
+        mcts_iterations=20,  # with the defaults a chair takes 26 s of CPU instead of 3, for the same volume
         mcts_nodes=8,
         mcts_max_depth=2,
         seed=seed,
@@ -91,10 +96,18 @@ def _decomposed(shape: Any, seed: int) -> list[Points]:
     return [np.asarray(points, dtype=np.float64) for points, _ in parts][: tuned(Params).most_pieces]
 
 
-def _flat_below(points: Points, underside_m: float) -> Points:
-    """The points, with those near the underside projected onto it."""
-    flat = points.copy()
-    flat[:, 2] = np.where(points[:, 2] < underside_m + tuned(Params).flat_m, underside_m, points[:, 2])
+def _level_top(vertices: Points, faces: Faces) -> float:
+    """Height of a slab that is the highest part: the median over the area of its upward faces, whose bumps lie above it."""
+    heights, areas = vertices[faces][:, :, 2].mean(axis=1), face_areas(vertices, faces)
+    top = (face_normals(vertices, faces)[:, 2] > tuned(Params).level_cos) & (heights > vertices[:, 2].mean())
+    return weighted_median(heights[top], areas[top]) if top.any() else np.inf
+
+
+def _with_level_ends(points: Points, underside_m: float, top_m: float) -> Points:
+    """The points, with those near or beyond the underside and the top projected onto them."""
+    flat, near = points.copy(), tuned(Params).flat_m
+    flat[:, 2] = np.where(points[:, 2] < underside_m + near, underside_m, points[:, 2])
+    flat[:, 2] = np.where(points[:, 2] > top_m - near, top_m, flat[:, 2])
     return flat
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from r2c2r_core.synthesize.dimensions import MeasuredObject
 from r2c2r_core.synthesize.fixtures.carcass import Params as CarcassParams
 from r2c2r_core.synthesize.laps import lap_of
-from r2c2r_core.synthesize.runs import built_in
+from r2c2r_core.synthesize.runs import built_in, coplanar_fronts
 from r2c2r_core.synthesize.solve import Face, Tie
 from r2c2r_core.tuning import param, tuned
 
@@ -28,16 +28,14 @@ class Params:
         "Range of the gap (negative: overlap) within which two edges form one seam",
         source="gaps are 2-4 mm, end panels 16-19 mm",
     )
-    coplanar_m: float = param(0.002, "m", "Maximum distance between fronts of one plane")
-    line_m: float = param(0.02, "m", "Maximum height step to the next top of one line", source="a scan sags along a run")
-    lines_m: float = param(0.04, "m", "Maximum height range of all tops of one line", source="a scan sags along a run")
+    line_m: float = param(0.02, "m", "Maximum height step to the next top of one line, of a levelled run")
     slit_m: float = param(0.02, "m", "Maximum gap between a unit and the board above or below it: more is a real step")
 
 
 def ties_of(items: Sequence[MeasuredObject]) -> list[Tie]:
     """Ties for every plane, line and seam that built-in fronts share; `items` are already aligned in runs."""
     ties: list[Tie] = []
-    for plane in _coplanar(items):
+    for plane in coplanar_fronts(items):
         ties += [Tie(first=Face(a, 1, -1.0), second=Face(b, 1, -1.0)) for a, b in pairwise(plane)]
         for sign in (1.0, -1.0):
             ties += _levels(items, plane, sign)
@@ -81,35 +79,13 @@ def _one_above_the_other(a: MeasuredObject, b: MeasuredObject) -> bool:
     return bool((apart[:2] < reach[:2] - tuned(Params).slit_m / 2).all())
 
 
-def _coplanar(items: Sequence[MeasuredObject]) -> list[list[int]]:
-    """Built-in fronts grouped by plane, after alignment in runs."""
-    planes: list[list[int]] = []
-    for i, item in enumerate(items):
-        if not built_in(item) or item.spec.opens == "rigid" or item.fixed_by_person:
-            continue
-        home = next((p for p in planes if _same_plane(items[p[0]], item)), None)
-        if home is None:
-            planes.append([i])
-        else:
-            home.append(i)
-    return planes
-
-
-def _same_plane(a: MeasuredObject, b: MeasuredObject) -> bool:
-    apart = float((a.front_centre - b.front_centre) @ a.outward)
-    return float(a.outward @ b.outward) > 1 - 1e-6 and abs(apart) < tuned(Params).coplanar_m
-
-
 def _levels(items: Sequence[MeasuredObject], plane: Sequence[int], sign: float) -> Iterator[Tie]:
     """Ties of closely spaced tops (+1) or bottoms (-1) to one line."""
     left = sorted(plane, key=lambda i: _edge(items[i], 2, sign))
     params = tuned(Params)
     while left:
         line = [left.pop(0)]
-        lowest = _edge(items[line[0]], 2, sign)
-        while left and _edge(items[left[0]], 2, sign) < min(
-            _edge(items[line[-1]], 2, sign) + params.line_m, lowest + params.lines_m
-        ):
+        while left and _edge(items[left[0]], 2, sign) < _edge(items[line[-1]], 2, sign) + params.line_m:
             line.append(left.pop(0))
         yield from (Tie(first=Face(a, 2, sign), second=Face(b, 2, sign)) for a, b in pairwise(line))
 

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.inputs import ObjectOverride
 from r2c2r_core.synthesize import layout as layout_module
@@ -212,6 +213,24 @@ def test_a_run_that_sags_along_its_length_is_levelled() -> None:
     assert np.ptp([o.world_from_object.translation[2] for o in layout.objects]) < 1e-6
     assert max(layout.moves_m.values()) < 0.015
     np.testing.assert_allclose([o.dimensions_m[2] for o in layout.objects], 0.7, atol=1e-3)
+
+
+def test_two_runs_of_a_tilted_room_get_level_lines_of_one_height() -> None:
+    """Up is off by 2°: the tops of an L fall by 13 cm, beyond any tolerance of a tie."""
+    tilt = np.array([0.022, 0.026])
+    back = [Unit(f"b{i}", "cabinet", (0.503 * i, 0.0, 0.5), (0.5, 0.58, 0.7)) for i in range(5)]
+    left = [Unit(f"l{i}", "cabinet", (-0.6, -0.6 - 0.503 * i, 0.5), (0.5, 0.58, 0.7), yaw=np.pi / 2) for i in range(4)]
+    items = []
+    for unit in [*back, *left]:
+        item = placed(unit)
+        fallen = item.world_from_object.translation - [0.0, 0.0, tilt @ item.front_centre[:2]]
+        items.append(replace(item, world_from_object=Rigid3(item.world_from_object.rotation, fallen)))
+    layout = arrange(items, 0.0, floor_found=True)
+    tops = np.array([o.world_from_object.translation[2] + o.dimensions_m[2] / 2 for o in layout.objects])
+    assert np.ptp(tops) < 1e-3
+    assert abs(tops.mean() - np.mean([i.world_from_object.translation[2] + i.dimensions_m[2] / 2 for i in items])) < 2e-3
+    assert ["slope by up to 1.5°" in warning for warning in layout.warnings] == [True]
+    assert max(layout.moves_m.values()) < 0.015  # the tilt is no error of an object
 
 
 def test_a_shorter_neighbour_keeps_its_own_height() -> None:

@@ -1,4 +1,6 @@
+import manifold3d
 import numpy as np
+import pytest
 from scipy.spatial import Delaunay
 from trimesh import Trimesh
 from trimesh.creation import annulus, cylinder, icosphere, revolve
@@ -56,3 +58,28 @@ def test_uneven_feet_are_flattened_into_one_underside() -> None:
     vertices[low, 2] += 0.004 * (vertices[low, 0] > 0)
     (piece,) = convex_pieces(vertices, np.asarray(mesh.faces), np.array([0.08, 0.08, 0.2]))
     assert (piece.vertices_link[:, 2] < -0.1 + 1e-9).sum() >= 10
+
+
+def table_mesh(bump_m: float = 0.0) -> Trimesh:
+    """A slab of 2 x 1 m on four legs, 0.7 m high, with a bump on its top."""
+    parts = [(0.0, 0.0, 0.325, 2.0, 1.0, 0.05), *((x, y, -0.025, 0.08, 0.08, 0.65) for x in (-0.9, 0.9) for y in (-0.4, 0.4))]
+    boxes = [manifold3d.Manifold.cube(part[3:], True).translate(part[:3]) for part in parts]
+    if bump_m:
+        boxes.append(manifold3d.Manifold.cube((0.3, 0.3, 0.02 + bump_m), True).translate((0.3, 0.1, 0.34 + bump_m / 2)))
+    mesh = manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add).to_mesh64()
+    return Trimesh(np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts), process=False)
+
+
+def test_the_colliders_of_a_large_table_are_no_thicker_than_it_is() -> None:
+    mesh = table_mesh()
+    pieces = pieces_of(mesh)
+    tops = [piece.vertices_link[:, 2].max() for piece in pieces]
+    assert max(tops) == pytest.approx(0.35, abs=1e-3)
+    assert sum(Trimesh(p.vertices_link).convex_hull.volume for p in pieces) < 1.3 * mesh.volume
+
+
+def test_the_top_of_a_table_is_level_where_things_stand() -> None:
+    mesh = table_mesh(bump_m=0.003)
+    pieces = convex_pieces(np.asarray(mesh.vertices), np.asarray(mesh.faces), mesh.extents, flat_top=True)
+    slab = max((piece.vertices_link for piece in pieces), key=lambda points: np.ptp(points[:, 0]))
+    assert slab[:, 2].max() == pytest.approx(0.35, abs=1e-6)
