@@ -1,5 +1,6 @@
 """Selection among candidate poses: stable poses are preferred to toppling ones, and rivals are compared after refinement."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,17 @@ def test_lean_is_measured_from_the_nearest_stable_pose(bottle: Case) -> None:
 def test_a_leaning_bottle_is_set_upright(bottle: Case) -> None:
     best = finish_contenders([trial(bottle, lean=25.0)], bottle)[0]
     assert lean_deg(best.pose, bottle) == 0.0
+
+
+def test_what_stands_on_legs_is_placed_with_its_base_level(bottle: Case) -> None:
+    """A table's top that leans with a bent scan lets what stands on it slide; a bottle's rough base tells less than the scan."""
+    chair = replace(bottle, track=replace(bottle.track, category="chair"))
+    (base,) = [base for base in chair.shape.bases if base[2] > 0.9]
+    leans = [
+        np.degrees(np.arccos((finish_contenders([trial(case, lean=2.0)], case)[0].pose.rotation @ base)[2]))
+        for case in (chair, bottle)
+    ]
+    assert leans[0] < 1e-3 < leans[1]
 
 
 def test_rival_poses_are_distinguished_by_size_and_rotation(bottle: Case) -> None:
