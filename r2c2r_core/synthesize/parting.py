@@ -14,13 +14,15 @@ from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.synthesize.layout import Params as LayoutParams
 from r2c2r_core.tuning import param, tuned
 
+_UP: Vector3 = np.array([0.0, 0.0, 1.0])
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """Tuned parameters of moving objects apart."""
 
     directions: int = param(24, "count", "Number of horizontal directions that are tried", ge=4)
-    rounds: int = param(4, "count", "Maximum number of moves of one object", ge=1)
+    sunk_m: float = param(0.02, "m", "Maximum depth to which an object that stands on another has sunk into it")
     deepest_m: float = param(0.15, "m", "Maximum distance by which an object is moved: beyond, the overlap is reported")
 
 
@@ -42,11 +44,11 @@ def _out_of(item: SceneObject, other: SceneObject) -> SceneObject:
     angles = np.arange(params.directions) * 2 * np.pi / params.directions
     ways = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
     still, shift = _pieces(other), np.zeros(3)
-    for _ in range(params.rounds):
-        met = [(own, each) for own in _pieces(item) for each in still if _overlap(own + shift, each)]
-        if not met:
-            break
-        needed = [max(last_contact(own + shift, each, way) or 0.0 for own, each in met) for way in ways]
+    for _ in ways:  # few moves suffice
+        met = [(own, each) for own in (part + shift for part in _pieces(item)) for each in still if _overlap(own, each)]
+        if not met or any(max(last_contact(*pair, up) or 0.0 for pair in met) < params.sunk_m for up in (_UP, -_UP)):
+            break  # one stands on the other: the export sets it down
+        needed = [max(last_contact(own, each, way) or 0.0 for own, each in met) for way in ways]
         best = int(np.argmin(needed))
         shift = shift + (needed[best] + gap_m) * ways[best]
     if not shift.any() or np.linalg.norm(shift) > params.deepest_m:
@@ -74,6 +76,5 @@ def _overlap(a: Points, b: np.ndarray) -> bool:
     """Whether two convex hulls share a point: along any direction, one has left the other later than it met it."""
     if (np.maximum(a.min(axis=0), b.min(axis=0)) >= np.minimum(a.max(axis=0), b.max(axis=0))).any():
         return False
-    up: Vector3 = np.array([0.0, 0.0, 1.0])
-    leaves, enters = last_contact(a, b, up), last_contact(a, b, -up)
+    leaves, enters = last_contact(a, b, _UP), last_contact(a, b, -_UP)
     return leaves is not None and enters is not None and leaves > 0 and enters > 0

@@ -43,13 +43,11 @@ def test_a_leaning_bottle_is_set_upright(bottle: Case) -> None:
 
 
 def test_what_stands_on_legs_is_placed_with_its_base_level(bottle: Case) -> None:
-    """A table's top that leans with a bent scan lets what stands on it slide; a bottle's rough base tells less than the scan."""
+    """Things slide off a table top that leans with a bent scan; a bottle's rough base tells less than the scan."""
     chair = replace(bottle, track=replace(bottle.track, category="chair"))
     (base,) = [base for base in chair.shape.bases if base[2] > 0.9]
-    leans = [
-        np.degrees(np.arccos((finish_contenders([trial(case, lean=2.0)], case)[0].pose.rotation @ base)[2]))
-        for case in (chair, bottle)
-    ]
+    poses = [finish_contenders([trial(case, lean=2.0)], case)[0].pose for case in (chair, bottle)]
+    leans = [np.degrees(np.arccos((pose.rotation @ base)[2])) for pose in poses]
     assert leans[0] < 1e-3 < leans[1]
 
 

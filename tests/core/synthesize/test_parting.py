@@ -41,6 +41,12 @@ def test_a_chair_whose_back_is_in_the_top_is_moved_out_by_the_overlap() -> None:
     assert ["moved by 52 mm out of table" in warning for warning in chair.warnings][-1]
 
 
+def test_a_mug_near_the_edge_that_has_sunk_into_the_top_stays_on_the_table() -> None:
+    mug: tuple[Part, ...] = (((0, 0, 0.05), (0.08, 0.08, 0.1)),)
+    items = [free("table", TABLE, (0, 0, 0), 30.0), free("mug", mug, (0.5, 0.3, 0.73), 0.3)]  # its top is at 0.74
+    assert moved_apart(items)[1].world_from_object.translation == pytest.approx([0.5, 0.3, 0.73])
+
+
 def test_one_thing_inside_another_stays_where_it_was_measured() -> None:
     solid: tuple[Part, ...] = (((0, 0, 0.4), (0.8, 0.8, 0.8)),)
     items = [free("sofa", solid, (0, 0, 0), 30.0), free("chair", CHAIR, (0, 0, 0), 5.0)]
