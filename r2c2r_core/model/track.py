@@ -46,6 +46,7 @@ class FrontPanel(Rectangle3):
     edges: tuple[float, ...] = ()  # probability of each edge: left, right, top, bottom; empty where a person drew it
     changes: tuple[float, ...] = ()  # CIELAB colour change at each edge, median along it; in the same order
     seam: float = 0.0  # probability of the most likely seam inside it that was not cut
+    strip_over_m: float = 0.0  # height of the strip of another material over it, such as a worktop's front edge; 0: none
     slides: float = 0.0  # probability that it slides sideways, over the panel behind it
 
 

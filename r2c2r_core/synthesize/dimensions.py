@@ -90,6 +90,7 @@ class MeasuredObject:
     front_measured: bool  # the front plane and its rectangle come from all frames, not from the mesh
     confidence: float
     edges: tuple[float, ...] = ()  # probability that each edge of its front is right: left, right, top, bottom
+    strip_over_m: float = 0.0  # height of the strip of another material over its front; 0: none was seen
     fixed_by_person: bool  # a person gave pose or size: the layout leaves it where it is
     laps: tuple[Lap, ...] = ()  # with the leaves that it slides past, set after the layout
     placed_pose: Rigid3  # world_from_object as the mesh was placed, before person and layout
@@ -161,6 +162,7 @@ def measure_object(
         front_measured=front is not None,
         confidence=front.confidence if front is not None else 0.3,
         edges=front.edges if front is not None else (),
+        strip_over_m=front.strip_over_m if front is not None else 0.0,
         fixed_by_person=False,
         placed_pose=pose,
         warnings=tuple(warnings),

@@ -14,6 +14,7 @@ from r2c2r_core.model.motion import Source
 from r2c2r_core.synthesize.dimensions import MeasuredObject, depth_behind
 from r2c2r_core.synthesize.facets import Colour, Facets, most_common
 from r2c2r_core.synthesize.facets import Params as FacetsParams
+from r2c2r_core.synthesize.runs import weighted_median
 from r2c2r_core.synthesize.slabs import Params as SlabsParams
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.unit_runs import Interval, UnitRun, flush, grouped, heights, is_front, overlap
@@ -131,10 +132,16 @@ def _top_of(facets: Facets, run: UnitRun) -> _Top | None:
     level = level.where(level.within(2, top + params.above_m[0], top + params.above_m[1]))
     level = level.where(level.within(1, front - params.overhang_m, back + params.behind_m))
     over = level.where(_over_any(level.middles[:, 0], run) & level.within(1, front, back))
+    widths = np.array([unit.dimensions_m[0] for unit in run.units])
+    edge_m = weighted_median(np.array([unit.strip_over_m for unit in run.units]), widths)
     height = most_common(over.middles[:, 2], over.areas, least=params.evidence * _length(run) * _depth(run))
+    # black stone has no depth: where the pictures show its front edge over most of the run, that tells its height
+    height = height if edge_m == 0.0 else top + tuned(SlabsParams).clear_m + edge_m
     if height is None or height < top + tuned(SlabsParams).clear_m + params.thinnest_m:
         return None
     level, over = (part.where(np.abs(part.middles[:, 2] - height) < facets_params.band_m) for part in (level, over))
+    if edge_m > 0.0 and len(over.areas):
+        return _Top(run, height, level, over, over.colour)
     return _Top(run, height, level, over, _colour(facets, run, height, over)) if _all_along(run, over) else None
 
 

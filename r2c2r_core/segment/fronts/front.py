@@ -91,7 +91,7 @@ class Front:
     handle: GridHandle | None
     depth_m: float  # to the wall behind, or the usual depth
     sides: tuple[HingeSide, ...] = ()  # faces of the carcass in view
-    strips: tuple[bool, bool] = (False, False)  # whether its upper, lower edge is that of a strip of another material
+    strips: tuple[float, float] = (0.0, 0.0)  # heights of strips of another material at its upper, lower edge, grid cells
 
     @property
     def outline(self) -> Rectangle3:
@@ -130,7 +130,7 @@ def find_front(
     surface = surface_of(run.mosaic, run.relief)
     refined = panel_edges(cell, surface, run.grid.cell_m)
     panel = clear_of_strips(refined, surface, run.grid.cell_m)
-    strips = panel.top != refined.top, panel.bottom != refined.bottom
+    strips = panel.top - refined.top, refined.bottom - panel.bottom
     return Front(run, panel, own_handle(handle, panel), 0.0, strips=strips)
 
 
@@ -159,6 +159,7 @@ def front_panel(front: Front) -> FrontPanel:
         edges=strengths,
         changes=changes,
         seam=seam_inside(front),
+        strip_over_m=front.strips[0] * front.run.grid.cell_m,
     )
 
 
@@ -402,7 +403,7 @@ def _edge_strengths(front: Front, changes: Iterable[float]) -> tuple[float, ...]
     params, odds = tuned(Params), front.run.odds.of_edges(front.cell)
     return tuple(
         min(probability(SUREST if strip else own), 1.0 if change >= params.edge_lab else params.unseen_edge)
-        for own, strip, change in zip(odds, (False, False, *front.strips), changes, strict=True)
+        for own, strip, change in zip(odds, (0.0, 0.0, *front.strips), changes, strict=True)
     )
 
 

@@ -49,9 +49,11 @@ def scanned(*solids: tuple[Corner, Corner]) -> Capture:
     return replace(capture((BEHIND,)), surface=surface)
 
 
-def built(units: Sequence[Unit], scan: Capture, *, on: bool = True) -> ArticulatedScene:
+def built(units: Sequence[Unit], scan: Capture, *, on: bool = True, strip_over_m: float = 0.0) -> ArticulatedScene:
     rng = np.random.default_rng(0)
     tracks, placements, assets = zip(*[placed_unit(u, rng) for u in units], strict=True)
+    if strip_over_m:
+        tracks = tuple(replace(t, front=t.front and replace(t.front, strip_over_m=strip_over_m)) for t in tracks)
     config = SynthesizeConfig(surroundings=on)
     return build_scene(scan, tracks, placements, assets, Overrides(objects={}), config)
 
@@ -81,6 +83,16 @@ def test_an_unclicked_worktop_is_built_at_the_scanned_height() -> None:
     np.testing.assert_allclose(counter.links[0].colour, np.array(BROWN) / 255, atol=0.01)
     assert any("without clicks" in line for line in counter.warnings)
     assert counter.name == "counter_1"
+
+
+def test_the_front_edge_in_the_pictures_tells_the_height_of_black_stone() -> None:
+    """Depth shows one patch of its top, 1 cm too high, and what stands on it; the pictures show its edge over every front."""
+    patch, books = ((0.0, 0.0, 0.9), (0.15, 0.1, 0.91)), ((0.3, 0.0, 0.9), (0.6, 0.2, 0.96))
+    assert of(built((CAB_L, CAB_R), scanned(patch, books)), "counter") == []
+    (counter,) = of(built((CAB_L, CAB_R), scanned(patch, books), strip_over_m=0.05), "counter")
+    low, high = bounds(counter)
+    np.testing.assert_allclose([low[2], high[2]], [0.852, 0.902], atol=1e-3)
+    np.testing.assert_allclose([low[0], high[0]], [-0.3, 0.903], atol=0.01)
 
 
 def test_a_plinth_is_built_where_the_scan_shows_it() -> None:
