@@ -43,12 +43,7 @@ class Params:
         source="neighbours share at most 0.02 of the sample kitchens' correct masks",
     )
     same: float = param(0.5, "share", "Minimum shared fraction of the smaller mask for two objects to be the same")
-    on_slab_m: float = param(
-        0.05,
-        "m",
-        "Maximum height of an object's underside over or below the slab that it stands on",
-        source="scans bend by 3 cm",
-    )
+    on_slab_m: float = param(0.05, "m", "Maximum distance of an underside from the slab under it", source="scans bend by 3 cm")
     near_click: float = param(
         0.01,
         "share",

@@ -23,11 +23,7 @@ class Params:
     max_strip_m: float = param(0.08, "m", "Maximum height of a strip", gt=0, source="worktops are 20-40 mm thick, some 60")
     min_strip_m: float = param(0.008, "m", "Minimum height of a strip: lower ones are blurred gaps", gt=0, source=_SOURCE)
     min_difference: float = param(
-        4.0,
-        "σ",
-        "Minimum difference of a strip's rows from the panel's, relative to the scatter of the panel's own rows",
-        gt=0,
-        source=_SOURCE,
+        4.0, "σ", "Minimum difference of a strip from the panel, relative to the scatter of its rows", gt=0, source=_SOURCE
     )
     min_sigma: float = param(4.0, "grey", "Minimum scatter of the CIELAB colours of rows of one material", gt=0, source=_SOURCE)
     beside_m: float = param(
