@@ -76,7 +76,7 @@ def test_an_object_whose_support_search_fails_is_exported_where_it_is(tmp_path: 
     def fails(*_: Any) -> None:
         raise np.linalg.LinAlgError("SVD did not converge")
 
-    monkeypatch.setattr(support, "_carried_at", fails)
+    monkeypatch.setattr(support, "_gap_below", fails)
     objects = (counter("counter_1"), bottle("bottle_1", bottom_z=0.87))
     scene = ArticulatedScene(name="t", objects=objects, layout_moves_m={}, warnings=())
     assert write_bundle(reconstruction(scene), tmp_path / "b.zip", QUICK, created=CREATED).left_out == {}
