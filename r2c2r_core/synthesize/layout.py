@@ -62,14 +62,17 @@ def arrange(objects: Sequence[MeasuredObject], manhattan_yaw_rad: float, *, floo
     with spared("the search for impossible objects failed", unseen):
         outliers = outliers_of(objects)
     objects = [item for item in objects if item.name not in outliers]
-    objects, sloping = level_runs(align_runs(objects, manhattan_yaw_rad))
-    placed = with_one_back(leave_fillers(objects))
+    levelled = aligned = list(align_runs(objects, manhattan_yaw_rad))
+    with spared("the lines of runs were not levelled", unseen):
+        levelled, said = level_runs(aligned)
+        unseen += said
+    placed = with_one_back(leave_fillers(levelled))
     placed = [settled(item, placed, floor_found=floor_found) for item in placed]
     placed, warnings = solved_apart(placed)
-    warnings = [*unseen, *sloping, *warnings]
+    warnings = [*unseen, *warnings]
     moves = {
-        before.name: float(np.linalg.norm(anchor(after) - anchor(before)))
-        for before, after in zip(objects, placed, strict=True)
+        before.name: float(np.linalg.norm(anchor(after) - anchor(level) + anchor(line) - anchor(before)))  # but for the level
+        for before, line, level, after in zip(objects, aligned, levelled, placed, strict=True)
     }
     warnings += [
         f"{name} was moved by {1000 * by:.0f} mm: check its size and pose" for name, by in moves.items() if by > params.far_m
@@ -203,9 +206,8 @@ def overlapping_pairs(items: Sequence[MeasuredObject]) -> list[tuple[int, int, f
         if d > 1e-6 and not _rests_on(items[i], items[j]) and not _rests_on(items[j], items[i]):
             if (items[i].fixed_by_person and items[j].fixed_by_person) or lap_of(items[i], items[j]) is not None:
                 continue
-            if _stands_in(items[i], items[j]) or _stands_in(items[j], items[i]):
-                continue
-            if items[i].spec.opens == items[j].spec.opens == "rigid":
+            free = items[i].spec.opens == items[j].spec.opens == "rigid"
+            if free or _stands_in(items[i], items[j]) or _stands_in(items[j], items[i]):
                 continue
             found.append((i, j, d))
     return found

@@ -26,11 +26,14 @@ class Params:
     deepest_m: float = param(0.15, "m", "Maximum distance by which an object is moved: beyond, the overlap is reported")
 
 
-def moved_apart(items: Sequence[SceneObject]) -> list[SceneObject]:
-    """The objects, of each pair of free ones whose colliders overlap the lighter one moved horizontally out of the other."""
+def moved_apart(items: Sequence[SceneObject], kept: frozenset[str]) -> list[SceneObject]:
+    """The objects, the lighter of two free ones that overlap moved out of the other; those in `kept`, a person's, stay."""
     done = {item.name: item for item in items}
     for names in combinations([item.name for item in items if item.movable], 2):
-        first, second = sorted((done[name] for name in names), key=lambda item: item.links[0].inertial.mass_kg)
+        pair = (done[name] for name in names)
+        first, second = sorted(pair, key=lambda item: (item.name in kept, item.links[0].inertial.mass_kg))
+        if first.name in kept:
+            continue
         said: list[str] = []
         with spared(f"it was not moved apart from {second.name}", said):
             first = _out_of(first, second)
@@ -74,7 +77,4 @@ def _pieces(item: SceneObject) -> list[Points]:
 
 def _overlap(a: Points, b: np.ndarray) -> bool:
     """Whether two convex hulls share a point: along any direction, one has left the other later than it met it."""
-    if (np.maximum(a.min(axis=0), b.min(axis=0)) >= np.minimum(a.max(axis=0), b.max(axis=0))).any():
-        return False
-    leaves, enters = last_contact(a, b, _UP), last_contact(a, b, -_UP)
-    return leaves is not None and enters is not None and leaves > 0 and enters > 0
+    return all((last_contact(a, b, way) or 0.0) > 0.0 for way in (_UP, -_UP))

@@ -123,7 +123,7 @@ def build_scene(
                 built.append(_fixture(item, hinges.get(item.name), overrides.of(item.name), carcass))
     if not built:
         raise StageError("no object could be built", hint="; ".join(failures.values()))
-    built = moved_apart(built)
+    built = moved_apart(built, frozenset(item.name for item in placed if item.fixed_by_person))
     progress.at(0.9, "opening every joint")
     arranged = {item.name: item for item in placed if item.name not in failures}
 

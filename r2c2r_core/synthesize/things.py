@@ -25,10 +25,7 @@ class Params:
         ge=1,
     )
     flat_m: float = param(
-        0.006,
-        "m",
-        "Distance from the underside or top within which a point belongs to it",
-        source="reconstructed feet are uneven",
+        0.006, "m", "Maximum distance of points of the underside or a flat top from it", source="reconstructed feet are uneven"
     )
     simplified_m: float = param(0.005, "m", "Maximum distance by which a solid is simplified before its decomposition", ge=0)
     level_cos: float = param(0.9, "cosine", "Minimum cosine of the angle between a slab's top and up")

@@ -51,6 +51,23 @@ def test_a_run_becomes_coplanar_and_parallel() -> None:
     assert max(layout.moves_m.values()) < 0.015
 
 
+def test_the_report_counts_what_the_alignment_moved() -> None:
+    units = run_of_doors(0.0, 0.0)
+    back = replace(units[2], centre=(units[2].centre[0], 0.01, units[2].centre[2]))
+    layout = arranged(*units[:2], back, *units[3:], manhattan=0.0)
+    assert layout.moves_m["d2"] == pytest.approx(0.01, abs=2e-3)
+
+
+def test_runs_that_cannot_be_levelled_stay_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(layout_module, "level_runs", fails)
+    layout = arranged(*run_of_doors(0.0, 0.0), manhattan=0.0)
+    assert len(layout.objects) == 5
+    assert any("were not levelled" in warning for warning in layout.warnings)
+
+
 def test_a_run_almost_parallel_to_the_room_is_aligned_with_it() -> None:
     layout = arranged(*run_of_doors(0.002, 0.004), manhattan=0.0)
     np.testing.assert_allclose([o.outward for o in layout.objects], [[0, -1, 0]] * 5, atol=1e-9)
