@@ -24,7 +24,7 @@ from r2c2r_core.segment.mosaics.orthomosaic import (
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief, measure_relief
 from r2c2r_core.segment.planes import PlaneRegion
-from r2c2r_core.segment.runs.panels import cut_panels
+from r2c2r_core.segment.runs.xy_cut import cut_panels
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 

@@ -83,17 +83,9 @@ class Paths(NamedTuple):
     score: np.ndarray  # (positions,) sum of odds minus the cost of sidesteps
 
 
-class LineEvidence(NamedTuple):
-    """Evidence of lines through a cell, at positions from `start` on."""
-
-    start: int
-    odds: np.ndarray  # log-odds of the network and of crossing borders
-    prior: np.ndarray  # log-odds by sizes and handles
-
-
-def cut_alone(field: "LineField", grid: Cell) -> list[Cell]:
-    """Rectangles that tile a grid, each cut by the evidence within it alone."""
-    found, waiting = [], [grid]
+def cut_panels(odds: PanelOdds, grid: Cell, cell_m: float) -> list[Cell]:
+    """Panels of a grid, as rectangles that tile it; each is cut by the evidence within it alone."""
+    field, found, waiting = LineField(odds, cell_m), [], [grid]
     while waiting:
         cell = waiting.pop()
         line = field.best_cut(cell) or field.end_of_fronts(cell)
@@ -185,25 +177,11 @@ class LineField:
         position = self._centre(cell, axis, first + paths.at[:, best], np.ones(len(paths.at), bool))
         return Line(unbroken, (mean + float(prior[best])) * (span.stop - span.start), axis, position * STEP, mean)
 
-    def evidence(self, cell: Cell, axis: int) -> LineEvidence | None:
-        """Evidence for a line at each position within a cell; None where none fits."""
-        start, stop = self._within(cell, axis)
-        paths = self._paths(cell, axis, start, stop)
-        if paths is None:
-            return None
-        odds = paths.odds.mean(axis=0) + self._crossed(cell, axis, start, stop, paths)
-        return LineEvidence(start, odds, self._prior(cell, axis, start, stop))
-
     def _within(self, cell: Cell, axis: int) -> tuple[int, int]:
         """Range of positions of lines far enough from a cell's ends."""
         low, high = across(cell, axis)
         margin = max(1, round(self.params.apart_m / self.cell_m))
         return round(low / STEP) + margin, min(round(high / STEP), self.odds[axis].shape[1]) - margin
-
-    def is_front(self, cell: Cell) -> bool:
-        """Whether a cell lies mostly on fronts, and is wide and high enough to be more than a rail."""
-        share = self.front[0][self._span(cell, 0), self._span(cell, 1)]
-        return bool(share.size and share.mean() > 0.5 and min(share.shape) * self.cell_m > self.params.shortest_m)
 
     def best_uncut(self, cell: Cell, inset_m: float, faintest: float) -> float:
         """Log-odds, without sizes, of the likeliest possible line at least `inset_m` within a cell; -inf without one.

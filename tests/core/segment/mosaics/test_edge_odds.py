@@ -9,7 +9,7 @@ from r2c2r_core.segment.mosaics.lines import Evidence, scored
 from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell, Tile
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief
-from r2c2r_core.segment.runs.panels import cut_panels
+from r2c2r_core.segment.runs.xy_cut import cut_panels
 
 ROWS, COLUMNS, CELL_M = 160, 200, 0.0025
 

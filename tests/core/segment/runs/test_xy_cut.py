@@ -11,8 +11,7 @@ from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.segment.fronts.units import unit_cell
 from r2c2r_core.segment.mosaics.orthomosaic import Cell
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
-from r2c2r_core.segment.runs.panels import cut_panels
-from r2c2r_core.segment.runs.xy_cut import LineField
+from r2c2r_core.segment.runs.xy_cut import LineField, cut_panels
 
 CELL_M = 0.0025
 SEEN = (400, 400)  # rows and columns of a grid that all of these fit in
@@ -199,18 +198,6 @@ def test_a_front_ends_where_both_of_its_side_lines_end() -> None:
 
     assert tops(uprights_from=44) == {22}
     assert tops(uprights_from=20) == {10}
-
-
-def test_a_line_too_faint_for_one_front_cuts_a_row_of_fronts() -> None:
-    seams = [(160 * k, 0, 320) for k in range(1, 4)]
-    row = odds(640, 320, [(2, 0, 320), *seams], [])
-    row.level[22] = 0.8  # below what one drawer of this height needs
-    one = odds(160, 320, [], [])
-    one.level[22] = 0.8
-    assert len(cut_panels(one, Cell(0, 0, 160, 320), CELL_M)) == 1
-    assert len(cut_panels(row, Cell(0, 0, 640, 320), CELL_M)) == 8
-    row.level[22, 80:] = -4.0  # only one of four has it
-    assert len(cut_panels(row, Cell(0, 0, 640, 320), CELL_M)) == 4
 
 
 def test_a_narrow_strip_with_a_handle_is_not_cut_off_as_filler() -> None:
