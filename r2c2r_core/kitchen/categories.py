@@ -345,6 +345,7 @@ _FIXED = (
         kind="thing",
         opens="fixed",
         fixture="solid",
+        flat_top=True,
         width=Size(0.3, 1.2, 4.0, _WORKTOPS),
         depth=Size(0.1, 0.62, 1.6, _WORKTOPS),
         height=Size(0.01, 0.04, 0.12, _WORKTOPS),

@@ -33,6 +33,7 @@ from r2c2r_core.segment.things.painted import find_painted, level_holes, may_hol
 from r2c2r_core.segment.things.revolution import Sight, find_round
 from r2c2r_core.segment.things.standing import find_standing
 from r2c2r_core.segment.things.standing_mask import standing_colours
+from r2c2r_core.segment.things.thing import Params as ThingParams
 from r2c2r_core.segment.things.thing import ThingConfig, find_thing, sized_as
 from r2c2r_core.segment.things.visual_hull import find_small, glimpse_small
 from r2c2r_core.tuning import param, tuned
@@ -68,6 +69,11 @@ def find_object(
         appliance = _appliance(prepared, prompt, category, negatives.points, others)
         if appliance is not None:
             return appliance
+    if category.kind == "front" and _on_level(prepared.scene, positives):
+        raise ObjectNotSeen(
+            f"{prompt.name}: the click is on a level surface, which is no front",
+            hint=f"click on the front of the {category.label}, or correct its category",
+        )
     thing = _loose(prepared, prompt, category, positives, negatives.points) if positives.clicks else None
     if thing is not None:
         warnings = (
@@ -81,6 +87,15 @@ def find_object(
         f"{prompt.name}: no separate surface under {len(clicks)} click(s)",
         hint=f"click on its middle, or add a second click{_without_depth(prepared.scene, clicks)}",
     )
+
+
+def _on_level(scene: Scene, positives: Hits) -> bool:
+    """Whether the surface about the first click is level."""
+    params, parts, point = tuned(ThingParams), scene.parts, positives.points[0]
+    faces = parts.faces_near(point, params.furniture_gap_m)
+    faces = faces[np.linalg.norm(parts.middles[faces] - point, axis=1) < params.furniture_gap_m]
+    level = parts.upward[faces] > params.level_cos
+    return bool(parts.areas_m2[faces][level].sum() > 0.5 * parts.areas_m2[faces].sum())
 
 
 def _without_depth(scene: Scene, clicks: list[PromptPoint]) -> str:
@@ -270,12 +285,14 @@ def _thing(
         if hob is not None:
             return FoundThing(hob, scene)
     positives = _on_thing(scene, hits, config)
-    if config.on_floor:
+    if config.on_floor or config.slab_m is not None:
         standing = find_standing(scene, positives, negatives, config, structure)
         if standing is not None:
             colours = standing_colours(standing, scene, scene.frames)
             standing = replace(standing, thing=replace(standing.thing, colours=colours))
             return FoundThing(standing.thing, scene, standing=standing)
+        if config.slab_m is not None:  # what is not level is no worktop
+            return None
     is_small = config.radius_m < tuned(Params).small_m
     thing = _small_thing(scene, structure, prompt, config, hits, negatives, by_silhouettes=is_small)
     if thing is not None:

@@ -10,6 +10,7 @@ from r2c2r_core.geometry.camera import depth_points, project
 from r2c2r_core.geometry.visibility import look_up
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
+from r2c2r_core.segment.things.slab import height_of
 from r2c2r_core.segment.things.support import raised, support_offset
 from r2c2r_core.tuning import param, tuned
 
@@ -63,11 +64,11 @@ class DepthCloud:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Region:
-    """An axis-aligned box in the world, and the height of a level surface in it that corrects the height of each frame."""
+    """An axis-aligned box in the world, and a level surface in it that corrects the height of each frame."""
 
     low: Vector3
     high: Vector3
-    level_z_m: float | None
+    level: np.ndarray | None  # (a, b, c): its height is a x + b y + c
 
     def holds(self, points: Points) -> np.ndarray:
         """Mask of the points that lie inside the box."""
@@ -75,17 +76,18 @@ class Region:
 
     def lift(self, scene: Scene, frame: Frame) -> float:
         """Height error of a frame, metres (positive: too high), from the level surface where it is nearest the image centre."""
-        if self.level_z_m is None:
+        if self.level is None:
             return 0.0
         x, y = (
             np.linspace(0.75 * a + 0.25 * b, 0.25 * a + 0.75 * b, 5) for a, b in zip(self.low[:2], self.high[:2], strict=True)
         )
-        places = np.array([[u, v, self.level_z_m] for u in x for v in y])
+        places = np.array([[u, v, 0.0] for u in x for v in y])
+        places[:, 2] = height_of(self.level, places)
         local = frame.world_from_camera.inverse.apply(places)
         off_axis = np.hypot(local[:, 0], local[:, 1]) / np.maximum(local[:, 2], 1e-6)
         off_axis[local[:, 2] < tuned(Params).nearest_m] = np.inf
         for place in np.argsort(off_axis)[: tuned(Params).places]:
-            if offset := support_offset(scene, frame, self.level_z_m, places[place]):
+            if offset := support_offset(scene, frame, places[place][2], places[place]):
                 return offset
         return 0.0
 

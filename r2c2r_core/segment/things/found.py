@@ -70,10 +70,9 @@ class FoundThing(Loose):
     def box(self) -> ThingBox | None:
         """Box of the object on its support."""
         centres = np.stack([frame.world_from_camera.translation for frame in self.scene.frames])
-        room = self.scene.capture.room
-        return box_of(
-            self.thing.vertices, self.thing.support_z_m, room.manhattan_yaw_rad, centres.mean(axis=0), round_thing=self.round
-        )
+        points = self.thing.vertices if self.standing is None else self.standing.levelled
+        yaw_rad, support_m = self.scene.capture.room.manhattan_yaw_rad, self.thing.support_z_m
+        return box_of(points, support_m, yaw_rad, centres.mean(axis=0), round_thing=self.round)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,20 +1,23 @@
-"""Floor-standing objects cut whole from depth voxels: chairs with seat and back, tables with top and legs.
+"""Floor-standing objects cut whole from depth voxels: chairs with seat and back, tables with top and legs; and worktops.
 
 A cut along concave creases separates a box from the table under it, but also a back from its seat. From an object whose
 category stands on the floor, only foreign surface is therefore cut off: the floor, walls, other large level surfaces, negative
-clicks and, where its slab is its highest part, objects on that slab.
+clicks and, where its slab is its highest part, objects on that slab. A worktop is such a slab without legs.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from r2c2r_core.arrays import Points
+from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.least_squares import fit_linear, geman_mcclure
 from r2c2r_core.segment.planes import PlaneRegion
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.things.depth_cloud import DepthCloud, Region, gather_cloud
 from r2c2r_core.segment.things.min_cut import VoxelGraph, cut, touching
+from r2c2r_core.segment.things.slab import Params as SlabParams
+from r2c2r_core.segment.things.slab import Slab, arm_at, height_of, level_cells, plan_of
 from r2c2r_core.segment.things.thing import Params as ThingParams
 from r2c2r_core.segment.things.thing import Thing, ThingConfig
 from r2c2r_core.tuning import param, tuned
@@ -33,27 +36,24 @@ class Params:
         0.08, "m", "Maximum height difference between the floor and the room's floor plane: terraces slope"
     )
     gap_m: float = param(0.06, "m", "Maximum gap between parts of one object: sensors lose dark and thin pieces")
-    level_cos: float = param(0.92, "cosine", "Minimum cosine between a face normal and up for a level surface")
     large_m2: float = param(0.45, "m²", "Minimum area of a level surface without a click for it to belong to another object")
-    off_slab_m: float = param(
-        0.015, "m", "Maximum height above a slab of points that belong to it; higher ones belong to objects on it"
-    )
     slab_m: float = param(0.08, "m", "Maximum thickness of a slab with its apron")
-    rim_m: float = param(0.03, "m", "Maximum distance of legs beyond the observed edge of a slab")
-    hidden_m: float = param(0.12, "m", "Radius of the morphological closing that bridges objects hiding part of a slab")
+    rim_m: float = param(
+        0.03, "m", "Maximum distance of legs and of the slab itself beyond its observed edge: level faces end before it"
+    )
     leg_m: float = param(0.15, "m", "Maximum width of a leg")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Standing:
-    """A segmented floor-standing object, and the label of each voxel around it: ON, OFF or UNKNOWN."""
+    """A segmented floor-standing object or worktop, and the label of each voxel around it: ON, OFF or UNKNOWN."""
 
     thing: Thing
     region: Region
     size_m: float
     labels: np.ndarray  # (x, y, z) uint8
     floor: np.ndarray  # (a, b, c): its height is a x + b y + c
-    top_z_m: float | None  # of a slab that is its highest part
+    top: np.ndarray | None  # (a, b, c) of a slab that is its highest part
 
     def label_of(self, points: Points) -> np.ndarray:
         """Labels of world points (..., 3): ON, OFF or UNKNOWN; OFF outside the region."""
@@ -62,42 +62,95 @@ class Standing:
         inside = ((at >= 0) & (at < self.labels.shape)).all(axis=-1)
         at = np.where(inside[..., None], at, 0)
         label = np.where(inside, self.labels[at[..., 0], at[..., 1], at[..., 2]], OFF)
-        low = points[..., 2] < _height_of(self.floor, points) + params.off_floor_m
-        high = points[..., 2] > self.top_z_m + params.off_slab_m if self.top_z_m is not None else np.zeros_like(low)
-        return np.asarray(np.where(low | high, OFF, label))
+        foreign = points[..., 2] < height_of(self.floor, points) + params.off_floor_m
+        if self.top is not None:
+            foreign |= points[..., 2] > height_of(self.top, points) + tuned(SlabParams).off_slab_m
+        return np.asarray(np.where(foreign, OFF, label))
+
+    @property
+    def levelled(self) -> Points:
+        """Its points with the slab level: up may be off by 2 degrees, which lifts one end of a table by 7 cm."""
+        points = self.thing.vertices.copy()
+        if self.top is not None:
+            tilt = height_of(self.top, points)
+            points[:, 2] -= tilt - tilt.mean()
+        return points
 
 
 def find_standing(
     scene: Scene, positives: Points, negatives: Points, config: ThingConfig, structure: tuple[PlaneRegion, ...]
 ) -> Standing | None:
-    """Floor-standing object at the clicks (world points); None without a floor, or where depth shows too little."""
-    params = tuned(Params)
+    """Floor-standing object or worktop at the clicks (world points); None without a floor, or where depth shows too little."""
+    params, seed_m = tuned(Params), tuned(ThingParams).seed_m
+    if config.slab_m is not None:
+        return _find_worktop(scene, positives, config.slab_m, config)
     if not scene.capture.room.floor_found:
         return None
-    size = float(np.clip(2 * config.radius_m / params.voxels_along, *params.voxel_range_m))
-    reach = 2 * config.radius_m + tuned(ThingParams).seed_m
-    low, high = positives.min(axis=0) - reach, positives.max(axis=0) + reach
-    low[2], high[2] = -params.floor_slack_m, max(config.tallest_m, float(positives[:, 2].max())) + tuned(ThingParams).seed_m
-    levels = _level_cells(scene, low, high, size)
-    top = _slab_at(levels, positives, low, size) if config.flat_top else None
-    region = Region(low=low, high=high, level_z_m=top[1] if top is not None else 0.0)
+    low, high, size = _around(positives, config)
+    low[2], high[2] = -params.floor_slack_m, max(config.tallest_m, float(positives[:, 2].max())) + seed_m
+    levels = level_cells(scene, low, high, size)
+    top = levels.slab_at(positives, seed_m) if config.flat_top else None
+    region = Region(low=low, high=high, level=top.plane if top is not None else np.zeros(3))
     cloud = gather_cloud(scene, region, size)
     if len(cloud.positions) < 50:
         return None
     floor = _fit_floor(cloud)
-    above = cloud.positions[:, 2] > _height_of(floor, cloud.positions) + params.off_floor_m
+    above = cloud.positions[:, 2] > height_of(floor, cloud.positions) + params.off_floor_m
     on = (
-        _of_slab(cloud, above, *top)
+        _of_table(cloud, above, top)
         if top is not None
-        else _cut_off(cloud, above, levels, positives, negatives, config, structure)
+        else _cut_off(cloud, above, levels.labels, positives, negatives, config, structure)
     )
-    if on is None or on.sum() < 30:
+    return None if on is None else _standing(cloud, on, region, floor, top, lambda middle: height_of(floor, middle))
+
+
+def _find_worktop(scene: Scene, positives: Points, thickness_m: float, config: ThingConfig) -> Standing | None:
+    """Level slab at the clicks (world points) with its front edge, one arm of an L; None where depth shows too little of it."""
+    params, seed_m = tuned(Params), tuned(ThingParams).seed_m
+    low, high, size = _around(positives, config)
+    low[2], high[2] = positives[:, 2].min() - 2 * seed_m, positives[:, 2].max() + 2 * seed_m
+    top = level_cells(scene, low, high, size).slab_at(positives, seed_m, whole=True)
+    if top is None:
         return None
-    labels = _labels(cloud, on, np.ceil((high - low) / size).astype(int) + 1)
+    seen = scene.parts.middles[scene.parts.faces_near(positives[0], high[0] - positives[0, 0], any_height=True)]
+    below = seen[:, 2] < height_of(top.plane, seen) - params.slab_m
+    beside = plan_of(seen[below & ((seen > low) & (seen < high))[:, :2].all(axis=1)], low, size, top.plan.shape)
+    top = replace(top, plan=arm_at(top.plan, beside, positives[0], low, size, scene.capture.room.manhattan_yaw_rad))
+    region = Region(low=low, high=high, level=top.plane)
+    cloud = gather_cloud(scene, region, size)
+    nothing = np.array([0.0, 0.0, low[2] - params.off_floor_m])  # its floor: nothing below it matters
+    return _standing(
+        cloud,
+        _of_slab(cloud, top, thickness_m)[0],
+        region,
+        nothing,
+        top,
+        lambda middle: height_of(top.plane, middle) - thickness_m,
+    )
+
+
+def _around(positives: Points, config: ThingConfig) -> tuple[np.ndarray, np.ndarray, float]:
+    """Ends of the box to search about the clicks, and the size of its voxels."""
+    params, reach = tuned(Params), 2 * config.radius_m + tuned(ThingParams).seed_m
+    size = float(np.clip(2 * config.radius_m / params.voxels_along, *params.voxel_range_m))
+    return positives.min(axis=0) - reach, positives.max(axis=0) + reach, size
+
+
+def _standing(
+    cloud: DepthCloud,
+    on: np.ndarray,
+    region: Region,
+    floor: np.ndarray,
+    top: Slab | None,
+    bottom_at: Callable[[Vector3], np.ndarray],
+) -> Standing | None:
+    """Object of some voxels of a cloud; None for too few."""
+    if on.sum() < 30:
+        return None
+    labels = _labels(cloud, on, np.ceil((region.high - region.low) / cloud.size_m).astype(int) + 1)
     at = cloud.positions[on]
-    middle = np.array([[*at[:, :2].mean(axis=0), 0.0]])
-    thing = Thing(at, np.zeros((0, 3), np.int64), float(_height_of(floor, middle)[0]), size)
-    return Standing(thing, region, size, labels, floor, top[1] if top is not None else None)
+    thing = Thing(at, np.zeros((0, 3), np.int64), float(bottom_at(at.mean(axis=0))), cloud.size_m)
+    return Standing(thing, region, cloud.size_m, labels, floor, top.plane if top is not None else None)
 
 
 def _cut_off(
@@ -139,22 +192,25 @@ def _cut_off(
     return on
 
 
-def _of_slab(cloud: DepthCloud, above: np.ndarray, footprint: np.ndarray, level_m: float) -> np.ndarray:
+def _of_table(cloud: DepthCloud, above: np.ndarray, top: Slab) -> np.ndarray:
     """Mask of the voxels above the floor on a slab or on the slender legs under it."""
+    params = tuned(Params)
+    slab, near, height = _of_slab(cloud, top, params.slab_m)
+    return slab | _legs(cloud, above & near & (height <= -params.slab_m), height)
+
+
+def _of_slab(cloud: DepthCloud, top: Slab, thickness_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Masks of the voxels on a slab and of those over or under it, and the height of each above it."""
     from scipy import ndimage
 
-    params = tuned(Params)
-    rim = max(1, round(params.rim_m / cloud.size_m))
-    under = ndimage.binary_dilation(footprint, iterations=rim)
-    column = above & under[cloud.cells[:, 0], cloud.cells[:, 1]]
-    height = cloud.positions[:, 2] - level_m
-    own = footprint[cloud.cells[:, 0], cloud.cells[:, 1]]
-    slab = own & (height < params.off_slab_m) & (height > -params.slab_m)
-    below = column & (height <= -params.slab_m)
-    return slab | _legs(cloud, below, level_m)
+    params, (x, y, _) = tuned(Params), cloud.cells.T
+    height = cloud.positions[:, 2] - height_of(top.plane, cloud.positions)
+    near = ndimage.binary_dilation(top.plan, iterations=max(1, round(params.rim_m / cloud.size_m)))[x, y]
+    lowest = np.where(top.plan[x, y], -thickness_m, -tuned(SlabParams).off_slab_m)
+    return near & (height > lowest) & (height < tuned(SlabParams).off_slab_m), near, height
 
 
-def _legs(cloud: DepthCloud, below: np.ndarray, level_m: float) -> np.ndarray:
+def _legs(cloud: DepthCloud, below: np.ndarray, height: np.ndarray) -> np.ndarray:
     """Mask of the voxels below a slab that are slender at each height and reach up to the slab together."""
     from scipy import ndimage
 
@@ -171,49 +227,9 @@ def _legs(cloud: DepthCloud, below: np.ndarray, level_m: float) -> np.ndarray:
     legs = np.zeros(len(of), bool)
     for part in np.unique(of[of > 0]):
         member = of == part
-        if cloud.positions[member, 2].max() > level_m - params.slab_m - params.gap_m:
+        if height[member].max() > -params.slab_m - params.gap_m:
             legs |= member
     return legs
-
-
-def _level_cells(scene: Scene, low: np.ndarray, high: np.ndarray, size: float) -> np.ndarray:
-    """Labels (x, y, z) of the connected level parts of the fused surface in voxels; 0 elsewhere."""
-    from scipy import ndimage
-
-    parts = scene.parts
-    middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    faces = parts.faces_near(middle, reach)
-    at = parts.middles[faces]
-    level = (parts.normals[faces, 2] > tuned(Params).level_cos) & ((at > low) & (at < high)).all(axis=1)
-    cells = np.floor((at[level] - low) / size).astype(int)
-    filled = np.zeros(np.ceil((high - low) / size).astype(int) + 1, bool)
-    filled[tuple(cells.T)] = True
-    return np.asarray(ndimage.label(filled, np.ones((3, 3, 3)))[0])
-
-
-def _slab_at(levels: np.ndarray, positives: Points, low: np.ndarray, size: float) -> tuple[np.ndarray, float] | None:
-    """Plan (x, y) of the level part under the clicks, filled under objects on it, and its height; None without one."""
-    from scipy import ndimage
-
-    params = tuned(Params)
-    reach = int(np.ceil(tuned(ThingParams).seed_m / size))
-    votes: list[int] = []
-    for point in positives:
-        at = np.clip(np.floor((point - low) / size).astype(int), 0, np.array(levels.shape) - 1)
-        block = levels[tuple(slice(max(k - reach, 0), k + reach + 1) for k in at)]
-        votes += np.unique(block[block > 0]).tolist()
-    if not votes:
-        return None
-    sizes = np.bincount(levels.ravel())
-    cells = np.argwhere(levels == max(set(votes), key=lambda vote: sizes[vote]))
-    if len(cells) * size**2 < 0.1 * params.large_m2:
-        return None
-    plan = np.zeros(levels.shape[:2], bool)
-    plan[cells[:, 0], cells[:, 1]] = True
-    pad = max(1, round(params.hidden_m / size))
-    closed = ndimage.binary_closing(np.pad(plan, pad + 1), iterations=pad)[pad + 1 : -pad - 1, pad + 1 : -pad - 1]
-    height = low[2] + (np.median(cells[:, 2]) + 0.5) * size
-    return np.asarray(ndimage.binary_fill_holes(closed)), float(height)
 
 
 def _large_levels(levels: np.ndarray, positives: Points, cloud: DepthCloud) -> np.ndarray:
@@ -252,8 +268,3 @@ def _fit_floor(cloud: DepthCloud) -> np.ndarray:
         return np.zeros(3)
     system = np.column_stack([at[:, :2], np.ones(len(at))])
     return fit_linear(system, at[:, 2], geman_mcclure, 0.01, rounds=15)[0]
-
-
-def _height_of(floor: np.ndarray, points: Points) -> np.ndarray:
-    """Height of the floor under points (..., 3)."""
-    return np.asarray(points[..., :2] @ floor[:2] + floor[2])

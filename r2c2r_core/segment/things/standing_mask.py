@@ -14,6 +14,7 @@ from r2c2r_core.segment.things.crops import shrunk
 from r2c2r_core.segment.things.depth_cloud import clean_depth
 from r2c2r_core.segment.things.pixel_cut import ColourModel, cut_pixels, learn_colours
 from r2c2r_core.segment.things.silhouettes import splat
+from r2c2r_core.segment.things.slab import height_of
 from r2c2r_core.segment.things.standing import OFF, ON, UNKNOWN, Standing
 from r2c2r_core.segment.things.support import raised
 from r2c2r_core.tuning import param, tuned
@@ -65,7 +66,7 @@ def standing_colours(found: Standing, scene: Scene, frames: tuple[Frame, ...]) -
     samples = []
     for crop in crops[:: max(1, len(crops) // params.model_frames)]:
         near = cv2.dilate(crop.voxels.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
-        off = ~near if found.top_z_m is None else ~near | crop.off  # objects on a slab lie in front of it
+        off = ~near if found.top is None else ~near | crop.off  # objects on a slab lie in front of it
         samples.append((cv2.cvtColor(crop.rgb, cv2.COLOR_RGB2LAB), crop.on & crop.voxels, off & ~crop.hidden))
     return learn_colours(samples) if samples else None
 
@@ -151,8 +152,8 @@ def _depth_labels(found: Standing, scene: Scene, frame: Frame, camera: Intrinsic
     label = np.where(depth.ravel() > 0, found.label_of(world), UNKNOWN).reshape(depth.shape).astype(np.uint8)
     nearest = float(np.quantile(frame.world_from_camera.inverse.apply(found.thing.vertices)[:, 2], 0.02))
     nearer = (label == OFF) & scene.noise.occluded(depth, nearest, tuned(Params).before_m)
-    if found.top_z_m is not None:
-        nearer |= (label == OFF) & (world[:, 2] > found.top_z_m).reshape(depth.shape)
+    if found.top is not None:
+        nearer |= (label == OFF) & (world[:, 2] > height_of(found.top, world)).reshape(depth.shape)
     label, inside = sample_through(label, frame.depth_camera, camera)
     nearer, _ = sample_through(nearer, frame.depth_camera, camera)
     return np.where(inside, label, UNKNOWN), inside & nearer

@@ -46,6 +46,11 @@ class Params:
         0.08, "m", "Maximum gap between parts of an object on the floor: scans lose parts of legs and seats"
     )
     solid_m: float = param(0.03, "m", "Minimum distance of measured depth behind a place that is empty, beyond the noise", gt=0)
+    foot: float = param(
+        0.05,
+        "share",
+        "Minimum fraction of the places just above a support that no frame sees through, for an object to stand on it",
+    )
     canopy_m: float = param(0.2, "m", "Maximum gap between parts of a hood, whose canopy's top is too high to be seen")
     level_cos: float = param(0.92, "cosine", "Minimum cosine between a face normal and up for a support")
     level_area_m2: float = param(0.0005, "m²", "Minimum level area in one direction for a support to continue there")
@@ -77,7 +82,7 @@ class Params:
         (0.25, 4.0), "m", "Minimum and maximum distance of the views from which the surface is fused again"
     )
     farthest_m: float = param(
-        1.0, "m", "Maximum radius of an object; of larger ones, such as a worktop, this much around a click is segmented"
+        1.0, "m", "Maximum radius of an object without a flat top; of larger ones, this much around a click is segmented"
     )
 
 
@@ -91,6 +96,7 @@ class ThingConfig:
     handled: bool = False  # may have a handle
     on_floor: bool = False
     flat_top: bool = False
+    slab_m: float | None = None  # usual thickness of a level slab without legs
     solid_gap_m: float = 0.0  # between parts that count as joined where nothing is seen between them
     lowest_m: float = 0.0
     tallest_m: float = 1.1
@@ -101,7 +107,7 @@ class ThingConfig:
 def sized_as(category: Category) -> ThingConfig:
     """Size limits of objects of a category."""
     return ThingConfig(
-        radius_m=min(category.longest_m / 2, tuned(Params).farthest_m),
+        radius_m=category.longest_m / 2 if category.flat_top else min(category.longest_m / 2, tuned(Params).farthest_m),
         width_m=category.width.usual if category.round else None,
         round=category.round,
         handled=category.open_vessel,
@@ -109,6 +115,7 @@ def sized_as(category: Category) -> ThingConfig:
         stands=category.stands,
         solid_gap_m=tuned(Params).canopy_m if category.no_front else 0.0,
         flat_top=category.flat_top,
+        slab_m=category.height.usual if category.flat_top and not category.on_floor else None,
         lowest_m=category.height.low,
         tallest_m=category.height.high,
     )
@@ -214,7 +221,7 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
     """World height of the object's support: the floor, or the highest level surface below that surrounds it.
 
     Surrounds: it continues in enough directions, farther out than the object reaches. Where no surface does, the highest large
-    level one below.
+    level one below. None where frames see that nothing stands on it: the object hangs. Bottles and glasses are seen through.
     """
     params = tuned(Params)
     if config.support_z_m is not None:
@@ -246,7 +253,18 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
     reaching = [i for i in peaks if around[i] >= params.around]
     top = (reaching or peaks)[-1]
     chosen = near & (np.abs(height_bin - top) <= 2)
-    return float(np.average(centres[chosen, 2], weights=areas[chosen]))
+    height = float(np.average(centres[chosen, 2], weights=areas[chosen]))
+    return None if not config.round and _is_clear(scene, lowest, height, config.radius_m) else height
+
+
+def _is_clear(scene: Scene, above: Vector3, support_z_m: float, radius_m: float) -> bool:
+    """Whether frames see through almost everything within reach just above a surface, so that the object cannot stand on it."""
+    params = tuned(Params)
+    if above[2] - support_z_m < params.furniture_gap_m:
+        return False
+    steps = np.linspace(-radius_m, radius_m, 9)
+    places = np.array([[above[0] + x, above[1] + y, support_z_m + 2 * params.solid_m] for x, y in product(steps, steps)])
+    return bool(_solid(scene, places).mean() < params.foot)
 
 
 def _solid(scene: Scene, points: Points) -> np.ndarray:

@@ -1,6 +1,6 @@
 """A small kitchen of coloured boxes with known panels, filmed by a few exact cameras; each scene is made once per process."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import cv2
@@ -32,6 +32,7 @@ Corners = tuple[tuple[float, float, float], tuple[float, float, float]]
 Named = tuple[tuple[float, ...], tuple[float, ...], tuple[int, int, int], str | None]
 TABLE: Corners = ((-0.6, -0.35, 0.0), (0.6, 0.35, 0.73))
 CHAIR: Corners = ((0.05, -0.80, 0.0), (0.47, -0.42, 0.90))
+LEVEL = Rigid3()
 POST = (0.62, 0.72)  # x range of a post in front of door_b
 
 
@@ -130,8 +131,8 @@ def _filmed(
 
 
 @cache
-def dining() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
-    """A table with a carton on it and a chair drawn up to it, seen from all around, and their true masks."""
+def dining(world_from_scene: Rigid3 = LEVEL) -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
+    """A table with a carton on it, a chair drawn up to it and a hanging box, seen from all around, and their true masks."""
     boxes: list[Named] = [((-2.5, -2.5, -0.02), (2.5, 2.5, 0.0), (120, 100, 80), None)]
     boxes += [((*TABLE[0][:2], TABLE[1][2] - 0.03), TABLE[1], (190, 150, 90), "table")]
     boxes += _legs(TABLE, 0.05, TABLE[1][2] - 0.03, (190, 150, 90), "table")
@@ -140,9 +141,12 @@ def dining() -> tuple[Capture, dict[str, dict[int, np.ndarray]]]:
     boxes += [((left, near, 0.42), (right, far, 0.45), (60, 60, 64), "chair")]
     boxes += [((left, near, 0.45), (right, near + 0.03, top), (60, 60, 64), "chair")]
     boxes += _legs(CHAIR, 0.04, 0.42, (60, 60, 64), "chair")
+    boxes += [((0.35, 0.85, 0.9), (0.5, 1.0, 1.05), (150, 60, 150), "lamp")]
     ring = [(2.0 * np.cos(a), 2.0 * np.sin(a), 1.5 + 0.2 * np.cos(3 * a)) for a in np.arange(16) / 16 * 2 * np.pi]
     poses = [look_at(np.array(eye), np.array([0.0, -0.2, 0.45])) for eye in ring]
-    return _filmed("dining", poses, [_packed(boxes, ["table", "carton", "chair"])] * len(poses), ())
+    shapes, names = _packed(boxes, ["table", "carton", "chair", "lamp"])
+    shapes = replace(shapes, vertices=world_from_scene.apply(shapes.vertices))
+    return _filmed("dining", [world_from_scene @ pose for pose in poses], [(shapes, names)] * len(poses), ())
 
 
 HOOD_CHIMNEY, HOOD_CANOPY = (0.0, -0.13, 1.85), (0.0, -0.24, 1.65)
