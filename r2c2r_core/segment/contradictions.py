@@ -43,7 +43,6 @@ class Params:
         source="neighbours share at most 0.02 of the sample kitchens' correct masks",
     )
     same: float = param(0.5, "share", "Minimum shared fraction of the smaller mask for two objects to be the same")
-    on_slab_m: float = param(0.05, "m", "Maximum distance of an underside from the slab under it", source="scans bend by 3 cm")
     near_click: float = param(
         0.01,
         "share",
@@ -119,7 +118,7 @@ def _between(
 ) -> Iterator[Contradiction]:
     pair = tracks[first.name], tracks[second.name]
     share, frame = _overlap(*pair, params.frames)
-    if share < params.overlap or _stands_on(*pair, params) or _stands_on(*pair[::-1], params):
+    if share < params.overlap:
         return
     where = f"{_clicks(first)} and {_clicks(second)}"
     if share >= params.same:
@@ -136,16 +135,6 @@ def _between(
             message=f"{where} claim the same surface: {100 * share:.0f} % of the smaller mask is in both (frame {frame})",
             mend=f"click off one of them where the other is, in frame {frame}",
         )
-
-
-def _stands_on(thing: MaskTrack, slab: MaskTrack, params: Params) -> bool:
-    """Whether a thing stands on a slab such as a table top, whose mask may take in what is thin on it."""
-    if thing.box is None or slab.box is None or not category_of(slab.category).flat_top:
-        return False
-    height, place = slab.box.dimensions_m[2] / 2, slab.box.world_from_object
-    local = place.inverse.apply(thing.box.world_from_object.translation)
-    over = bool((np.abs(local[:2]) < slab.box.dimensions_m[:2] / 2).all())
-    return over and abs(thing.box.support_z_m - float(place.translation[2] + height)) < params.on_slab_m
 
 
 def _overlap(first: MaskTrack, second: MaskTrack, most: int) -> tuple[float, int]:

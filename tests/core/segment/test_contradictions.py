@@ -82,16 +82,6 @@ def test_overlapping_masks_are_reported_with_both_clicks(begins: int, rule: str)
     assert "\n" not in said.line
 
 
-def test_a_thin_thing_on_a_table_is_not_the_table() -> None:
-    """The table's mask takes in the magazine, 1 cm high; the same mask with the floor as its support is the table again."""
-    table = thing("table", "table", (1.2, 0.8, 0.72))  # its centre is at the origin: its top at 0.36
-    said = (prompt("table", "table", 10.5), prompt("magazine", "magazine", 10.5))
-    magazine = thing("magazine", "magazine", (0.2, 0.3, 0.01), support_z_m=0.35)
-    assert found((table, said[0]), (magazine, said[1])) == ()
-    (same,) = found((table, said[0]), (replace(magazine, box=thing("m", "magazine", (0.2, 0.3, 0.01)).box), said[1]))
-    assert same.rule == "same-thing"
-
-
 def test_overlap_with_an_open_door_is_not_reported() -> None:
     left, right = track("door_1", "cabinet", slice(0, 80)), track("door_2", "cabinet", slice(0, 80))
     opened = replace(left, motions=(motion(dict.fromkeys(FRAMES, 1.0), "left"),))
