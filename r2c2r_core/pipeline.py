@@ -16,6 +16,7 @@ from r2c2r_core.generate.stage import GENERATORS
 from r2c2r_core.ingest.above import calibrations_beside
 from r2c2r_core.ingest.doctor.doubts import Doubts, find_doubts
 from r2c2r_core.ingest.stage import level_scan, read_recording
+from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.ledger import Kept, Ledger, Reached, Shared, Stage, aside
 from r2c2r_core.model.capture import Capture
 from r2c2r_core.model.inputs import Overrides, Prompts
@@ -29,6 +30,7 @@ from r2c2r_core.pool import Pool, usual_workers
 from r2c2r_core.progress import SILENT, Progress
 from r2c2r_core.segment.contradictions import find_contradictions
 from r2c2r_core.segment.prompts import check_prompts, without_hinge
+from r2c2r_core.segment.slab_masks import stands_on, without_things
 from r2c2r_core.segment.stage import SEGMENTERS, find_disputed, open_session, track_object
 from r2c2r_core.sources import source_key
 from r2c2r_core.synthesize.fixtures.carcass import CARCASSES
@@ -141,8 +143,11 @@ def _run(request: Request, run: Ledger) -> tuple[Reconstruction, Certificate]:
     shown = [tracks[name] for name in names]
     placed = [placements[name] for name in names]
     assets = [aside(choices[name].chosen) for name in names]  # a placement depends on its candidate
-    scene = run.one("synthesize", build_scene, capture, shown, placed, assets, said, config.synthesize)
+    unseen = [one for one in request.prompts.objects if category_of(one.category).name == "counter" and one.name not in names]
+    scene = run.one("synthesize", build_scene, capture, shown, placed, assets, said, config.synthesize, unseen)
     run.failures |= scene.value.failures
+    for item in scene.value.objects:  # a worktop of which depth shows nothing is made over its run
+        run.failures.pop(item.name, None)
     fitted = run.one("warp", fit_meshes, scene, shown, placed, assets, config.warp)
     stand = [name for name in names if name not in scene.value.failures]
     result = Reconstruction(
@@ -208,7 +213,17 @@ def segment_objects(request: Request, run: Ledger, capture: Kept[Capture]) -> di
     prompts = {prompt.name: without_hinge(prompt) for prompt in request.prompts.objects}
     disputed = run.one("segment", find_disputed, session, list(prompts.values()), name=DISPUTED, span=(0.0, 0.1)).value
     prompts = {name: replace(prompt, others=disputed.get(name, ())) for name, prompt in prompts.items()}
-    return run.each("segment", track_object, prompts, session, prompts, alone=SEGMENTERS.get(name).alone)
+    tracks = run.each("segment", track_object, prompts, session, prompts, alone=SEGMENTERS.get(name).alone)
+    return {name: _without_things(kept, tracks.values()) for name, kept in tracks.items()}
+
+
+def _without_things(slab: Kept[MaskTrack], tracks: Collection[Kept[MaskTrack]]) -> Kept[MaskTrack]:
+    """A slab's track without the things that stand on it; any other track as it is."""
+    on_it = [kept for kept in tracks if kept is not slab and stands_on(kept.value, slab.value)]
+    if not on_it:
+        return slab
+    cleared = without_things(slab.value, [kept.value for kept in on_it])
+    return Kept(cleared, content_key(slab.key, [kept.key for kept in on_it]))
 
 
 def generate_objects(

@@ -19,6 +19,7 @@ class Params:
 
     clear_m: float = param(0.002, "m", "Gap to objects beside, below and above the board")
     shortest_m: float = param(0.10, "m", "Minimum length of a piece")
+    same_m: float = param(0.10, "m", "Maximum difference of the tops of a worktop as clicked and as found over its units")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +57,13 @@ class Slab:
     def meets(self, corners: Points, axis: int) -> bool:
         """Whether it and corners in its frame overlap along an axis."""
         return bool(corners[:, axis].min() < self.high[axis] and corners[:, axis].max() > self.low[axis])
+
+    def is_at(self, top: Vector3) -> bool:
+        """Whether a point on top of a worktop (world) lies on it."""
+        local = self.rotation.T @ top - (self.low + self.high) / 2
+        return bool(
+            (np.abs(local - [0.0, 0.0, self.thickness_m / 2]) < [*(self.high - self.low)[:2] / 2, tuned(Params).same_m]).all()
+        )
 
     def cut(self, obstacles: Sequence[Points], replaced_by: Sequence[Points] = ()) -> list["Slab"]:
         """Pieces of the slab along its run beside obstacles (corners in its frame), and away from replacements."""

@@ -12,7 +12,7 @@ from r2c2r_core.failing import apart
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import named
 from r2c2r_core.model.capture import Capture
-from r2c2r_core.model.inputs import JointLimits, ObjectOverride, Overrides
+from r2c2r_core.model.inputs import JointLimits, ObjectOverride, ObjectPrompt, Overrides
 from r2c2r_core.model.materials import SLIDE_FEEL, JointFeel
 from r2c2r_core.model.mesh import MeshAsset
 from r2c2r_core.model.motion import JointMotion, Source
@@ -79,12 +79,14 @@ def build_scene(
     assets: Sequence[MeshAsset],
     overrides: Overrides,
     config: SynthesizeConfig,
+    unseen: Sequence[ObjectPrompt] = (),
     *,
     progress: Progress = SILENT,
 ) -> ArticulatedScene:
     """Articulated scene: every object measured, arranged, and built as a fixture that opens.
 
-    One that cannot be measured or built is left out, with the reason; raises StageError if none can.
+    `unseen` are the prompts of worktops of which depth shows nothing: one made over a run under their clicks takes their name.
+    An object that cannot be measured or built is left out, with the reason; raises StageError if none can.
     """
     carcass = CARCASSES.load(config.fixtures)
     measured: list[MeasuredObject] = []
@@ -102,14 +104,15 @@ def build_scene(
     carriers = {track.name: carrier.motion for track in tracks if track.box is not None and (carrier := track.box.carrier)}
     contents = [item for item in measured if item.name in carriers]
     fixed = {item.name for item in contents if item.fixed_by_person}
-    measured = with_hidden_edges([item for item in measured if item.name not in carriers])
+    worktops = [item for item in measured if item.spec.name == "counter" and not item.fixed_by_person]
+    measured = with_hidden_edges([item for item in measured if item.name not in carriers and item not in worktops])
     layout = arrange(measured, capture.room.manhattan_yaw_rad, floor_found=capture.room.floor_found)
     if config.outliers == "keep":
         layout = with_outliers(layout, measured)
     failures |= {name: f"synthesize: {name}: left out: {why}" for name, why in layout.outliers.items()}
     placed = lapped(layout.objects)
     said: list[str] = []
-    made = surroundings_of(capture, placed, said) if config.surroundings else []
+    made = surroundings_of(capture, placed, [*worktops, *unseen], said, unasked=config.surroundings)
     found, sized = as_said(made, overrides)
     below = [*placed, *(item.measured(item.slab) for item in (*found, *sized))]  # worktops are known only now
     placed = tuple(settled(item, below, floor_found=capture.room.floor_found) for item in placed)
@@ -121,7 +124,7 @@ def build_scene(
                 built.append(_thing(item, *meshes[item.name], config.seed))
             else:
                 built.append(_fixture(item, hinges.get(item.name), overrides.of(item.name), carcass))
-    if not built:
+    if not built and not made:
         raise StageError("no object could be built", hint="; ".join(failures.values()))
     built = moved_apart(built, frozenset(item.name for item in placed if item.fixed_by_person))
     progress.at(0.9, "opening every joint")
@@ -134,6 +137,10 @@ def build_scene(
     opened = open_all(built, hinges, rebuild, capture.room.walls, kept)
     opened += standing_clear(opened, found, _painted, capture.room.walls, kept, said)
     opened += [_painted(item.measured(item.slab), item.slab) for item in sized]  # as a person specified, even where it collides
+    for name in {item.name for item in worktops} - {item.name for item in opened}:
+        failures[name] = (
+            f"synthesize: {name}: left out: units, other worktops or objects in it take its place; click it elsewhere"
+        )
     opened += in_drawers(_built(contents, meshes, config, failures), carriers, opened, fixed, failures)
     return ArticulatedScene(
         name=capture.name,

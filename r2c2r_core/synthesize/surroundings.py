@@ -1,4 +1,4 @@
-"""Worktops and plinths added from the scan, collision-free: they are part of a kitchen but are not clicked."""
+"""Worktops and plinths from the scan, collision-free: they are part of a kitchen, whether somebody clicked them or not."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -6,12 +6,14 @@ from itertools import count
 
 import numpy as np
 
+from r2c2r_core.arrays import Vector3
 from r2c2r_core.failing import apart, spared
 from r2c2r_core.geometry.boxes import Boxes, box_penetration
+from r2c2r_core.geometry.camera import pixel_rays
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.capture import Capture, Wall
-from r2c2r_core.model.inputs import ObjectOverride, Overrides
+from r2c2r_core.model.inputs import ObjectOverride, ObjectPrompt, Overrides
 from r2c2r_core.model.motion import Source
 from r2c2r_core.model.scene import SceneObject
 from r2c2r_core.synthesize.clearance import gathered, link_boxes, open_freely
@@ -20,7 +22,7 @@ from r2c2r_core.synthesize.facets import facets_of
 from r2c2r_core.synthesize.plinths import plinth_runs, plinths
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.unit_runs import UnitRun
-from r2c2r_core.synthesize.worktops import runs_of, worktop
+from r2c2r_core.synthesize.worktops import clicked_worktop, runs_of, worktop
 from r2c2r_core.tuning import param, tuned
 
 MADE = "made from the scan, without clicks"
@@ -40,10 +42,16 @@ class Surrounding:
     name: str
     category: str
     slab: Slab
+    clicked: MeasuredObject | None = None  # None: nobody clicked it
 
     def measured(self, slab: Slab) -> MeasuredObject:
         """The surrounding as a measured object, with its slab or a smaller one."""
         pose = Rigid3(slab.rotation, slab.rotation @ ((slab.low + slab.high) / 2))
+        if self.clicked is not None:
+            said, size_m = (*self.clicked.warnings, *slab.notes), slab.high - slab.low
+            return replace(
+                self.clicked, world_from_object=pose, dimensions_m=size_m, sources=slab.sources, placed_pose=pose, warnings=said
+            )
         return MeasuredObject(
             name=self.name,
             category=self.category,
@@ -61,25 +69,56 @@ class Surrounding:
         )
 
 
-def surroundings_of(capture: Capture, objects: Sequence[MeasuredObject], said: list[str]) -> list[Surrounding]:
-    """Worktops over the runs of base units and plinths below them; none where a person clicked one.
+def surroundings_of(
+    capture: Capture,
+    objects: Sequence[MeasuredObject],
+    clicked: Sequence[MeasuredObject | ObjectPrompt],
+    said: list[str],
+    *,
+    unasked: bool,
+) -> list[Surrounding]:
+    """Worktops over the runs of base units and plinths below them, `unasked` or only those clicked; none where one was placed.
 
-    None without a floor either, since base units are identified by their height above it. `said` gets a line for every run
-    where one could not be made.
+    A clicked worktop, or the prompt of one of which depth shows nothing, is the one over the run at its place; else the level
+    surface as clicked, unless that is taken. Runs need a floor, since base units are identified by their height above it.
+    `said` gets a line for every run where none could be made.
     """
-    if not capture.room.floor_found:
-        return []
     counters, boards = list[Slab](), list[Slab]()
     with spared("the search for worktops and plinths failed", said):
         facets = facets_of(capture.surface)
-        for run in runs_of(objects):
+        runs = runs_of(objects) if capture.room.floor_found and (unasked or clicked) else []
+        for run in runs:
             with spared(f"no worktop was made over {_names(run)}", said):
-                counters += worktop(capture, facets, run, objects, counters)
-        for run in plinth_runs(objects):
+                counters += worktop(capture, facets, run, objects, counters, [other for other in runs if other is not run])
+        for run in plinth_runs(objects) if capture.room.floor_found and unasked else ():
             with spared(f"no plinth was made below {_names(run)}", said):
                 boards += plinths(facets, run, objects, boards)
-    names = {item.name for item in objects}
-    return [*_named("counter", counters, names), *_named("plinth", boards, names)]
+    made = list[Surrounding]()
+    for item in clicked:
+        with spared(f"{item.name} is left out", said):
+            own, seen = [slab for slab in counters if any(map(slab.is_at, _tops(capture, item, slab)))], None
+            if isinstance(item, MeasuredObject):
+                seen = item
+                own = own or clicked_worktop(facets, item, objects, [*counters, *(other.slab for other in made)])
+            if own:
+                largest = max(own, key=lambda slab: slab.along[1] - slab.along[0])
+                counters = [slab for slab in [*counters, *(one for one in own if one not in counters)] if slab is not largest]
+                made.append(Surrounding(name=item.name, category=item.category, slab=largest, clicked=seen))
+    names = {item.name for item in (*objects, *clicked)}
+    return [*made, *(_named("counter", counters, names) if unasked else ()), *_named("plinth", boards, names)]
+
+
+def _tops(capture: Capture, item: MeasuredObject | ObjectPrompt, slab: Slab) -> list[Vector3]:
+    """Points on top of a clicked worktop: its middle, or where its clicks meet the height of a slab."""
+    if isinstance(item, MeasuredObject):
+        return [item.world_from_object.apply(np.array([0.0, 0.0, item.dimensions_m[2] / 2]))]
+    points = []
+    for click in (click for click in item.points if click.label == 1):
+        frame = capture.frame(click.frame)
+        eye, ray = frame.world_from_camera.translation, pixel_rays(np.array([click.x, click.y]), frame.rgb_camera)
+        ray = frame.world_from_camera.rotation @ ray
+        points += [eye + ray * ((slab.high[2] - eye[2]) / ray[2])] if ray[2] < 0 else []
+    return points
 
 
 def as_said(made: Sequence[Surrounding], overrides: Overrides) -> tuple[list[Surrounding], list[Surrounding]]:

@@ -1,6 +1,6 @@
 """Detection of a worktop over a run of base units: its height, front edge, ends and rear.
 
-Nobody clicks a worktop. The evidence is level surface just above the units; without it none is made.
+The evidence is level surface just above the units; without it none is made but where somebody clicked one.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,6 +19,8 @@ from r2c2r_core.synthesize.slabs import Params as SlabsParams
 from r2c2r_core.synthesize.slabs import Slab
 from r2c2r_core.synthesize.unit_runs import Interval, UnitRun, flush, grouped, heights, is_front, overlap
 from r2c2r_core.tuning import param, tuned
+
+_GREY = (0.6, 0.6, 0.6)  # of a worktop that the scan shows no part of; its mesh has its own colours
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +57,9 @@ class Params:
     speck: float = param(0.01, "share", "Fraction of a stretch below which surface is ignored")
     shown: float = param(0.5, "share", "Observed density relative to that over the units above which a strip is worktop too")
     reach_m: float = param(0.70, "m", "Maximum extension past the last unit: a corner, or an appliance that was not clicked")
+    corner_m: float = param(
+        0.12, "m", "Maximum gap between two runs that meet at a corner", source="fillers of 2-10 cm, see kitchen/categories.py"
+    )
     overhang_m: float = param(0.06, "m", "Maximum overhang in front of the fronts")
     fine_m: float = param(0.005, "m", "Step of the search for the front edge", gt=0)
     edge_m: float = param(0.03, "m", "Depth below the surface down to which the front edge is searched")
@@ -72,11 +77,16 @@ def runs_of(objects: Sequence[MeasuredObject]) -> list[UnitRun]:
 
 
 def worktop(
-    capture: Capture, facets: Facets, run: UnitRun, objects: Sequence[MeasuredObject], taken: Sequence[Slab]
+    capture: Capture,
+    facets: Facets,
+    run: UnitRun,
+    objects: Sequence[MeasuredObject],
+    taken: Sequence[Slab],
+    others: Sequence[UnitRun] = (),
 ) -> list[Slab]:
     """The worktop over a run, in pieces between the objects that stand in it; empty where the scan shows none.
 
-    `facets` are in the world, `taken` are the worktops of other runs.
+    `facets` are in the world, `taken` are the worktops of `others`, runs that it meets at corners.
     """
     params = tuned(Params)
     slabs_params = tuned(SlabsParams)
@@ -90,7 +100,7 @@ def worktop(
     obstacles = [run.corners(item) for item in objects if not any(item is unit for unit in run.units)]
     obstacles += [other.corners(run.rotation) for other in taken]
     pieces: list[Slab] = []
-    for low, high in _stretches(top):
+    for low, high in (_into_corners(stretch, run, others) for stretch in _stretches(top)):
         slab = Slab(
             run.rotation,
             np.array([low, run.least(1) - overhang, run.most(2) + slabs_params.clear_m]),
@@ -105,6 +115,26 @@ def worktop(
         for piece in pieces
         if piece.thickness_m >= params.thinnest_m and any(overlap(piece.along, unit) > 0 for unit in run.stretches)
     ]
+
+
+def clicked_worktop(
+    facets: Facets, item: MeasuredObject, objects: Sequence[MeasuredObject], taken: Sequence[Slab]
+) -> list[Slab]:
+    """A worktop as clicked, on the units under it, in pieces between the objects and worktops that stand in it."""
+    clear_m, run = tuned(SlabsParams).clear_m, UnitRun(item.world_from_object.rotation, (item,))
+    low, high = (np.array([end(axis) for axis in range(3)]) for end in (run.least, run.most))
+    units = [run.corners(unit) for unit in objects if is_front(unit)]
+    level = facets.turned(run.rotation)
+    level = level.where(
+        (level.normals[:, 2] > tuned(Params).level) & ((level.middles > low) & (level.middles < high)).all(axis=1)
+    )
+    slab = Slab(run.rotation, low, high, item.sources, level.colour if len(level.areas) else _GREY)
+    tops = [float(unit[:, 2].max()) + clear_m for unit in units if slab.meets(unit, 0) and slab.meets(unit, 1)]
+    slab = replace(slab, low=np.array([*low[:2], max([low[2], *(top for top in tops if top < high[2])])]))
+    pieces = _below_what_stands_on_it(slab, run, objects).cut(
+        [*(run.corners(other) for other in objects), *(other.corners(run.rotation) for other in taken)]
+    )
+    return [piece for piece in pieces if piece.thickness_m >= tuned(Params).thinnest_m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -236,6 +266,19 @@ def _stretches(top: _Top) -> Iterator[Interval]:
         if inside := [u for u in units if overlap(u, (low, high)) > 0]:
             first, last = min(u[0] for u in inside), max(u[1] for u in inside)
             yield low if first - low > 2 * params.bin_m else first, high if high - last > 2 * params.bin_m else last
+
+
+def _into_corners(stretch: Interval, run: UnitRun, others: Sequence[UnitRun]) -> Interval:
+    """The interval with the blind corners at its ends: to the back of a run across it that begins there, before its fronts."""
+    params, (low, high) = tuned(Params), stretch
+    for other in others:
+        (left, near, _), (right, _, top) = (
+            end([end(run.corners(unit), axis=0) for unit in other.units], axis=0) for end in (np.min, np.max)
+        )
+        if near < run.least(1) - params.corner_m and abs(top - run.most(2)) < params.stacked_m:
+            high = right if abs(left - high) < params.corner_m else high
+            low = left if abs(right - low) < params.corner_m else low
+    return low, high
 
 
 def _below_what_stands_on_it(slab: Slab, run: UnitRun, objects: Sequence[MeasuredObject]) -> Slab:

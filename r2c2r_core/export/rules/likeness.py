@@ -58,7 +58,7 @@ def _contradictions(entries: list[dict[str, Any]], present: set[str]) -> Iterato
 
 def _unsure_place(item: dict[str, Any]) -> Iterator[Finding]:
     placement = item.get("placement")
-    if placement is not None and placement["unsure"]:
+    if placement is not None and placement["unsure"] and item.get("fixture") != "counter":  # the level surface places a worktop
         turn = placement.get("runner_up_turn_deg")
         turned = f" turned by {turn:.0f}°" if turn else ""
         yield finding(

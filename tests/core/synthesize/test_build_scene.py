@@ -452,7 +452,7 @@ def test_hinge_confidence_is_higher_with_a_handle_near_the_edge() -> None:
 
 def test_a_handle_determines_the_hinge_despite_a_blocking_neighbour() -> None:
     """Without a handle the hinge is on the side that opens; a handle is observed, a neighbour may be measured wrong."""
-    block = Unit("block", "counter", (0.25, -0.43, 0.5), (0.06, 0.15, 0.7), kind="thing")
+    block = Unit("block", "open_shelf", (0.25, -0.43, 0.5), (0.06, 0.15, 0.7), kind="thing")
     sides = []
     for handle in (None, Handle(0.24, 0.2)):
         joint = built(Unit("cab", "cabinet", (0, 0, 0.5), (0.6, 0.58, 0.7), handle=handle), block).objects[0].joints[0]

@@ -7,9 +7,11 @@ import pytest
 
 from r2c2r_core.export.plan import plan_bundle
 from r2c2r_core.export.support import supported
+from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.meshes import box_mesh
-from r2c2r_core.model.capture import Capture, SceneSurface, Wall
-from r2c2r_core.model.inputs import Overrides
+from r2c2r_core.geometry.transforms import Rigid3
+from r2c2r_core.model.capture import Capture, Frame, SceneSurface, Wall
+from r2c2r_core.model.inputs import ObjectPrompt, Overrides, PromptPoint
 from r2c2r_core.model.scene import ArticulatedScene, SceneObject
 from r2c2r_core.synthesize.stage import SynthesizeConfig, build_scene
 from r2c2r_core.warp.stage import WarpConfig, fit_meshes
@@ -85,6 +87,15 @@ def test_an_unclicked_worktop_is_built_at_the_scanned_height() -> None:
     assert counter.name == "counter_1"
 
 
+def test_worktops_of_two_runs_cover_the_corner_between_them() -> None:
+    """Fillers leave 5 cm between the last doors and the corner; the scan shows the worktops over the units only."""
+    across = Unit("across", "cabinet", (1.233, -0.63, 0.48), (0.6, 0.56, 0.74), yaw=-np.pi / 2, handle=Handle(0.24, 0.2))
+    tops = ((-0.3, -0.295, 0.86), (0.903, 0.28, 0.892)), ((0.938, -0.93, 0.86), (1.513, -0.33, 0.892))
+    first, second = of(built((CAB_L, CAB_R, across), scanned(*tops)), "counter")
+    np.testing.assert_allclose([bounds(first)[0][0], bounds(first)[1][0]], [-0.3, 1.513], atol=0.01)
+    np.testing.assert_allclose(bounds(second)[1][1], bounds(first)[0][1] - 0.002, atol=1e-3)
+
+
 def test_the_front_edge_in_the_pictures_tells_the_height_of_black_stone() -> None:
     """Depth shows one patch of its top, 1 cm too high, and what stands on it; the pictures show its edge over every front."""
     patch, books = ((0.0, 0.0, 0.9), (0.15, 0.1, 0.91)), ((0.3, 0.0, 0.9), (0.6, 0.2, 0.96))
@@ -93,6 +104,63 @@ def test_the_front_edge_in_the_pictures_tells_the_height_of_black_stone() -> Non
     low, high = bounds(counter)
     np.testing.assert_allclose([low[2], high[2]], [0.852, 0.902], atol=1e-3)
     np.testing.assert_allclose([low[0], high[0]], [-0.3, 0.903], atol=0.01)
+
+
+CLICKED = Unit("top", "worktop", (0.6, 0.0, 0.872), (1.7, 0.6, 0.04), kind="thing")
+
+
+@pytest.mark.parametrize("high", [0.04, 0.892])
+def test_a_clicked_worktop_is_the_one_over_its_units(high: float) -> None:
+    """Its own box is shorter, and may be a solid to the floor."""
+    clicked = replace(CLICKED, centre=(0.6, 0.0, 0.892 - high / 2), size=(1.7, 0.6, high))
+    scene = built((*RUN, BOTTLE, clicked), scanned(WORKTOP, PLINTH))
+    unasked = of(kitchen(), "counter")[0]
+    (top,) = of(scene, "worktop")
+    assert (of(scene, "counter"), top.name, top.fixture) == ([], "top", "counter")
+    np.testing.assert_allclose(bounds(top), bounds(unasked))
+    assert not any("without clicks" in line for line in top.warnings)
+    assert {item.name for item in scene.objects} == {item.name for item in kitchen().objects} - {"counter_1"} | {"top"}
+
+
+def test_a_clicked_worktop_that_the_surface_does_not_show_stands_on_its_units() -> None:
+    """Measured 4 cm thick, of which 3 cm are in the units."""
+    scene = built((CAB_L, CAB_R, replace(CLICKED, centre=(0.3, 0.0, 0.86), size=(1.2, 0.6, 0.04))), scanned(), on=False)
+    (top,) = of(scene, "worktop")
+    low, high = bounds(top)
+    np.testing.assert_allclose([low[2], high[2]], [0.852, 0.88], atol=1e-3)
+    np.testing.assert_allclose([low[0], high[0]], [-0.3, 0.9], atol=0.02)
+    assert deepest_contact(compile_scene(scene)) < 5e-4
+
+
+def test_a_second_click_on_a_worktop_leaves_the_second_out_with_a_reason() -> None:
+    again = replace(CLICKED, name="again", centre=(0.5, 0.0, 0.872), size=(1.2, 0.5, 0.04))
+    scene = built((*RUN, CLICKED, again), scanned(WORKTOP, PLINTH))
+    assert [item.name for item in of(scene, "worktop")] == ["top"]
+    assert "again: left out: units, other worktops" in scene.failures["again"]
+
+
+def test_a_worktop_whose_click_hits_no_surface_is_the_one_made_over_its_units() -> None:
+    """Black gloss has no depth at the click, 60 cm in front of the camera and 40 cm below it."""
+    scan = scanned(WORKTOP, PLINTH)
+    camera = Intrinsics(fx=400.0, fy=400.0, cx=320.0, cy=240.0, width=640, height=480)
+    down = np.array([[1.0, 0.0, 0.0], [0.0, -0.5547, 0.83205], [0.0, -0.83205, -0.5547]])
+    frame = Frame(
+        index=7,
+        timestamp_s=None,
+        rgb_camera=camera,
+        depth_camera=camera,
+        world_from_camera=Rigid3(down, np.array([0.5, -0.6, 1.292])),
+        sharpness=1.0,
+    )
+    said = ObjectPrompt(name="top", category="worktop", points=(PromptPoint(frame=7, x=320.0, y=240.0, label=1),))
+    beside = replace(said, name="beside", points=(PromptPoint(frame=7, x=320.0, y=-4000.0, label=1),))
+    rng = np.random.default_rng(0)
+    tracks, placements, assets = zip(*[placed_unit(u, rng) for u in RUN], strict=True)
+    kitchen, config = replace(scan, frames=(*scan.frames, frame)), SynthesizeConfig()
+    scene = build_scene(kitchen, tracks, placements, assets, Overrides(objects={}), config, (said, beside))
+    (top,) = of(scene, "worktop")
+    assert (top.name, of(scene, "counter")) == ("top", [])
+    np.testing.assert_allclose(bounds(top)[1][2], 0.892, atol=1e-3)
 
 
 def test_a_plinth_is_built_where_the_scan_shows_it() -> None:
