@@ -2,9 +2,9 @@
 
     python benchmarks/redkitchen.py DATA [--set NAME ...] [--workdir DIR] [--keep]
 
-DATA holds the folders of 7-Scenes RedKitchen frames that redkitchen.json names, with their clicks. Sizes are compared with those
-read from orthographic photos of the wall planes, to about 5 mm; the sizes of doors L1 to L3 have no single true height.
---keep reads stages whose inputs and code are unchanged from DIR.
+DATA holds the folders of 7-Scenes RedKitchen frames that redkitchen.json names, with their clicks. Sizes are compared with
+those read from orthographic photos of the planes, to about 5 mm for doors; doors L1 to L3 have no single true height. --keep
+reads stages whose inputs and code are unchanged from DIR.
 """
 
 import argparse
@@ -45,7 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if not options.keep:
                 shutil.rmtree(work, ignore_errors=True)
             work.mkdir(parents=True, exist_ok=True)
-            print("\n".join([f"## {name}", *figures_of(run_set(options.data / name, SETS["sets"][name], work), work)]), flush=True)
+            answer = run_set(options.data / name, SETS["sets"][name], work)
+            print("\n".join([f"## {name}", *figures_of(answer, work)]), flush=True)
     return 0
 
 
@@ -85,7 +86,10 @@ def figures_of(answer: dict[str, Any], work: Path) -> Iterator[str]:
     for name, item in objects.items():
         size = 100 * np.array(item["dimensions_m"])
         truth = SETS["truth_cm"].get(name, [None] * 3)
-        errors = " ".join("–" if real is None else f"{100 * (got / real - 1):+.0f}%" for got, real in zip(size, truth, strict=True))
+        size = size if name in DOORS else np.array([*sorted(size[:2], reverse=True), size[2]])  # things have no front
+        errors = " ".join(
+            "–" if real is None else f"{100 * (got / real - 1):+.0f}%" for got, real in zip(size, truth, strict=True)
+        )
         middle = 100 * item["world_from_object"][2][3]
         low, high = middle - size[2] / 2, middle + size[2] / 2
         yield f"{name:22} {size[0]:6.1f} x {size[1]:5.1f} x {size[2]:5.1f} cm ({errors}), z {low:6.1f} to {high:6.1f}"
@@ -94,7 +98,8 @@ def figures_of(answer: dict[str, Any], work: Path) -> Iterator[str]:
         [100 * (door["world_from_object"][2][3] + sign * door["dimensions_m"][2] / 2) for door in doors] for sign in (1, -1)
     )
     yield f"{len(doors)} doors: tops spread over {np.ptp(tops):.1f} cm, bottoms over {np.ptp(bottoms):.1f} cm"
-    yield from (f"- {a} has {100 * share:.0f} % of {b} in its mask" for a, b, share in shared_masks(work / "masks", set(objects)))
+    shared = shared_masks(work / "masks", set(objects))
+    yield from (f"- {a} has {100 * share:.0f} % of {b} in its mask" for a, b, share in shared)
     yield from (f"- {name}: {warning}" for name, item in objects.items() for warning in item["warnings"])
 
 

@@ -46,11 +46,6 @@ class Params:
         0.08, "m", "Maximum gap between parts of an object on the floor: scans lose parts of legs and seats"
     )
     solid_m: float = param(0.03, "m", "Minimum distance of measured depth behind a place that is empty, beyond the noise", gt=0)
-    foot: float = param(
-        0.05,
-        "share",
-        "Minimum fraction of the places just above a support that no frame sees through, for an object to stand on it",
-    )
     canopy_m: float = param(0.2, "m", "Maximum gap between parts of a hood, whose canopy's top is too high to be seen")
     level_cos: float = param(0.92, "cosine", "Minimum cosine between a face normal and up for a support")
     level_area_m2: float = param(0.0005, "m²", "Minimum level area in one direction for a support to continue there")
@@ -258,13 +253,13 @@ def support_height(scene: Scene, positives: Points, config: ThingConfig) -> floa
 
 
 def _is_clear(scene: Scene, above: Vector3, support_z_m: float, radius_m: float) -> bool:
-    """Whether frames see through almost everything within reach just above a surface, so that the object cannot stand on it."""
+    """Whether frames see through everything within reach just above a surface, so that the object cannot stand on it."""
     params = tuned(Params)
     if above[2] - support_z_m < params.furniture_gap_m:
         return False
-    steps = np.linspace(-radius_m, radius_m, 9)
+    steps = np.linspace(-radius_m, radius_m, min(41, int(radius_m / 0.01) + 1))  # at 2 cm, or coarser below what is very large
     places = np.array([[above[0] + x, above[1] + y, support_z_m + 2 * params.solid_m] for x, y in product(steps, steps)])
-    return bool(_solid(scene, places).mean() < params.foot)
+    return not _solid(scene, places).any()
 
 
 def _solid(scene: Scene, points: Points) -> np.ndarray:
