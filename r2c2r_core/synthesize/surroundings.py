@@ -103,7 +103,8 @@ def surroundings_of(
             if own:
                 largest = max(own, key=lambda slab: slab.along[1] - slab.along[0])
                 counters = [slab for slab in [*counters, *(one for one in own if one not in counters)] if slab is not largest]
-                made.append(Surrounding(name=item.name, category=item.category, slab=largest, clicked=seen))
+                slab = largest if seen is not None else replace(largest, notes=(*largest.notes, "its clicks show no surface"))
+                made.append(Surrounding(name=item.name, category=item.category, slab=slab, clicked=seen))
     names = {item.name for item in (*objects, *clicked)}
     return [*made, *(_named("counter", counters, names) if unasked else ()), *_named("plinth", boards, names)]
 

@@ -118,10 +118,13 @@ def _find_worktop(scene: Scene, positives: Points, thickness_m: float, config: T
     top = replace(top, plan=arm_at(top.plan, beside, positives[0], low, size, scene.capture.room.manhattan_yaw_rad))
     region = Region(low=low, high=high, level=top.plane)
     cloud = gather_cloud(scene, region, size)
+    on = _of_slab(cloud, top, thickness_m)[0]
+    if on.sum() * size**2 < tuned(SlabParams).least_m2:  # gloss that depth shows some specks of
+        return None
     nothing = np.array([0.0, 0.0, low[2] - params.off_floor_m])  # its floor: nothing below it matters
     return _standing(
         cloud,
-        _of_slab(cloud, top, thickness_m)[0],
+        on,
         region,
         nothing,
         top,

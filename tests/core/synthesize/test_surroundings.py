@@ -161,6 +161,7 @@ def test_a_worktop_whose_click_hits_no_surface_is_the_one_made_over_its_units() 
     (top,) = of(scene, "worktop")
     assert (top.name, of(scene, "counter")) == ("top", [])
     np.testing.assert_allclose(bounds(top)[1][2], 0.892, atol=1e-3)
+    assert "its clicks show no surface" in top.warnings
 
 
 def test_a_plinth_is_built_where_the_scan_shows_it() -> None:
