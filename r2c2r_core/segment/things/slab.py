@@ -63,8 +63,8 @@ class Levels:
         pad = max(1, round(params.hidden_m / size))
         closed = ndimage.binary_closing(np.pad(plan, pad + 1), iterations=pad)[pad + 1 : -pad - 1, pad + 1 : -pad - 1]
         filled = ndimage.binary_fill_holes(closed)
-        broad = ndimage.binary_opening(filled, iterations=pad // 2)  # without the rail of a chair drawn up to it
-        return Slab(np.asarray(filled & ndimage.binary_dilation(broad, iterations=pad // 2)), plane)
+        broad = ndimage.binary_opening(filled, iterations=max(1, pad // 2))  # without the rail of a chair drawn up to it
+        return Slab(np.asarray(filled & ndimage.binary_dilation(broad, iterations=max(1, pad // 2))), plane)
 
 
 def height_of(plane: np.ndarray, points: Points) -> np.ndarray:
