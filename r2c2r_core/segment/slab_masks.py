@@ -20,7 +20,9 @@ class Params:
 
 def stands_on(thing: MaskTrack, slab: MaskTrack) -> bool:
     """Whether a thing stands on a table or a worktop."""
-    if thing.kind != "thing" or thing.box is None or slab.box is None or not category_of(slab.category).flat_top:
+    if thing.kind != "thing" or thing.box is None or slab.box is None:
+        return False
+    if not category_of(slab.category).flat_top or category_of(thing.category).flat_top:  # one worktop under two names
         return False
     height, place = slab.box.dimensions_m[2] / 2, slab.box.world_from_object
     local = place.inverse.apply(thing.box.world_from_object.translation)

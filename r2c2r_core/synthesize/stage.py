@@ -137,10 +137,8 @@ def build_scene(
     opened = open_all(built, hinges, rebuild, capture.room.walls, kept)
     opened += standing_clear(opened, found, _painted, capture.room.walls, kept, said)
     opened += [_painted(item.measured(item.slab), item.slab) for item in sized]  # as a person specified, even where it collides
-    for name in {item.name for item in worktops} - {item.name for item in opened}:
-        failures[name] = (
-            f"synthesize: {name}: left out: units, other worktops or objects in it take its place; click it elsewhere"
-        )
+    for name in [item.name for item in worktops if all(item.name != other.name for other in opened)]:
+        failures[name] = f"synthesize: {name}: left out: units, other worktops or objects take its place; click it elsewhere"
     opened += in_drawers(_built(contents, meshes, config, failures), carriers, opened, fixed, failures)
     return ArticulatedScene(
         name=capture.name,

@@ -38,6 +38,8 @@ def test_a_magazine_stands_on_the_table_and_a_rug_below_it_does_not() -> None:
     assert not stands_on(replace(MAGAZINE, box=replace(MAGAZINE.box, support_z_m=0.0)), TABLE)
     assert not stands_on(MAGAZINE, replace(TABLE, category="chair"))
     assert not stands_on(TABLE, MAGAZINE)
+    worktop = thing("worktop", slice(0, 30), (1.2, 0.8, 0.04), -0.02)  # its top is at 0.02
+    assert not stands_on(worktop, replace(worktop, name="the same"))
 
 
 def test_a_table_mask_excludes_the_magazine_on_it() -> None:
