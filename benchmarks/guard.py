@@ -1,12 +1,13 @@
-"""Accuracy guard: every object of 29 kitchens against the figures stored for it.
+"""Accuracy guard: every object of 33 kitchens against the figures stored for it.
 
     python benchmarks/guard.py [KITCHEN...] [--workdir DIR] [--second PATH/make_kitchen.py] [--franka WHEEL] [--fast] [--update]
 
-Kitchens: sample-0..4 (own clicks), second-100..104 and franka (random clicks), opened-ours-21 and opened-second-101 (filmed
-while fronts open) go through `r2c2r run`, `check` and `evaluate`; for STYLE-120 and STYLE-121 only the edges of clicked fronts
-are measured. Each kitchen is drawn once into DIR/KITCHEN; stages with unchanged code are read from there, so that a run after a
-change to one stage recomputes only that stage and the later ones. --fast takes six kitchens up to the scene, from the masks
-that an earlier run stored, and leaves out the measures that need masks or a bundle.
+Kitchens: sample-0..4 (own clicks), second-100..104 and franka (random clicks), as-filmed-20, -21, as-filmed-second-105 and -106
+(with the faults of real recordings), opened-ours-21 and opened-second-101 (filmed while fronts open) go through `r2c2r run`,
+`check` and `evaluate`; for STYLE-120 and STYLE-121 only the edges of clicked fronts are measured. Each kitchen is drawn once
+into DIR/KITCHEN; stages with unchanged code are read from there, so that a run after a change to one stage recomputes only that
+stage and the later ones. --fast takes six kitchens up to the scene, from the masks that an earlier run stored, and leaves out
+the measures that need masks or a bundle.
 
 Exits 1 if an object is worse than in benchmarks/baseline.json by more than a measure's tolerance, if a previously found object
 is missing, if a certificate is lost, or if a measure gets worse on significantly more objects than it gets better on (sign
@@ -132,14 +133,14 @@ def _measure(name: str, folder: Path, *, fast: bool) -> Kitchen:
         return {"certified": None, "objects": _front_edges(folder)}
     random = KITCHENS[name].random_clicks
     prompts = random_clicks(folder, np.random.default_rng(0)) if random else read_prompts(folder / "prompts.json")
-    return (_scene if fast else _bundle)(folder, prompts)
+    return _scene(folder, prompts) if fast else _bundle(folder, prompts, KITCHENS[name].run_options)
 
 
-def _bundle(folder: Path, prompts: Prompts) -> Kitchen:
+def _bundle(folder: Path, prompts: Prompts, run_options: Sequence[str]) -> Kitchen:
     """The bundle's figures for every clicked object."""
     work, clicks = folder / "run", folder / "clicks.json"
     write_prompts(prompts, clicks)
-    outcome = whole_way(recording_in(folder), clicks, folder / "truth.json", work, anew=False)
+    outcome = whole_way(recording_in(folder), clicks, folder / "truth.json", work, anew=False, run_options=run_options)
     found = {} if outcome.evaluation is None else {item["name"]: item for item in outcome.evaluation["objects"]}
     matched = {name: item["matched"] for name, item in found.items() if item["matched"]}
     overlaps = clicked_overlaps(folder, prompts, work / "masks", matched)

@@ -4,12 +4,14 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
+from recordings import recording_in
 from whole_way import CLI, REPOSITORY
 
+from r2c2r_core.synthetic.as_filmed import film_as_real
 from r2c2r_core.synthetic.choices import STYLES
 
 _SCRIPTS = Path(__file__).resolve().parent
@@ -17,6 +19,7 @@ _WITH_LZFSE = (  # the generator imports the codec under another package's name
     "import lzfse, runpy, sys; sys.modules['liblzfse'] = lzfse; del sys.argv[0]; "
     "runpy.run_path(sys.argv[0], run_name='__main__')"
 )
+AS_FILMED = ("--register-depth",)
 _OPENED_FILM = ("--frames", "120", "--size", "480x360")
 
 
@@ -34,6 +37,8 @@ class GuardedKitchen:
     command: Callable[[Generators, str], list[str | Path | None]]  # from the generators and the target folder
     random_clicks: bool = False  # instead of those of its prompts.json
     edges_only: bool = False  # only the edges of fronts, from the segmenter alone
+    run_options: tuple[str, ...] = ()  # of `r2c2r run`
+    finish: Callable[[Path], None] | None = None  # changes the drawn folder
 
 
 def _own(*options: str) -> Callable[[Generators, str], list[str | Path | None]]:
@@ -44,6 +49,14 @@ def _second(seed: int) -> GuardedKitchen:
     options = ("--seed", str(seed), "--frames", "120")
     return GuardedKitchen(
         command=lambda by, out: [sys.executable, "-c", _WITH_LZFSE, by.second, out, *options], random_clicks=True
+    )
+
+
+def _second_as_filmed(seed: int) -> GuardedKitchen:
+    return replace(
+        _second(seed),
+        run_options=AS_FILMED,
+        finish=lambda folder: film_as_real(recording_in(folder), seed),
     )
 
 
@@ -58,6 +71,11 @@ KITCHENS: dict[str, GuardedKitchen] = {
     "franka": GuardedKitchen(
         command=lambda by, out: [sys.executable, _SCRIPTS / "franka.py", by.franka, out], random_clicks=True
     ),
+    **{
+        f"as-filmed-{seed}": GuardedKitchen(command=_own("--as-filmed", "--seed", str(seed)), run_options=AS_FILMED)
+        for seed in (20, 21)
+    },
+    **{f"as-filmed-second-{seed}": _second_as_filmed(seed) for seed in (105, 106)},
     "opened-ours-21": GuardedKitchen(command=_own("--opened", "--seed", "21", "--layout", "straight", *_OPENED_FILM)),
     "opened-second-101": _second_opened(101),
     **{
@@ -82,5 +100,7 @@ def drawn(name: str, workdir: Path, generators: Generators) -> Path | None:
     shutil.rmtree(unfinished, ignore_errors=True)
     workdir.mkdir(parents=True, exist_ok=True)
     subprocess.run([str(word) for word in command], cwd=REPOSITORY, check=True, stdout=subprocess.DEVNULL)
+    if (finish := KITCHENS[name].finish) is not None:
+        finish(unfinished)
     unfinished.rename(folder)
     return folder

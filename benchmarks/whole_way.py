@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,14 @@ class Outcome:
 
 
 def whole_way(
-    recording: Path, prompts: Path, truth: Path, work: Path, *, anew: bool = True, preset: str = "default"
+    recording: Path,
+    prompts: Path,
+    truth: Path,
+    work: Path,
+    *,
+    anew: bool = True,
+    preset: str = "default",
+    run_options: Sequence[str] = (),
 ) -> Outcome:
     """Run the commands; `work` keeps bundle.zip, run.log, certificate.json and evaluation.json.
 
@@ -38,7 +46,7 @@ def whole_way(
     work.mkdir(parents=True, exist_ok=True)
     bundle, masks, answer = work / "bundle.zip", work / "masks", work / "evaluation.json"
     bundle.unlink(missing_ok=True)
-    run = [*CLI, "run", str(recording), "--prompts", str(prompts), "-o", str(bundle), "--preset", preset]
+    run = [*CLI, "run", str(recording), "--prompts", str(prompts), "-o", str(bundle), "--preset", preset, *run_options]
     cost = run_measured([*run, "--workdir", str(work / "work"), "--masks", str(masks)], cwd=REPOSITORY, log=work / "run.log")
     if not bundle.exists():
         print(f"{work.name}: no bundle (exit {cost.exit_code}); see {work / 'run.log'}", file=sys.stderr)

@@ -17,7 +17,13 @@ def add(parsers: Parsers) -> None:
     added.add_argument(
         "--seed", type=seed, default=0, help="random seed; equal seeds give equal recordings (default: %(default)s)"
     )
-    added.add_argument("--opened", action="store_true", help="open and close fronts while filming")
+    how = added.add_mutually_exclusive_group()
+    how.add_argument("--opened", action="store_true", help="open and close fronts while filming")
+    how.add_argument(
+        "--as-filmed",
+        action="store_true",
+        help="add the faults of real recordings, from a tilt to unregistered depth; run it with --register-depth",
+    )
     add_size(added)
     added.formatter_class = argparse.RawDescriptionHelpFormatter
     added.add_argument("--style", choices=STYLES, metavar="NAME", help="style of the fronts, as listed below")
@@ -46,9 +52,8 @@ def add_size(parser: argparse.ArgumentParser) -> None:
 def sample(options: argparse.Namespace) -> int:
     """Write a recording of a synthetic kitchen with exact ground truth."""
     choice = Choice(style=options.style, palette=options.palette, layout=options.layout)
-    write_recording(
-        options.out, seed=options.seed, frames=options.frames, size=options.size, opened=options.opened, choice=choice
-    )
+    chosen = {"opened": options.opened, "as_filmed": options.as_filmed, "choice": choice}
+    write_recording(options.out, seed=options.seed, frames=options.frames, size=options.size, **chosen)
     return 0
 
 

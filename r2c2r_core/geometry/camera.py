@@ -66,6 +66,27 @@ def depth_points(depth_m: DepthMetres, camera: Intrinsics) -> PointField:
     return unproject(pixel_centres(camera), depth_m, camera)
 
 
+def reproject_depth(depth_m: DepthMetres, source: Intrinsics, target: Intrinsics, target_at_m: np.ndarray) -> DepthMetres:
+    """Reprojection of a depth image into a parallel camera at `target_at_m` (source's frame); 0 where nothing projects.
+
+    Each pixel is splatted over the square it covers, in enough pieces to leave no gaps; the nearest depth is kept.
+    """
+    pieces = max(1, int(np.ceil(max(target.fx * source.width / (source.fx * target.width), 1.0) + 0.2)))
+    offsets = (np.arange(pieces) + 0.5) / pieces
+    rows, columns = np.nonzero(depth_m > 0)
+    z = depth_m[rows, columns].astype(np.float64) - target_at_m[2]
+    least = np.full(target.height * target.width, np.inf)
+    for down in offsets:
+        for across in offsets:
+            x = (columns + across - source.cx) / source.fx * depth_m[rows, columns] - target_at_m[0]
+            y = (rows + down - source.cy) / source.fy * depth_m[rows, columns] - target_at_m[1]
+            column = np.floor(x / z * target.fx + target.cx).astype(np.int64)
+            row = np.floor(y / z * target.fy + target.cy).astype(np.int64)
+            inside = (column >= 0) & (column < target.width) & (row >= 0) & (row < target.height)
+            np.minimum.at(least, row[inside] * target.width + column[inside], z[inside])
+    return np.where(np.isfinite(least), least, 0.0).astype(np.float32).reshape(target.height, target.width)
+
+
 def sample_nearest(image: np.ndarray, uv_px: Pixels) -> tuple[np.ndarray, np.ndarray]:
     """Values of `image` at the pixels that contain uv (n, 2), and whether each lies inside; outside gives pixel (0, 0)."""
     height, width = image.shape[:2]

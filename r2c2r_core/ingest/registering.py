@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from r2c2r_core.arrays import DepthMetres
-from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.camera import reproject_depth
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.ingest.doctor.registration import WIDTH, Registration, measure_registration
 from r2c2r_core.ingest.store import write_depth
@@ -48,7 +47,9 @@ def register_depth(
         changed = as_colour_sees(frame, found)
         shift_m = frame.world_from_camera.inverse.apply(changed.world_from_camera.translation)
         write_depth(
-            store, frame.index, redrawn(images.depth(frame.index).metres, frame.depth_camera, changed.depth_camera, shift_m)
+            store,
+            frame.index,
+            reproject_depth(images.depth(frame.index).metres, frame.depth_camera, changed.depth_camera, shift_m),
         )
         registered.append(changed)
     right_mm, down_mm = -found.shift_mm[0], -found.shift_mm[1]
@@ -80,24 +81,3 @@ def as_colour_sees(frame: Frame, found: Registration) -> Frame:
         depth_camera=camera.resized(depth.width, depth.height),
         world_from_camera=frame.world_from_camera @ Rigid3(np.eye(3), centre_m),
     )
-
-
-def redrawn(depth_m: DepthMetres, source: Intrinsics, target: Intrinsics, target_at_m: np.ndarray) -> DepthMetres:
-    """The depth image reprojected into a camera at `target_at_m` in the source's frame; unknown where nothing projects.
-
-    Each pixel is splatted over the square it covers, in enough pieces to leave no gaps; the nearest depth is kept.
-    """
-    pieces = max(1, int(np.ceil(max(target.fx * source.width / (source.fx * target.width), 1.0) + 0.2)))
-    offsets = (np.arange(pieces) + 0.5) / pieces
-    rows, columns = np.nonzero(depth_m > 0)
-    z = depth_m[rows, columns].astype(np.float64) - target_at_m[2]
-    least = np.full(target.height * target.width, np.inf)
-    for down in offsets:
-        for across in offsets:
-            x = (columns + across - source.cx) / source.fx * depth_m[rows, columns] - target_at_m[0]
-            y = (rows + down - source.cy) / source.fy * depth_m[rows, columns] - target_at_m[1]
-            column = np.floor(x / z * target.fx + target.cx).astype(np.int64)
-            row = np.floor(y / z * target.fy + target.cy).astype(np.int64)
-            inside = (column >= 0) & (column < target.width) & (row >= 0) & (row < target.height)
-            np.minimum.at(least, row[inside] * target.width + column[inside], z[inside])
-    return np.where(np.isfinite(least), least, 0.0).astype(np.float32).reshape(target.height, target.width)

@@ -41,9 +41,9 @@ def film_along(knots: np.ndarray, eyes: np.ndarray, targets: np.ndarray, frames:
     times = np.linspace(0.0, SECONDS, frames)
     eye = Akima1DInterpolator(knots, eyes, method="makima")(times / SECONDS)
     target = Akima1DInterpolator(knots, targets, method="makima")(times / SECONDS)
-    eye += _tremor(rng, times, 3, 0.35) * 0.012 + _tremor(rng, times, 3, 0.08) * 0.0015
-    tilt = _tremor(rng, times, 3, 0.25) * np.radians([1.0, 1.0, 1.6]) + _tremor(rng, times, 3, 0.07) * np.radians(0.12)
-    gain = 1 + 0.035 * _tremor(rng, times, 1, 1.2)[:, 0]
+    eye += tremor(rng, times, 3, 0.35) * 0.012 + tremor(rng, times, 3, 0.08) * 0.0015
+    tilt = tremor(rng, times, 3, 0.25) * np.radians([1.0, 1.0, 1.6]) + tremor(rng, times, 3, 0.07) * np.radians(0.12)
+    gain = 1 + 0.035 * tremor(rng, times, 1, 1.2)[:, 0]
     blurred = rng.random(frames) < 0.06
     blur = np.where(blurred, rng.uniform(3, 8, frames), 0.0)
     return [
@@ -96,7 +96,7 @@ def _key_poses(kitchen: Kitchen, rng: np.random.Generator) -> tuple[np.ndarray, 
     return positions, np.array(targets)
 
 
-def _tremor(rng: np.random.Generator, times: np.ndarray, columns: int, period_s: float) -> np.ndarray:
+def tremor(rng: np.random.Generator, times: np.ndarray, columns: int, period_s: float) -> np.ndarray:
     """Smooth noise of unit variance; the same seed gives the same curve at every frame rate."""
     fine = gaussian_filter1d(rng.standard_normal((2000, columns)), period_s / SECONDS * 2000, axis=0, mode="wrap")
     fine /= fine.std(axis=0)

@@ -116,7 +116,7 @@ def photograph(
     """The frame as stored by a phone: motion blur, exposure, white balance, vignetting, noise."""
     image = colour
     if blur_px > 1:
-        image = np.asarray(cv2.filter2D(image, -1, _streak(blur_px, float(rng.uniform(0, np.pi)))), dtype=np.uint8)
+        image = np.asarray(cv2.filter2D(image, -1, streak(blur_px, float(rng.uniform(0, np.pi)))), dtype=np.uint8)
     height, width = image.shape[:2]
     y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j].astype(np.float32)
     fall = (1 - 0.07 * (x * x + y * y)).astype(np.float32) * np.float32(gain)
@@ -127,7 +127,7 @@ def photograph(
     return np.asarray(np.clip(noisy, 0, 255).astype(np.uint8))
 
 
-def _streak(length_px: float, angle_rad: float) -> np.ndarray:
+def streak(length_px: float, angle_rad: float) -> np.ndarray:
     half = int(np.ceil(length_px / 2))
     kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
     dx, dy = np.cos(angle_rad) * length_px / 2, np.sin(angle_rad) * length_px / 2

@@ -14,6 +14,7 @@ from r2c2r_core.arrays import Image
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.progress import SILENT, Progress
+from r2c2r_core.synthetic.as_filmed import film_as_real
 from r2c2r_core.synthetic.atlas import LitScene, front_patches, light_scene
 from r2c2r_core.synthetic.build import build_kitchen
 from r2c2r_core.synthetic.choices import SEEDS_OWN, Choice
@@ -62,6 +63,7 @@ def write_sample(
     frames: int = 180,
     size: tuple[int, int] = (960, 720),
     opened: bool = False,
+    as_filmed: bool = False,
     choice: Choice = SEEDS_OWN,
     name: str = "scan",
     progress: Progress = SILENT,
@@ -69,7 +71,8 @@ def write_sample(
 ) -> SamplePaths:
     """Write NAME.r3d, truth.json, prompts.json and truth_masks/ into `out`; size is (width, height) of the colour frames.
 
-    With `opened`, fronts are opened and closed during the recording (opening.py). `show` receives each colour frame.
+    With `opened`, fronts are opened and closed during the recording (opening.py); with `as_filmed`, it has the faults of real
+    recordings (as_filmed.py). `show` receives each colour frame.
     """
     paths = SamplePaths(
         scan=out / f"{name}.r3d", truth=out / "truth.json", prompts=out / "prompts.json", masks=out / "truth_masks"
@@ -107,7 +110,7 @@ def write_sample(
             yield frame
 
     with Record3DWriter(path=paths.scan, fps=round(frames / SECONDS)) as writer:
-        for number, frame in enumerate(progress.part(0.1, 1.0).each(taken(), "frame", frames)):
+        for number, frame in enumerate(progress.part(0.1, 0.8 if as_filmed else 1.0).each(taken(), "frame", frames)):
             shot, camera = shots[number], cameras[number]
             writer.add(frame.rgb, frame.lidar.depth_m, frame.lidar.confidence, camera, poses[number], shot.timestamp_s)
             sightings.add(
@@ -119,6 +122,8 @@ def write_sample(
     motions = {} if film is None else motion_entries(film, seen)
     _write_json(paths.truth, truth_document(objects, to_capture, sightings, motions))
     _write_json(paths.prompts, prompts_document(objects, sightings, np.random.default_rng([seed, 8])))
+    if as_filmed:
+        film_as_real(paths.scan, seed, progress.part(0.8, 1.0))
     return paths
 
 

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from r2c2r_core.geometry.camera import Intrinsics
+from r2c2r_core.geometry.camera import Intrinsics, reproject_depth
 from r2c2r_core.ingest.doctor import examine
-from r2c2r_core.ingest.registering import redrawn
 from r2c2r_core.ingest.stage import IngestConfig, read_capture
 
 from .corruptions import Corruption, corrupt_r3d, shifted_depth
@@ -71,7 +70,7 @@ def test_reprojected_depth_matches_depth_rendered_in_the_target_camera():
         normal = np.array([0.3, -0.1, 1.0])  # normal @ point = 1.5 m
         return ((1.5 - normal @ eye) / (normal[0] * x + normal[1] * y + normal[2])).astype(np.float32)
 
-    drawn = redrawn(plane(source, np.zeros(3)), source, target, at)
+    drawn = reproject_depth(plane(source, np.zeros(3)), source, target, at)
     inner = (slice(12, -12), slice(12, -12))
     assert (drawn[inner] > 0).all()  # no gaps, though each pixel is magnified
     assert np.abs(drawn - plane(target, at))[inner].max() < 0.004  # half a pixel of the slope
@@ -81,7 +80,7 @@ def test_the_nearer_surface_occludes_the_farther_one_when_reprojected():
     camera = Intrinsics(fx=100.0, fy=100.0, cx=50.0, cy=20.0, width=100, height=40)
     depth = np.full((40, 100), 2.0, np.float32)
     depth[:, 40:60] = 1.0
-    drawn = redrawn(depth, camera, camera, np.array([0.1, 0.0, 0.0]))
+    drawn = reproject_depth(depth, camera, camera, np.array([0.1, 0.0, 0.0]))
     assert (drawn[:, 30:50] == 1.0).all()  # shifted by 10 px, the surface behind it by 5
     assert set(np.unique(drawn[:, :30])) == {2.0}
     assert (drawn[:, 50:55] == 0).all()  # the area behind the near surface was not seen
