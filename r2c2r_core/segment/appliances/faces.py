@@ -40,7 +40,7 @@ class Patches(NamedTuple):
     points: Points
     axis: np.ndarray  # (n,) coordinate across the face: 0, 1 or 2
     face: np.ndarray  # (n,) parameter of the box that this coordinate measures
-    ends: dict[int, float]  # by LEFT and RIGHT: end of depth on the front, if within the search region
+    ends: dict[int, float]  # by LEFT, RIGHT and BACK: end of depth on the front, if within the search region, and on the sides
 
 
 def patches_on(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Patches:
@@ -76,20 +76,29 @@ def patches_on(box: np.ndarray, scene: Scene, world_from_front: Rigid3) -> Patch
         np.concatenate([np.zeros((0, 3)), *found.values()]),
         np.repeat([axes[face] for face in found], count).astype(int),
         np.repeat(list(found), count).astype(int),
-        _front_ends(points[on_front], box),
+        _front_ends(points[on_front], box) | _rear_end([points[chosen[side][0]] for side in (LEFT, RIGHT) if side in found]),
     )
 
 
 def _front_ends(points: Points, box: np.ndarray) -> dict[int, float]:
-    """Left and right end of depth on the front: the median over rows of patches."""
+    """Left and right end of depth on the front."""
     params, ends = tuned(Params), {}
-    rows = np.floor(points[:, 2] / params.patch_m).astype(int)
     for face, sign in ((LEFT, -1.0), (RIGHT, 1.0)):
-        reach = [float((sign * points[rows == row, 0]).max()) for row in np.unique(rows)]
-        limit = sign * float(box[face]) + params.shell_m - params.gap_m
-        if reach and np.median(reach) < limit:
-            ends[face] = sign * float(np.median(reach))
+        end = _end(points, sign * points[:, 0])
+        if end < sign * float(box[face]) + params.shell_m - params.gap_m:
+            ends[face] = sign * end
     return ends
+
+
+def _rear_end(sides: list[Points]) -> dict[int, float]:
+    """Rear end of depth on the sides, less what smeared depth may add behind them."""
+    return {BACK: max(_end(points, points[:, 1]) for points in sides) - tuned(Params).shell_m} if sides else {}
+
+
+def _end(points: Points, along: np.ndarray) -> float:
+    """Median over rows of patches of the farthest point along an axis; infinite without points."""
+    rows = np.floor(points[:, 2] / tuned(Params).patch_m).astype(int)
+    return float(np.median([along[rows == row].max() for row in np.unique(rows)])) if len(points) else np.inf
 
 
 def _surface_in(

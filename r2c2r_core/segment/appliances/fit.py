@@ -295,7 +295,7 @@ def _residuals(box: np.ndarray, evidence: Evidence, edges: Sequence[_Edges]) -> 
         limits.append(max(back - evidence.wall_m, 0.0) / params.wall_m)
     if evidence.support_m is not None:
         limits.append((bottom - evidence.support_m) / params.support_m)
-    beyond = {face: (1.0 if face == RIGHT else -1.0) * (box[face] - at) for face, at in evidence.patches.ends.items()}
+    beyond = {face: (-1.0 if face == LEFT else 1.0) * (box[face] - at) for face, at in evidence.patches.ends.items()}
     limits += [min(past - params.end_inset_m, 0.0) / params.end_m for past in beyond.values()]
     limits += list((back - np.clip(back, *evidence.rear_m.T)) / params.rear_m)
     turned = rotation_about_z(float(box[YAW]))

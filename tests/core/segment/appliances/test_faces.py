@@ -9,10 +9,11 @@ import pytest
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.transforms import Rigid3
 from r2c2r_core.model.capture import SceneSurface
-from r2c2r_core.segment.appliances.edges import FRONT, LEFT, RIGHT, TOP
-from r2c2r_core.segment.appliances.faces import patches_on
+from r2c2r_core.segment.appliances.edges import BACK, FRONT, LEFT, RIGHT, TOP
+from r2c2r_core.segment.appliances.faces import Params, patches_on
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.segment.surface import parts_of
+from r2c2r_core.tuning import tuned
 from tests.core.segment.appliances.drawn import TRUE
 
 HERE = Rigid3(np.eye(3), np.zeros(3))
@@ -68,6 +69,12 @@ def test_depth_on_the_front_has_an_end_only_where_depth_stops() -> None:
     found = patches_on(DEEP, scene_of(front), HERE).ends
     assert found.keys() == {LEFT}
     assert found[LEFT] == pytest.approx(-0.24, abs=CELL_M)
+
+
+def test_depth_on_a_side_ends_at_the_rear_less_what_smeared_depth_may_add() -> None:
+    side = sheet(0, 0.26, (0.0, 0.3), (-0.14, 0.14), 1)
+    ends = patches_on(DEEP, scene_of(side), HERE).ends
+    assert ends == {BACK: pytest.approx(0.3 - tuned(Params).shell_m, abs=CELL_M)}
 
 
 def test_a_face_with_almost_no_depth_has_no_patches() -> None:

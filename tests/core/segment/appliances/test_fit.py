@@ -111,6 +111,12 @@ def test_depth_beyond_a_line_on_the_front_moves_the_side_to_the_true_edge(short_
     assert solved(start, [photo(eye) for eye in EYES], patches=seen).box[RIGHT] == pytest.approx(RIGHT_M, abs=PIXEL_M)
 
 
+def test_a_box_is_at_least_as_deep_as_the_depth_on_its_sides() -> None:
+    usual = solved(TRUE, []).box[BACK]
+    seen = Patches(*NOTHING[:3], {BACK: usual + 0.03})
+    assert solved(TRUE, [], patches=seen).box[BACK] > usual + 0.02
+
+
 def test_an_edge_without_depth_beside_it_stays_in_place() -> None:
     dark = Patches(*NOTHING[:3], {LEFT: LEFT_M + 0.3})
     assert solved(TRUE, [photo(eye) for eye in EYES], patches=dark).box[LEFT] == pytest.approx(LEFT_M, abs=PIXEL_M)
