@@ -11,14 +11,20 @@ Gain = tuple[float, float, float]
 NO_GAIN: Gain = (1.0, 1.0, 1.0)
 
 
-_CLIPS_FROM = 200  # of 255: above, a channel may be clipped, and the true value is unknown
+_CLIPS_FROM = 200  # of 255: where all channels are above, they may be clipped, and the true value is unknown
 
 
 def balanced(rgb: Image, gain: Gain) -> Image:
-    """The image times its gain; the gain fades out towards white, which is white under any exposure."""
+    """The image times its gain; the gain fades out towards white, which is white under any exposure.
+
+    A pixel that is bright in some channels only is no white: it takes the gain, or it would keep its tint.
+    """
     if gain == NO_GAIN:
         return rgb
-    given = np.arange(256, dtype=np.float64)[:, None]
-    fade = np.clip((given - _CLIPS_FROM) / (255 - _CLIPS_FROM), 0.0, 1.0)
-    table = given * (np.asarray(gain) * (1.0 - fade) + fade)
-    return np.asarray(cv2.LUT(rgb, np.clip(np.round(table), 0, 255).astype(np.uint8)[None]))
+    table = np.clip(np.round(np.arange(256)[:, None] * np.asarray(gain)), 0, 255).astype(np.uint8)
+    image = np.asarray(cv2.LUT(rgb, table[None]))
+    darkest = cv2.min(cv2.min(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
+    bright = darkest > _CLIPS_FROM
+    fade = (darkest[bright, None] - np.float32(_CLIPS_FROM)) / (255 - _CLIPS_FROM)
+    image[bright] = np.round(image[bright] * (1.0 - fade) + rgb[bright] * fade)
+    return image

@@ -13,6 +13,7 @@ import numpy as np
 
 from r2c2r_core.arrays import DepthMetres, Image, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics, pixel_rays
+from r2c2r_core.geometry.light import balanced
 from r2c2r_core.geometry.visibility import DepthNoise, look_up
 from r2c2r_core.model.capture import Capture, Frame
 from r2c2r_core.progress import SILENT, Progress
@@ -93,8 +94,8 @@ class Scene:
         return np.asarray(self._camera_from_world @ np.append(point_world, 1.0))
 
     def rgb(self, frame_index: int) -> Image:
-        """Colour image; the most recent few hundred megabytes stay in memory."""
-        return self._rgb.get(frame_index, self.capture.images.rgb)
+        """Colour image under the recording's common exposure; the most recent few hundred megabytes stay in memory."""
+        return self._rgb.get(frame_index, lambda index: balanced(self.capture.images.rgb(index), self.frame(index).gain))
 
     def depth(self, frame_index: int) -> DepthMetres:
         """Sensor depth in metres, float32, 0 where the sensor has none."""

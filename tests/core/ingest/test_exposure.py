@@ -90,3 +90,8 @@ def test_gain_keeps_white_at_255_and_is_monotonic():
         assert np.allclose(out[:140], np.minimum(np.arange(140)[:, None] * gain, 255), atol=1)
         assert (np.diff(out, axis=0) >= -1).all()
     assert balanced(ramp, NO_GAIN) is ramp
+
+
+def test_a_pixel_with_one_clipped_channel_takes_the_gain_of_all() -> None:
+    lavender = np.full((1, 1, 3), (190, 195, 250), np.uint8)
+    assert balanced(lavender, (0.8, 0.8, 0.65)).ravel().tolist() == [152, 156, 162]
