@@ -34,11 +34,8 @@ _EXPOSURE_S, _MOST_BLUR = 1 / 30, 8 / 640  # the longest motion blur is a fracti
 _DEPTH_FOCAL, _DEPTH_AT_M = 585 / 526, np.array([-0.033, 0.0028, 0.0])  # times the colour camera's; in its frame
 _DARK, _GRAZING = 40, 0.2  # grey level of 255, and cosine of the view, below which depth is lost
 _JUMP, _SMEAR_PX = (0.03, 0.03), 1.0  # a depth edge: at 0 m, and increase per metre; sigma of its blur
-_LEAST_PX, _MOST_CUT, _CUT = (
-    400,
-    0.3,
-    0.03,
-)  # pixels that show an object; fractions of the rows: cut off at most, and of an object at least
+_LEAST_PX = 400  # of an object, from which a frame shows it
+_MOST_CUT, _CUT = 0.3, 0.03  # fractions of the rows: cut off at most, and of the object at least
 
 
 def film_as_real(recording: Path, seed: int, progress: Progress = SILENT) -> None:
@@ -145,15 +142,14 @@ def _entry(chair: Chair) -> dict[str, Any]:
 
 def _floor_m(film: Film) -> float:
     """Height of the floor in the capture's frame: the lowest level with many points."""
-    heights = []
+    found = []
     for frame in range(0, len(film.poses), 10):
-        points = depth_points(
-            film.depth_m(frame)[::4, ::4], film.depth_camera(frame).resized(*(n // 4 for n in film.depth_size))
-        )
-        heights.append(film.poses[frame].apply(points[points[..., 2] > 0])[:, 1])
-    counts, edges = np.histogram(np.concatenate(heights), bins=np.arange(-3.0, 3.0, 0.01))
-    peak = int(np.flatnonzero(counts > 0.3 * np.sort(counts)[-10:].mean())[0])
-    return float(np.median([h for h in np.concatenate(heights) if edges[peak] - 0.01 < h < edges[peak] + 0.03]))
+        points = depth_points(film.depth_m(frame), film.depth_camera(frame))[::4, ::4]
+        found.append(film.poses[frame].apply(points[points[..., 2] > 0])[:, 1])
+    heights = np.concatenate(found)
+    counts, edges = np.histogram(heights, bins=np.arange(-3.0, 3.0, 0.01))
+    lowest = edges[np.argmax(counts > 0.3 * np.sort(counts)[-10:].mean())]
+    return float(np.median(heights[(heights > lowest - 0.01) & (heights < lowest + 0.03)]))
 
 
 def _chair_pixels(film: Film, frame: int, chair: Chair) -> np.ndarray:
