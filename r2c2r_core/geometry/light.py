@@ -21,10 +21,9 @@ def balanced(rgb: Image, gain: Gain) -> Image:
     """
     if gain == NO_GAIN:
         return rgb
-    table = np.clip(np.round(np.arange(256)[:, None] * np.asarray(gain)), 0, 255).astype(np.uint8)
-    image = np.asarray(cv2.LUT(rgb, table[None]))
-    darkest = cv2.min(cv2.min(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
-    bright = darkest > _CLIPS_FROM
-    fade = (darkest[bright, None] - np.float32(_CLIPS_FROM)) / (255 - _CLIPS_FROM)
-    image[bright] = np.round(image[bright] * (1.0 - fade) + rgb[bright] * fade)
-    return image
+    values = np.arange(256)
+    table = np.clip(np.round(values[:, None] * np.asarray(gain)), 0, 255).astype(np.uint8)
+    white = np.clip((values - _CLIPS_FROM) / (255 - _CLIPS_FROM), 0, 1).astype(np.float32)
+    red, green, blue = cv2.split(rgb)
+    fade = cv2.LUT(cv2.min(cv2.min(red, green), blue), white)
+    return np.asarray(cv2.blendLinear(rgb, cv2.LUT(rgb, table[None]), fade, 1 - fade))
