@@ -63,6 +63,7 @@ class Scene:
     _frames: dict[int, Frame] = field(default_factory=dict)
     _camera_from_world: np.ndarray | None = None
     _rgb: "_Recent[Image]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES))
+    _balanced: "_Recent[Image]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES // 2))
     _depth: "_Recent[DepthMetres]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES // 4))
     _filled: "_Recent[DepthMetres]" = field(default_factory=lambda: _Recent(_IMAGE_CACHE_BYTES // 4))
 
@@ -94,8 +95,12 @@ class Scene:
         return np.asarray(self._camera_from_world @ np.append(point_world, 1.0))
 
     def rgb(self, frame_index: int) -> Image:
-        """Colour image under the recording's common exposure; the most recent few hundred megabytes stay in memory."""
-        return self._rgb.get(frame_index, lambda index: balanced(self.capture.images.rgb(index), self.frame(index).gain))
+        """Colour image; the most recent few hundred megabytes stay in memory."""
+        return self._rgb.get(frame_index, self.capture.images.rgb)
+
+    def balanced(self, frame_index: int) -> Image:
+        """Colour image under the recording's common exposure and white balance."""
+        return self._balanced.get(frame_index, lambda index: balanced(self.rgb(index), self.frame(index).gain))
 
     def depth(self, frame_index: int) -> DepthMetres:
         """Sensor depth in metres, float32, 0 where the sensor has none."""

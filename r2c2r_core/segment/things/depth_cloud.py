@@ -137,7 +137,7 @@ def _points_in(scene: Scene, frame: Frame, region: Region) -> tuple[Points, np.n
     world = frame.world_from_camera.apply(depth_points(scene.depth(frame.index), camera)[::step, ::step].reshape(-1, 3))
     world = raised(world, -region.lift(scene, frame))
     inside = region.holds(world) & (depth.ravel() > 0)
-    small = cv2.resize(scene.rgb(frame.index), (camera.width, camera.height), interpolation=cv2.INTER_AREA)[::step, ::step]
+    small = cv2.resize(scene.balanced(frame.index), (camera.width, camera.height), interpolation=cv2.INTER_AREA)[::step, ::step]
     lab = cv2.cvtColor(np.ascontiguousarray(small), cv2.COLOR_RGB2LAB).reshape(-1, 3)
     return world[inside], lab[inside].astype(np.float32)
 

@@ -70,7 +70,7 @@ def small_mask(thing: Thing, scene: Scene, frame: Frame, band_m: float | None = 
     mask = np.zeros((frame.rgb_camera.height, frame.rgb_camera.width), bool)
     crop, outline, share = crop_outline(thing, scene, frame, band_m)
     if crop is not None:
-        mask[crop.area] = _at_full(outline, crop, scene.rgb(frame.index)[crop.area])
+        mask[crop.area] = _at_full(outline, crop, scene.balanced(frame.index)[crop.area])
     return mask, share
 
 
@@ -87,7 +87,7 @@ def crop_outline(
     if share < 0.08:
         return None, nothing, 0.0
     scale = crop.scale
-    rgb = crop.rgb(scene.rgb(frame.index))
+    rgb = crop.rgb(scene.balanced(frame.index))
     odds = seen_odds(thing, scene, frame, crop)
     shift = _best_shift(crop.hull, odds, colour_gradient(rgb), reach_px=round(thing.pose_error_m * scale))
     hull = _moved(crop.hull, shift)
@@ -122,7 +122,7 @@ def seen_odds(thing: Thing, scene: Scene, frame: Frame, crop: Crop) -> np.ndarra
     """Log-odds of a crop's pixels by the frame's own depth (above the support) and colour."""
     odds = _depth_odds(thing, scene, frame, crop)
     if thing.colours is not None:
-        odds = odds + unmixed(thing.colours.odds(cv2.cvtColor(crop.rgb(scene.rgb(frame.index)), cv2.COLOR_RGB2LAB)))
+        odds = odds + unmixed(thing.colours.odds(cv2.cvtColor(crop.rgb(scene.balanced(frame.index)), cv2.COLOR_RGB2LAB)))
     return odds
 
 
@@ -133,7 +133,7 @@ def colours_of(thing: Thing, scene: Scene, views: list[Frame], band_m: float) ->
         crop, mask, share = crop_outline(thing, scene, frame, band_m)
         if crop is None or share < 0.8 or not mask.any():
             continue
-        lab = cv2.cvtColor(crop.rgb(scene.rgb(frame.index)), cv2.COLOR_RGB2LAB)
+        lab = cv2.cvtColor(crop.rgb(scene.balanced(frame.index)), cv2.COLOR_RGB2LAB)
         odds = _depth_odds(thing, scene, frame, crop)
         inner = cv2.erode(mask.astype(np.uint8), _round(0.25 * band_m * crop.scale)) > 0
         outer = cv2.dilate(mask.astype(np.uint8), _round(0.5 * band_m * crop.scale)) > 0
@@ -147,7 +147,7 @@ def usual_shift(thing: Thing, scene: Scene, views: list[Frame]) -> float:
     for frame in views:
         crop = hull_crop(thing, scene, frame)
         if crop is not None:
-            gradient, odds = colour_gradient(crop.rgb(scene.rgb(frame.index))), seen_odds(thing, scene, frame, crop)
+            gradient, odds = colour_gradient(crop.rgb(scene.balanced(frame.index))), seen_odds(thing, scene, frame, crop)
             moved = _best_shift(crop.hull, odds, gradient, round(thing.pose_error_m * crop.scale))
             shifts.append(float(np.hypot(*moved)) / crop.scale)
     return float(np.median(shifts)) if shifts else 0.0

@@ -90,7 +90,7 @@ def standing_mask(found: Standing, scene: Scene, frame: Frame) -> tuple[Mask, fl
     odds[~crop.reach] = -params.far_odds
     odds[crop.hidden & ~crop.on] -= params.far_odds
     small = cut_pixels(crop.rgb, odds, params.cut_px)
-    photo = scene.rgb(frame.index)[crop.area]
+    photo = scene.balanced(frame.index)[crop.area]
     height, width = photo.shape[:2]
     grown = np.asarray(cv2.resize(small.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR) > 0.5)
     cell = max(height, width) / min(params.cut_px, max(small.shape))
@@ -123,7 +123,7 @@ def _crop_of(found: Standing, scene: Scene, frame: Frame) -> _Crop | None:
     voxels = splat(project(local, small), (small.height, small.width), found.size_m * scale / shrink) > 0
     reach = _hull_of(project(_with_feet(found, frame, lift), small), small, params.reach_m * scale / shrink)
     label, nearer = _depth_labels(found, scene, frame, small, lift)
-    part = scene.rgb(frame.index)[area]
+    part = scene.balanced(frame.index)[area]
     rgb = cv2.resize(part, (small.width, small.height), interpolation=cv2.INTER_AREA)
     return _Crop(area, small, scale / shrink, voxels, label == ON, label == OFF, reach, nearer, np.asarray(rgb))
 

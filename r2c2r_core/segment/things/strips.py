@@ -109,7 +109,7 @@ def views_of(scene: Scene, frames: Sequence[Frame], foot: Vector3, reach_m: floa
             continue
         area = (slice(int(top), int(bottom)), slice(int(left), int(right)))
         small = shrunk(camera, area)
-        part = cv2.resize(scene.rgb(frame.index)[area], (small.width, small.height), interpolation=cv2.INTER_AREA)
+        part = cv2.resize(scene.balanced(frame.index)[area], (small.width, small.height), interpolation=cv2.INTER_AREA)
         yield View(frame, np.asarray(cv2.cvtColor(part, cv2.COLOR_RGB2LAB), np.uint8), small, lift)
 
 

@@ -208,7 +208,7 @@ def _refined(mask: Mask, scene: Scene, frame: Frame) -> Mask:
     area = box_around(mask, 24)
     band = int(np.clip(np.sqrt(mask.sum()) / 10, 2, max(4, frame.rgb_camera.width / 110)))
     result = np.zeros_like(mask)
-    result[area] = refine_border(scene.rgb(frame.index)[area], mask[area], band)
+    result[area] = refine_border(scene.balanced(frame.index)[area], mask[area], band)
     return result
 
 
@@ -348,7 +348,7 @@ def _views_of(scene: Scene, centre: Vector3, reach_m: float, most: int = 40) -> 
         inside = (depth > 0) & (away < reach_m**2)
         if inside.sum() < 30:
             continue
-        colour = cv2.resize(scene.rgb(index), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+        colour = cv2.resize(scene.balanced(index), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
         views.append(DepthView(np.where(inside, depth, 0).astype(np.float32), camera, frame.world_from_camera, colour))
     return views
 
