@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from recordings import recording_in
+from recordings import recording_in, write_masks_by_name
 from whole_way import CLI, REPOSITORY
 
 from r2c2r_core.synthetic.as_filmed import film_as_real
@@ -53,11 +53,11 @@ def _second(seed: int) -> GuardedKitchen:
 
 
 def _second_as_filmed(seed: int) -> GuardedKitchen:
-    return replace(
-        _second(seed),
-        run_options=AS_FILMED,
-        finish=lambda folder: film_as_real(recording_in(folder), seed),
-    )
+    def finish(folder: Path) -> None:
+        write_masks_by_name(folder)
+        film_as_real(recording_in(folder), seed)
+
+    return replace(_second(seed), run_options=AS_FILMED, finish=finish)
 
 
 def _second_opened(seed: int) -> GuardedKitchen:

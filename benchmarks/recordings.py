@@ -1,6 +1,7 @@
 """Recordings with ground truth, of either sample generator: true masks, clicks on the frames that were read, random clicks."""
 
 import json
+import shutil
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -49,6 +50,18 @@ def true_masks(folder: Path) -> TrueMask:
         return np.asarray(image > 127) if own.exists() else np.asarray(image == order.index(name) + 1)
 
     return mask
+
+
+def write_masks_by_name(folder: Path) -> None:
+    """Replace masks/, images of object numbers, by truth_masks/NAME/ as `r2c2r sample` writes them."""
+    for number, item in enumerate(json.loads((folder / "truth.json").read_text())["objects"], 1):
+        own = folder / "truth_masks" / item["name"]
+        own.mkdir(parents=True)
+        for path in sorted((folder / "masks").glob("*.png")):
+            mask = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) == number
+            if mask.any():
+                cv2.imwrite(str(own / path.name), mask.astype(np.uint8) * np.uint8(255))
+    shutil.rmtree(folder / "masks")
 
 
 def clicked(folder: Path, frames: Sequence[int]) -> Prompts:

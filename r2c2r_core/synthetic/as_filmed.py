@@ -39,7 +39,7 @@ _MOST_CUT, _CUT = 0.3, 0.03  # fractions of the rows: cut off at most, and of th
 
 
 def film_as_real(recording: Path, seed: int, progress: Progress = SILENT) -> None:
-    """Rewrite a recording in place, with truth.json, prompts.json and the true masks beside it.
+    """Rewrite a recording in place, with truth.json, prompts.json and truth_masks/ beside it, as `r2c2r sample` writes them.
 
     A chair is added, also to the truth. An object's true pose is bent by the mean error of the frames that show it. Rows are
     cut off the top until no frame shows some object whole. Depth is that of a separate camera: read it with --register-depth.
@@ -49,7 +49,7 @@ def film_as_real(recording: Path, seed: int, progress: Progress = SILENT) -> Non
     things, frames = truth["objects"], range(len(film.poses))
     chair = place_chair(things, _floor_m(film), rng)
     things.append(_entry(chair))
-    masks = TrueMasks(folder=folder, names=[each["name"] for each in things], size=film.colour(0).shape[:2])
+    masks = TrueMasks(folder=folder / "truth_masks", names=[each["name"] for each in things], size=film.colour(0).shape[:2])
 
     def cover(frame: int) -> np.ndarray:
         numbers = np.where(_chair_pixels(film, frame, chair), len(things), masks.read(frame)).astype(np.uint8)

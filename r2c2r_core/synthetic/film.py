@@ -58,7 +58,7 @@ class Film:
 
 @dataclass(frozen=True, kw_only=True)
 class TrueMasks:
-    """True masks beside a recording: truth_masks/NAME/ as `r2c2r sample` writes them, or images of object numbers in masks/."""
+    """True masks beside a recording, NAME/NNNNNN.png in a folder."""
 
     folder: Path
     names: Sequence[str]  # of the objects, in the order of truth.json
@@ -66,11 +66,9 @@ class TrueMasks:
 
     def read(self, frame: int) -> np.ndarray:
         """Number of the object in each pixel (h, w), from 1; 0 where there is none."""
-        if not self._own.exists():
-            return np.asarray(cv2.imread(str(self.folder / "masks" / _file(frame)), cv2.IMREAD_UNCHANGED))
         numbers = np.zeros(self.size, np.uint8)
         for number, name in enumerate(self.names, 1):
-            path = self._own / name / _file(frame)
+            path = self.folder / name / f"{frame:06d}.png"
             if path.exists():
                 mask = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) > 127
                 numbers = numbers[-len(mask) :]
@@ -79,21 +77,9 @@ class TrueMasks:
 
     def write(self, frame: int, numbers: np.ndarray) -> None:
         """Replace the masks of a frame."""
-        if not self._own.exists():
-            cv2.imwrite(str(self.folder / "masks" / _file(frame)), numbers)
-            return
         for number, name in enumerate(self.names, 1):
-            path, mask = self._own / name / _file(frame), numbers == number
-            if not mask.any():
-                path.unlink(missing_ok=True)
-                continue
-            path.parent.mkdir(exist_ok=True)
-            cv2.imwrite(str(path), mask.astype(np.uint8) * np.uint8(255))
-
-    @property
-    def _own(self) -> Path:
-        return self.folder / "truth_masks"
-
-
-def _file(frame: int) -> str:
-    return f"{frame:06d}.png"
+            path, mask = self.folder / name / f"{frame:06d}.png", numbers == number
+            path.unlink(missing_ok=True)
+            if mask.any():
+                path.parent.mkdir(exist_ok=True)
+                cv2.imwrite(str(path), mask.astype(np.uint8) * np.uint8(255))

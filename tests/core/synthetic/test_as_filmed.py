@@ -4,7 +4,6 @@ import json
 import shutil
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
@@ -22,18 +21,10 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_sample(tmp_path_factory.mktemp("clean"), seed=0, frames=8, size=SIZE).scan.parent
 
 
-@pytest.fixture(scope="module", params=["folders", "numbers"])
-def filmed(request: pytest.FixtureRequest, clean: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A sample with the faults; its true masks as a folder per object, or as images of object numbers."""
+@pytest.fixture(scope="module")
+def filmed(clean: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("filmed") / "kitchen"
     shutil.copytree(clean, folder)
-    if request.param == "numbers":
-        (folder / "masks").mkdir()
-        own = masks_of(folder)
-        images = [own.read(frame) for frame in range(8)]
-        shutil.rmtree(folder / "truth_masks")
-        for frame, numbers in enumerate(images):
-            cv2.imwrite(str(folder / "masks" / f"{frame:06d}.png"), numbers)
     film_as_real(folder / "scan.r3d", seed=3)
     return folder
 
@@ -43,7 +34,7 @@ def truth_of(folder: Path) -> list[dict]:
 
 
 def masks_of(folder: Path) -> TrueMasks:
-    return TrueMasks(folder=folder, names=[each["name"] for each in truth_of(folder)], size=SIZE[::-1])
+    return TrueMasks(folder=folder / "truth_masks", names=[each["name"] for each in truth_of(folder)], size=SIZE[::-1])
 
 
 def colour_view(film: Film, frame: int) -> tuple[Intrinsics, Rigid3]:
