@@ -128,6 +128,7 @@ def photograph(
 
 
 def streak(length_px: float, angle_rad: float) -> np.ndarray:
+    """Convolution kernel of straight motion blur."""
     half = int(np.ceil(length_px / 2))
     kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
     dx, dy = np.cos(angle_rad) * length_px / 2, np.sin(angle_rad) * length_px / 2

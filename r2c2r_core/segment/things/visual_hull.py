@@ -297,7 +297,7 @@ def _silhouette_share(thing: Thing, voxels: Voxels, scene: Scene, views: list[Fr
         outlined, in_crop = sample_nearest(mask, uv)
         hidden, _ = sample_nearest(crop.hidden, uv)
         in_mask = outlined & in_crop
-        _, valid = sample_nearest(scene.balanced(frame.index), project(local, frame.rgb_camera))
+        _, valid = sample_nearest(scene.rgb(frame.index), project(local, frame.rgb_camera))
         valid &= ~(hidden & in_crop) | in_mask
         seen += valid
         inside += valid & in_mask

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,15 +40,12 @@ def masks_of(folder: Path) -> TrueMasks:
 
 def colour_view(film: Film, frame: int) -> tuple[Intrinsics, Rigid3]:
     """The colour camera and its pose, from the depth camera's that the file states."""
-    camera = film.cameras[frame]
-    focal = 526 / 585
-    colour = Intrinsics(
-        fx=camera.fx * focal, fy=camera.fy * focal, cx=camera.cx, cy=camera.cy, width=camera.width, height=camera.height
-    )
+    camera, focal = film.cameras[frame], 526 / 585
+    colour = replace(camera, fx=camera.fx * focal, fy=camera.fy * focal)
     return colour, film.poses[frame] @ Rigid3(np.eye(3), np.array([0.033, -0.0028, 0.0]))
 
 
-def test_a_single_frame_shows_objects_where_the_truth_has_them(clean: Path, tmp_path: Path) -> None:
+def test_a_single_frame_shows_objects_where_the_truth_has_them(tmp_path: Path) -> None:
     write_sample(tmp_path, seed=0, frames=1, size=SIZE)
     film_as_real(tmp_path / "scan.r3d", seed=3)
     film = Film.read(tmp_path / "scan.r3d")
