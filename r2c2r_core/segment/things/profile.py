@@ -28,9 +28,6 @@ class Params:
     )
     most_odds: float = param(3.0, "log", "Maximum absolute log-odds of a view's colour given the other views", gt=0)
     beside: float = param(2 / 3, "share", "Fraction of the searched radii beyond which only the background shows", gt=0, lt=1)
-    sure_odds: float = param(
-        3.0, "log", "Log-odds against the body where all nearby depth belongs to another surface: so do the colours there"
-    )
     border: float = param(
         12.0,
         "score",
@@ -70,7 +67,7 @@ def profile_evidence(strips: Strips, colours: Colours) -> tuple[np.ndarray, np.n
     coloured = np.stack([unmixed(view) for view in colours.odds(strips)])
     lab = strips.lab.astype(np.float32)
     coloured = np.logaddexp(coloured, _by_other_views(lab, strips.shown)) - np.log(2)
-    odds = np.where(strips.another, -params.sure_odds, strips.depth_odds + params.colour * coloured)
+    odds = strips.depth_odds + params.colour * coloured
     half = lab.shape[2] // 2
     across = np.pad(np.linalg.norm(np.diff(lab, axis=2), axis=3), ((0, 0), (0, 0), (0, 1)))
     across = np.concatenate([across[:, :, :half], np.roll(across, 1, axis=2)[:, :, half:]], axis=2)

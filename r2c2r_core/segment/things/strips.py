@@ -82,7 +82,6 @@ class Strips(NamedTuple):
 
     lab: np.ndarray  # (..., 3) uint8
     depth_odds: np.ndarray
-    another: np.ndarray  # bool: all depth around the place belongs to another surface
     hidden: np.ndarray  # bool
     on_support: np.ndarray  # bool: what lies behind the place is the support
 
@@ -143,11 +142,7 @@ def _strip(view: View, site: Site, foot: Vector3, grid: Grid) -> Strips:
     odds = np.clip(room * (room / 2 - beyond) / noise**2, -params.off_odds, params.on_odds) * known
     before = -(2 * grid.cells * grid.cell_m + params.hides_m + 3 * noise)
     hidden = outside | (known & (beyond < before))
-    pixel_m = float(np.median(z)) / frame.depth_camera.fx
-    reach = [2 * round(pixel_m / size) + 1 for size in (grid.level_m, grid.cell_m)]
-    off = (odds <= -params.off_odds).reshape(shape).astype(np.uint8)
-    another = cv2.erode(off, np.ones(reach, np.uint8)) > 0
-    return Strips(lab, odds.reshape(shape), another, hidden.reshape(shape), (on_support < to_wall).reshape(shape))
+    return Strips(lab, odds.reshape(shape), hidden.reshape(shape), (on_support < to_wall).reshape(shape))
 
 
 def _room_behind(rays: Points, z_m: np.ndarray, eye: Vector3, foot: Vector3, site: Site) -> tuple[np.ndarray, np.ndarray]:

@@ -103,7 +103,7 @@ def test_a_neck_is_detected_by_its_consistent_colour_in_all_views() -> None:
     lab[neck] = 90 + rng.integers(0, 6, lab[neck].shape)
     nothing = np.zeros(lab.shape[:3])
     unknown = ColourModel(np.zeros((16, 32, 32), np.float32))
-    strips = Strips(lab, nothing, nothing > 0, nothing > 0, nothing > 0)
+    strips = Strips(lab, nothing, nothing > 0, nothing > 0)
     odds, _, _ = profile_evidence(strips, Colours(unknown, unknown, unknown))
     assert (odds[:15, :radius] > 0.5).all()
     assert (odds[:, radius:] < 0).all()
