@@ -17,6 +17,7 @@ from r2c2r_core.model.inputs import HingeSide
 from r2c2r_core.model.rectangle import TOWARDS, Rectangle3
 from r2c2r_core.model.track import FrontHandle, FrontPanel
 from r2c2r_core.segment.fronts.units import unit_cell
+from r2c2r_core.segment.fronts.unseen import with_unseen_top
 from r2c2r_core.segment.mosaics.edges import panel_edges, surface_of
 from r2c2r_core.segment.mosaics.handles import GridHandle, find_handle
 from r2c2r_core.segment.mosaics.orthomosaic import Cell, PlaneGrid, joined
@@ -131,6 +132,7 @@ def find_front(
     refined = panel_edges(cell, surface, run.grid.cell_m)
     panel = clear_of_strips(refined, surface, run.grid.cell_m)
     strips = panel.top - refined.top, refined.bottom - panel.bottom
+    panel = with_unseen_top(panel, run, kind)
     return Front(run, panel, own_handle(handle, panel), 0.0, strips=strips)
 
 
@@ -410,7 +412,8 @@ def _edge_strengths(front: Front, changes: Iterable[float]) -> tuple[float, ...]
 def seam_inside(front: Front) -> float:
     """Probability of the likeliest uncut seam inside a panel."""
     params, field = tuned(Params), LineField(front.run.odds, front.run.grid.cell_m)
-    return probability(field.best_uncut(front.cell, params.border_m, params.faintest))
+    shown = replace(front.cell, top=max(front.cell.top, 0.0))
+    return probability(field.best_uncut(shown, params.border_m, params.faintest))
 
 
 _SIDE_EDGES: dict[HingeSide, tuple[int, int]] = {"left": (0, 3), "right": (1, 2), "bottom": (2, 3), "top": (0, 1)}

@@ -35,8 +35,8 @@ def _changes(values: np.ndarray, at: float, low: float, high: float) -> np.ndarr
     first, last, start, stop = round(low + _CORNER), round(high - _CORNER), max(int(at) - _OFF, 0), int(at) + _OFF + 1
     begin = max(start - 5, 0)
     around = values[first:last, begin : stop + 5]
-    if len(around) < _PARTS or around.shape[1] < stop - begin:
-        return np.zeros((_PARTS, stop - start))
+    if len(around) < _PARTS or stop <= start or around.shape[1] < stop - begin:
+        return np.zeros((_PARTS, max(stop - start, 1)))
     parts = np.arange(_PARTS) * len(around) // _PARTS
     means = np.add.reduceat(around, parts, axis=0) / np.diff(parts, append=len(around))[:, None, None]
     padded = np.pad(means, ((0, 0), (4, 4), (0, 0)), mode="edge")
