@@ -1,21 +1,15 @@
 """Masks of tables and worktops without the clicked objects that stand on them: thin ones differ from the top only in colour."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from r2c2r_core.geometry.masks import pack_mask, unpack_mask
 from r2c2r_core.kitchen.names import category_of
 from r2c2r_core.model.track import MaskTrack
-from r2c2r_core.tuning import param, tuned
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Tuned parameters of what stands on a slab."""
-
-    on_slab_m: float = param(0.05, "m", "Maximum distance of an underside from the slab under it", source="scans bend by 3 cm")
+_ON_SLAB_M = 0.05  # maximum distance of an underside from the slab under it (scans bend by 3 cm)
 
 
 def stands_on(thing: MaskTrack, slab: MaskTrack) -> bool:
@@ -27,7 +21,7 @@ def stands_on(thing: MaskTrack, slab: MaskTrack) -> bool:
     height, place = slab.box.dimensions_m[2] / 2, slab.box.world_from_object
     local = place.inverse.apply(thing.box.world_from_object.translation)
     over = bool((np.abs(local[:2]) < slab.box.dimensions_m[:2] / 2).all())
-    return over and abs(thing.box.support_z_m - float(place.translation[2] + height)) < tuned(Params).on_slab_m
+    return over and abs(thing.box.support_z_m - float(place.translation[2] + height)) < _ON_SLAB_M
 
 
 def without_things(slab: MaskTrack, things: Sequence[MaskTrack]) -> MaskTrack:

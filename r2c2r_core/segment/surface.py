@@ -8,17 +8,12 @@ from r2c2r_core.arrays import Faces, Points, Vector3
 from r2c2r_core.geometry.camera import Intrinsics
 from r2c2r_core.geometry.raster import rasterize
 from r2c2r_core.model.capture import Frame, SceneSurface
-from r2c2r_core.tuning import param, tuned
 
 _PART_M = 0.5
 _NONE = np.zeros(0, np.int64)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Tuned parameters of the rendered surface."""
-
-    width_px: int = param(256, "px", "Width of the rendered depth image: the occluders that sensors miss are broad", ge=16)
+_WIDTH_PX = 256  # width of the rendered depth image: the occluders that sensors miss are broad
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,8 +111,7 @@ def draw(parts: SurfaceParts, frame: Frame) -> np.ndarray:
 
 def drawn_size(camera: Intrinsics) -> tuple[int, int]:
     """Width and height of the rendered depth image."""
-    params = tuned(Params)
-    return params.width_px, max(1, round(params.width_px * camera.height / camera.width))
+    return _WIDTH_PX, max(1, round(_WIDTH_PX * camera.height / camera.width))
 
 
 def _may_be_seen(parts: SurfaceParts, frame: Frame) -> np.ndarray:

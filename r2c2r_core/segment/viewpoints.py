@@ -1,26 +1,17 @@
 """View selection: sharp, near frames in which a point is unoccluded, spread over directions."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from r2c2r_core.arrays import Vector3
 from r2c2r_core.geometry.camera import project
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.tuning import param, tuned
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Tuned parameters of the view selection."""
-
-    hidden_m: float = param(0.08, "m", "Maximum distance of a visible click behind the frame's depth: handles, glass")
+_HIDDEN_M = 0.08  # maximum distance of a visible click behind the frame's depth: handles, glass
 
 
 def best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
     """Frames in which the point is unoccluded, spread over viewing directions."""
-    params = tuned(Params)
     rated: list[tuple[float, Frame, float]] = []
     for frame, local in zip(scene.frames, scene.seen_from_all(point), strict=True):
         camera = frame.rgb_camera
@@ -32,7 +23,7 @@ def best_views(scene: Scene, point: Vector3, count: int) -> list[Frame]:
             continue
         seen = scene.filled_depth(frame.index)
         row, column = int(v * seen.shape[0] / camera.height), int(u * seen.shape[1] / camera.width)
-        if scene.noise.occluded(seen[row, column], local[2], params.hidden_m):
+        if scene.noise.occluded(seen[row, column], local[2], _HIDDEN_M):
             continue
         away = point - frame.world_from_camera.translation
         rated.append((float(np.sqrt(max(frame.sharpness, 1e-3)) / local[2]), frame, float(np.arctan2(away[1], away[0]))))

@@ -15,16 +15,8 @@ from r2c2r_core.segment.motion.board import open_mask
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.motion.leaf import Leaf
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.tuning import param, tuned
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Tuned parameters of the masks' confidence."""
-
-    border_m: float = param(
-        0.009, "m", "Usual position error of a mask's border", source="measured on samples and the real kitchen"
-    )
+_BORDER_M = 0.009  # usual position error of a mask's border (measured on samples and the real kitchen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +43,7 @@ class FoundAppliance:
         mask, share = appliance_mask(self.front, self.scene, frame)
         for opened in self._leaves.open_in(frame.index):
             mask = mask | open_mask(opened, self.scene, frame)[0]
-        return View(mask, expected_iou(mask, share, frame, self.front.outline.corners, tuned(Params).border_m))
+        return View(mask, expected_iou(mask, share, frame, self.front.outline.corners, _BORDER_M))
 
     def panel(self) -> FrontPanel | None:
         """Front rectangle with its handle."""

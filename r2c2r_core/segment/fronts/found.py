@@ -15,16 +15,8 @@ from r2c2r_core.segment.motion.board import open_mask
 from r2c2r_core.segment.motion.filmed import FilmedLeaves
 from r2c2r_core.segment.motion.leaf import Leaf, OpenLeaf
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.tuning import param, tuned
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Tuned parameters of the masks' confidence."""
-
-    border_m: float = param(
-        0.006, "m", "Usual position error of a mask's border", source="measured on samples and the real kitchen"
-    )
+_BORDER_M = 0.006  # usual position error of a mask's border (measured on samples and the real kitchen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +42,7 @@ class FoundFront:
         if opened:
             return self._opened(opened, frame)
         mask, share = front_mask(self.front, self.scene, frame)
-        return View(mask, expected_iou(mask, share, frame, self.front.outline.corners, tuned(Params).border_m, self.fit))
+        return View(mask, expected_iou(mask, share, frame, self.front.outline.corners, _BORDER_M, self.fit))
 
     def _opened(self, opened: tuple[OpenLeaf, ...], frame: Frame) -> View:
         """Mask of its open leaves, and of those of a pair that stay closed."""
@@ -61,7 +53,7 @@ class FoundFront:
             parts.append(front_mask(self.front, self.scene, frame, corners[-1]))
         mask = np.logical_or.reduce([sides_mask(self.front, self.scene, frame), *(part for part, _ in parts)])
         share = float(np.mean([share for _, share in parts]))
-        return View(mask, expected_iou(mask, share, frame, np.concatenate(corners), tuned(Params).border_m, self.fit))
+        return View(mask, expected_iou(mask, share, frame, np.concatenate(corners), _BORDER_M, self.fit))
 
     def panel(self) -> FrontPanel | None:
         """Front rectangle with its handle."""

@@ -1,7 +1,6 @@
 """Click selection: the frame that shows a proposal best, and the pixel there to click."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,21 +11,15 @@ from r2c2r_core.model.inputs import PromptPoint
 from r2c2r_core.segment.proposals.clutter import Clump
 from r2c2r_core.segment.proposals.panels import Panel
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.tuning import param, tuned
 
 _SPREAD = (0.5, 0.35, 0.65, 0.2, 0.8)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Tuned parameters of the click selection."""
-
-    views: int = param(5, "count", "Maximum number of frames compared for the best view of an object", ge=1)
+_VIEWS = 5  # maximum number of frames compared for the best view of an object
 
 
 def best_views(scene: Scene, corners: Points, outward: Vector3) -> list[Frame]:
     """Frames expected to show a rectangle large, whole and sharp, best first."""
-    params = tuned(Params)
     rated = []
     centre = corners.mean(axis=0)
     for frame in scene.frames:
@@ -46,7 +39,7 @@ def best_views(scene: Scene, corners: Points, outward: Vector3) -> list[Frame]:
         facing = float(away @ outward) / float(np.linalg.norm(away))
         if facing > 0.15:
             rated.append((area * (0.2 + 0.8 * whole) ** 2 * facing * np.sqrt(max(frame.sharpness, 1e-3)), frame))
-    return [frame for _, frame in sorted(rated, key=lambda view: (-view[0], view[1].index))[: params.views]]
+    return [frame for _, frame in sorted(rated, key=lambda view: (-view[0], view[1].index))[:_VIEWS]]
 
 
 def panel_clicks(scene: Scene, panel: Panel, frame: Frame, mask: Mask) -> Iterator[PromptPoint]:

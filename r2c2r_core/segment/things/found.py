@@ -19,16 +19,8 @@ from r2c2r_core.segment.things.silhouettes import small_mask
 from r2c2r_core.segment.things.standing import Standing
 from r2c2r_core.segment.things.standing_mask import standing_mask
 from r2c2r_core.segment.things.thing import Thing, thing_mask
-from r2c2r_core.tuning import param, tuned
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Tuned parameters of the masks' confidence."""
-
-    border_m: float = param(
-        0.01, "m", "Usual position error of a mask's border", source="measured on samples and the real kitchen"
-    )
+_BORDER_M = 0.01  # usual position error of a mask's border (measured on samples and the real kitchen)
 
 
 class Loose:
@@ -63,7 +55,7 @@ class FoundThing(Loose):
             mask, share = standing_mask(self.standing, self.scene, frame)
         else:
             mask, share = (small_mask if self.small else thing_mask)(self.thing, self.scene, frame)
-        border_m = 0.5 * self.thing.border_m if self.small else tuned(Params).border_m
+        border_m = 0.5 * self.thing.border_m if self.small else _BORDER_M
         sample = self.thing.vertices[:: max(1, len(self.thing.vertices) // 50)]
         return View(mask, expected_iou(mask, share, frame, sample, border_m))
 

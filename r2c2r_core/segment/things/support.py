@@ -1,7 +1,6 @@
 """Height offset of a frame: the height at which its depth shows the support, minus the true one (vertical pose error)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,19 +8,12 @@ from r2c2r_core.arrays import Points, Vector3
 from r2c2r_core.geometry.camera import project, unproject
 from r2c2r_core.model.capture import Frame
 from r2c2r_core.segment.scene import Scene
-from r2c2r_core.tuning import param, tuned
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Tuned parameters of the height offset."""
-
-    pose_error_m: float = param(0.04, "m", "Maximum height offset of a support between frames")
+_POSE_ERROR_M = 0.04  # maximum height offset of a support between frames
 
 
 def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre: Vector3) -> float:
     """Height offset of one frame, metres: how much too high its depth shows the support around the object."""
-    params = tuned(Params)
     if support_z_m is None:
         return 0.0
     depth = scene.depth(frame.index)
@@ -39,12 +31,10 @@ def support_offset(scene: Scene, frame: Frame, support_z_m: float | None, centre
     row, column = np.nonzero(patch > 0)
     uv = np.stack([columns.start + 2 * column + 0.5, rows.start + 2 * row + 0.5], axis=1)
     heights = frame.world_from_camera.apply(unproject(uv, patch[row, column].astype(np.float64), camera))[:, 2] - support_z_m
-    near = heights[np.abs(heights) < params.pose_error_m]
+    near = heights[np.abs(heights) < _POSE_ERROR_M]
     if len(near) < 60:
         return 0.0
-    counts, edges = np.histogram(
-        near, bins=round(2 * params.pose_error_m / 0.004), range=(-params.pose_error_m, params.pose_error_m)
-    )
+    counts, edges = np.histogram(near, bins=round(2 * _POSE_ERROR_M / 0.004), range=(-_POSE_ERROR_M, _POSE_ERROR_M))
     peak = float(edges[int(np.argmax(np.convolve(counts, [1, 2, 1], mode="same")))] + 0.002)
     return float(np.median(near[np.abs(near - peak) < 0.008]))
 
