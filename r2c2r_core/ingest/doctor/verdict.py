@@ -28,7 +28,7 @@ class Params:
     )
     unsure: float = param(0.5, "share", "Fraction of depth with low confidence above which it is reported")
     gravity_deg: float = param(
-        1.5, "deg", "Deviation of gravity from the planes above which it is reported", source="phones: 0.5, fitted planes: 1"
+        1.0, "deg", "Deviation of gravity from the planes above which it is reported", source="phones: 0.5"
     )
     tilt_deg: float = param(
         3.0,

@@ -248,7 +248,7 @@ def test_few_frames_missing_floor_and_assumed_up_are_reported(capture):
 
 
 @pytest.mark.parametrize(
-    ("off", "corrected", "verdict"), [(2.1, True, "good"), (5.0, True, "usable with care"), (5.0, False, "usable with care")]
+    ("off", "corrected", "verdict"), [(1.1, True, "good"), (5.0, True, "usable with care"), (5.0, False, "usable with care")]
 )
 def test_a_gravity_error_is_reported_with_its_angle_behind_worse_faults(off, corrected, verdict, capture):
     room = replace(capture.room, up_file_off_deg=off, up_corrected=corrected, floor_found=False)
@@ -262,7 +262,7 @@ def test_a_gravity_error_is_reported_with_its_angle_behind_worse_faults(off, cor
 
 
 def test_a_small_gravity_error_is_not_reported(capture):
-    room = replace(capture.room, up_file_off_deg=1.4, up_corrected=False)
+    room = replace(capture.room, up_file_off_deg=0.9, up_corrected=False)
     assert "gravity_off" not in {r.cause for r in examine(replace(capture, room=room)).remarks}
 
 
