@@ -18,7 +18,7 @@ class Params:
         0.02, "m", "Maximum misalignment of the fronts of a row", gt=0, source="poses bend a real kitchen's lines by 2 cm"
     )
     beyond_m: float = param(
-        0.02, "m", "Height over an edge that frames must show for the edge to be seen", gt=0, source="an edge's search distance"
+        0.01, "m", "Height over an edge that frames must show for the edge to be seen", gt=0, source="two cells of the odds"
     )
 
 

@@ -35,6 +35,12 @@ def test_an_upper_edge_that_frames_show_stays(door: Front) -> None:
     assert with_unseen_top(door.cell, door.run, CABINET) == door.cell
 
 
+def test_an_upper_edge_15_mm_below_the_border_of_the_pictures_is_seen(door: Front) -> None:
+    mosaic = door.run.mosaic.copy()
+    mosaic[: round(door.cell.top - 0.015 / door.run.grid.cell_m)] = 0
+    assert with_unseen_top(door.cell, dataclasses.replace(door.run, mosaic=mosaic), TALL) == door.cell
+
+
 def test_an_unseen_upper_edge_is_on_the_line_of_its_row(door: Front) -> None:
     cut = cut_off(door, slice(round(door.cell.left) - 4, round(door.cell.right) + 4))
     found = with_unseen_top(cut.cell, cut.run, CABINET)
