@@ -3,7 +3,7 @@
 | package    | method                                                                                                      |
 |------------|-------------------------------------------------------------------------------------------------------------|
 | mosaics    | orthomosaic of a vertical plane: line evidence, relief, network log-odds, edges, handles                    |
-| runs       | its partition into panels by a recursive XY-cut; face frames, stiles                                        |
+| runs       | its most probable partition into fronts; colour contrast of their edges                                     |
 | motion     | a leaf relative to its unit: its joint and its state in every frame, from depth                             |
 | fronts     | the clicked panel as a rectangle on its plane; open drawers and doors                                       |
 | things     | free-standing objects: min-cut of the fused surface; small ones by visual hull                              |

@@ -27,9 +27,8 @@ from r2c2r_core.segment.motion.board import hand_px, patches_unlike
 from r2c2r_core.segment.occlusion import Facet, Tolerance, at_size, visible_mask
 from r2c2r_core.segment.occlusion import Params as SightParams
 from r2c2r_core.segment.runs.contrast import edge_changes
-from r2c2r_core.segment.runs.parting import parted
+from r2c2r_core.segment.runs.partition import Clicks, Partitioner
 from r2c2r_core.segment.runs.run import Run
-from r2c2r_core.segment.runs.xy_cut import Line, LineField, halves
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -52,6 +51,9 @@ class Params:
         0.2, "share", "Maximum relative difference where their handles meet: a cell may include the gap beside its door"
     )
     handles_meet: float = param(0.5, "score", "Minimum pair score of doors whose handles meet")
+    two_names: float = param(
+        3.0, "log", "Log-odds gain of a seam between two clicks of different names", source="one click in twenty is a slip"
+    )
     off_plane_m: float = param(
         0.06, "m", "Maximum distance from the plane of a click on the panel", source="handles protrude by up to 5 cm"
     )
@@ -346,33 +348,19 @@ def _without(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) 
 
 def _cut_off(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Cell:
     """Part of the cell without the negative click, cut along the likeliest line between the clicks."""
-    line = _line_between(cell, column, row, run, kept)
-    return cell if line is None else _side_of(cell, line, kept)
+    return _part_of(cell, [kept, np.array([[column, row]])], run, np.inf)
 
 
 def _own_part(cell: Cell, on: np.ndarray, others: np.ndarray, run: Run) -> Cell:
     """Part of a cell with its own clicks (n, 2), where other objects' clicks (m, 2) on the same plane lie in it too."""
-    clicked = [on, *(other[None] for other in others if cell.contains(*other.tolist()))]
-    parts = parted(LineField(run.odds, run.grid.cell_m), cell, clicked).parts
-    return next((part for part in parts if part.contains(*on[0].tolist())), cell)
+    inside = [other[None] for other in others if cell.contains(*other.tolist())]
+    return _part_of(cell, [on, *inside], run, tuned(Params).two_names) if inside else cell
 
 
-def _line_between(cell: Cell, column: float, row: float, run: Run, kept: np.ndarray) -> Line | None:
-    """Likeliest line with all kept clicks on one side and the negative click on the other."""
-    field, found = LineField(run.odds, run.grid.cell_m), []
-    for axis, (off, on) in enumerate(((column, kept[:, 0]), (row, kept[:, 1]))):
-        below, above = on[on < off], on[on > off]
-        if len(below) and len(above):
-            continue  # a negative click between two positive ones: no straight cut along this axis
-        start, stop = (float(below.max()), off) if len(below) else (off, float(above.min())) if len(above) else (off, off)
-        found.append(field.best_between(cell, axis, start, stop))
-    return max((line for line in found if line is not None), key=lambda line: line.odds, default=None)
-
-
-def _side_of(cell: Cell, line: Line, kept: np.ndarray) -> Cell:
-    """Half of a cut that contains the kept clicks."""
-    first, second = halves(cell, line)
-    return first if kept[0, line.axis] < line.position else second
+def _part_of(cell: Cell, clicked: list[np.ndarray], run: Run, shared_cost: float) -> Cell:
+    """Part of a cell that holds the first click of the first object."""
+    parts = Partitioner(run.odds, run.grid.cell_m).divide(cell, Clicks(clicked, shared_cost))
+    return next((part for part in parts if part.contains(*clicked[0][0].tolist())), cell)
 
 
 def _handle_on(run: Run, cell: Cell) -> GridHandle | None:
@@ -411,9 +399,9 @@ def _edge_strengths(front: Front, changes: Iterable[float]) -> tuple[float, ...]
 
 def seam_inside(front: Front) -> float:
     """Probability of the likeliest uncut seam inside a panel."""
-    params, field = tuned(Params), LineField(front.run.odds, front.run.grid.cell_m)
+    params, field = tuned(Params), Partitioner(front.run.odds, front.run.grid.cell_m)
     shown = replace(front.cell, top=max(front.cell.top, 0.0))
-    return probability(field.best_uncut(shown, params.border_m, params.faintest))
+    return probability(field.seam_inside(shown, params.border_m, params.faintest))
 
 
 _SIDE_EDGES: dict[HingeSide, tuple[int, int]] = {"left": (0, 3), "right": (1, 2), "bottom": (2, 3), "top": (0, 1)}

@@ -1,1 +1,1 @@
-"""Furniture runs: an orthomosaic cut into panels (XY-cut), with face frames and stiles identified; `run` assembles them."""
+"""Furniture runs: an orthomosaic divided into fronts by the most probable partition; `run` assembles them."""

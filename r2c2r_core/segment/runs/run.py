@@ -24,7 +24,7 @@ from r2c2r_core.segment.mosaics.orthomosaic import (
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief, measure_relief
 from r2c2r_core.segment.planes import PlaneRegion
-from r2c2r_core.segment.runs.xy_cut import cut_panels
+from r2c2r_core.segment.runs.partition import Partitioner
 from r2c2r_core.segment.scene import Scene
 from r2c2r_core.tuning import param, tuned
 
@@ -119,7 +119,7 @@ def run_on(
     odds = edge_odds(seam_odds(mosaic, relief), mosaic, relief, *lines)
     vertical, horizontal = (_with_edges(found, relief, axis, grid) for axis, found in enumerate(lines))
     if cells is None:
-        cells = tuple(cut_panels(odds, Cell(0, 0, grid.columns, grid.rows), grid.cell_m))
+        cells = tuple(Partitioner(odds, grid.cell_m).divide(Cell(0, 0, grid.columns, grid.rows)))
     flags = relief.on_plane(), relief.glazed()
     seen, panes = (each.repeat(STEP, axis=0).repeat(STEP, axis=1)[: grid.rows, : grid.columns] for each in flags)
     handles = find_handles(odds, relief, cells)

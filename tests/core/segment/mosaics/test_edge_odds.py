@@ -9,7 +9,7 @@ from r2c2r_core.segment.mosaics.lines import Evidence, scored
 from r2c2r_core.segment.mosaics.orthomosaic import STEP, Cell, Tile
 from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.mosaics.relief import Relief
-from r2c2r_core.segment.runs.xy_cut import cut_panels
+from r2c2r_core.segment.runs.partition import Partitioner
 
 ROWS, COLUMNS, CELL_M = 160, 200, 0.0025
 
@@ -33,7 +33,7 @@ def test_unobserved_cells_are_no_evidence_against_a_line() -> None:
     upright[: ROWS // 2, 60], front[:] = 3, 4
 
     def cells() -> int:
-        return len(cut_panels(PanelOdds(upright, level, handle, front), Cell(0, 0, COLUMNS, ROWS * STEP), CELL_M))
+        return len(Partitioner(PanelOdds(upright, level, handle, front), CELL_M).divide(Cell(0, 0, COLUMNS, ROWS * STEP)))
 
     assert cells() == 1
     front[ROWS // 2 :] = 0
@@ -51,7 +51,7 @@ def test_a_door_is_not_cut_at_the_chair_before_it() -> None:
     nothing = Evidence(np.zeros((40, COLUMNS * STEP)), np.zeros((40, COLUMNS * STEP), bool), 20)
     relief = Relief(CELL_M * STEP, *(np.zeros((ROWS, COLUMNS)) for _ in range(4)))
     odds = edge_odds(PanelOdds(upright, level, handle, front), mosaic, relief, nothing, nothing)
-    cells = cut_panels(odds, Cell(0, 0, COLUMNS * STEP, ROWS * STEP), CELL_M)
+    cells = Partitioner(odds, CELL_M).divide(Cell(0, 0, COLUMNS * STEP, ROWS * STEP))
     (door,) = [cell for cell in cells if cell.contains(140 * STEP, 60 * STEP)]
     assert door.bottom == pytest.approx(140 * STEP, abs=2 * STEP)
 
