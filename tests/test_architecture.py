@@ -232,7 +232,7 @@ def test_the_readme_lists_every_command_and_is_short() -> None:
     assert len(readme.splitlines()) <= 150  # it is for users: all else is in docs/
 
 
-MAX_CORE_LINES, MAX_PARAMS = 67_274, 1_267
+MAX_CORE_LINES, MAX_PARAMS = 67_302, 1_268
 """Limits of r2c2r_core. A change that needs more raises the number here, in its own commit, with the reason."""
 
 

@@ -38,7 +38,6 @@ class LineSet(NamedTuple):
     ends: np.ndarray  # (lines + 2,) positions, ascending
     starts: np.ndarray  # (blocks + 1,) borders of blocks along the lines
     paths: np.ndarray  # (lines, blocks) positions
-    odds: np.ndarray  # (lines, blocks) log-odds of an edge
     counted: np.ndarray  # (lines, blocks) log-likelihood ratio of an edge that may be hidden; 0 where no front is beside it
     field: np.ndarray  # (blocks, positions) log-odds everywhere
 
@@ -76,7 +75,7 @@ def find_lines(odds: np.ndarray, beside: np.ndarray, cell_m: float, *, every: bo
     inner = np.maximum.accumulate(paths.mean(axis=1)) + 0.5 + 1e-6 * np.arange(len(paths))  # strictly ascending
     blocks = np.arange(count)
     ends = np.concatenate([[0.0], inner, [odds.shape[1]]])
-    return LineSet(ends, starts, paths, field[blocks, paths], counted[blocks, paths], field)
+    return LineSet(ends, starts, paths, counted[blocks, paths], field)
 
 
 def _pooled(values: np.ndarray, starts: np.ndarray) -> np.ndarray:

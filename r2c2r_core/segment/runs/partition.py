@@ -18,12 +18,17 @@ from r2c2r_core.segment.mosaics.panel_net import PanelOdds
 from r2c2r_core.segment.runs.candidate_lines import LineSet, find_lines
 from r2c2r_core.tuning import param, tuned
 
+END_CELLS = 2  # 1 cm: the network's odds of a front change over 1 to 2 cm
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
     """Tuned parameters of the partition. Odds are natural logarithms: 0 is even."""
 
     beside_m: float = param(0.02, "m", "Maximum distance from a line to a front for the line to be its edge", gt=0)
+    end_weight: float = param(
+        0.5, "ratio", "Weight of the odds that a front ends at a line: the network's odds of edges have them in part", ge=0
+    )
     sample_m: float = param(
         0.08, "m", "Length of a line, and side of a square, whose odds count as one independent sample", gt=0
     )
@@ -57,6 +62,7 @@ class Partitioner:
     def __init__(self, odds: PanelOdds, cell_m: float) -> None:
         self._params, self._cell_m = (params := tuned(Params)), cell_m * STEP
         self._odds, front = odds, odds.front
+        self._edges = odds.upright + _ends(front, 1), odds.level + _ends(front, 0)
         reach = 2 * round(params.beside_m / self._cell_m) + 1
         shown = cv2.erode((front != 0).astype(np.float32), np.ones((3, 3), np.uint8))  # an edge shows only with both sides
         self._beside = tuple(
@@ -93,24 +99,25 @@ class Partitioner:
                 )
         return found
 
-    def seam_inside(self, region: Cell, inset_m: float, faintest: float) -> float:
-        """Log-odds of the likeliest line at least `inset_m` within a region that crosses it; -inf without one.
+    def seam_gain(self, region: Cell, inset_m: float) -> float:
+        """Log-likelihood ratio of the best division of a region to the region undivided; -inf where nothing divides it.
 
-        Its faintest part counts (that quantile): a seam runs from edge to edge, the inner edge of a frame ends at rails.
+        It is cut at least `inset_m` within its borders.
         """
-        best = -np.inf
-        for axis in (0, 1):
-            lines = self._lines(region, axis, every=True)
-            if lines is not None:
-                inner = lines.ends[1:-1] * self._cell_m
-                inside = (inner > inset_m) & (inner < lines.ends[-1] * self._cell_m - inset_m)
-                best = max(best, float(np.quantile(lines.odds, faintest, axis=1)[inside].max(initial=-np.inf)))
-        return best
+        upright, level = (self._lines(region, axis, every=True) for axis in (0, 1))
+        if upright is None or level is None:
+            return -np.inf
+        worth, uprights, levels = self._evidence(region, upright, level)
+        _, value = _best_cuts(worth, uprights, levels, np.ones(worth.shape, bool))
+        x, y = (np.flatnonzero(_inside(each.ends * self._cell_m, inset_m)) for each in (upright, level))
+        parts = [value[0, x, 0, -1] + value[x, -1, 0, -1] + uprights[x - 1, 0, -1]]
+        parts += [value[0, -1, 0, y] + value[0, -1, y, -1] + levels[y - 1, 0, -1]]
+        return float(np.concatenate(parts).max(initial=-np.inf) - worth[0, -1, 0, -1])
 
     def _lines(self, region: Cell, axis: int, *, every: bool) -> LineSet | None:
         """Candidate lines across a region: `every` one, or those that are likely somewhere; None in a region without extent."""
         rows, columns = self._area(region)
-        odds, beside = (self._odds.upright, self._odds.level)[axis][rows, columns], self._beside[axis][rows, columns]
+        odds, beside = self._edges[axis][rows, columns], self._beside[axis][rows, columns]
         if min(odds.shape) < 2:
             return None
         return find_lines(odds if axis == 0 else odds.T, beside if axis == 0 else beside.T, self._cell_m, every=every)
@@ -123,13 +130,10 @@ class Partitioner:
 
     def _first_cuts(self, region: Cell, upright: LineSet, level: LineSet, clicks: Clicks | None) -> np.ndarray:
         """First line of the best partition of each rectangle: 0 none, positive upright, negative level."""
-        params, (rows, columns) = self._params, self._area(region)
-        value = self._worth(region, upright, level)
-        samples = params.sample_m / self._cell_m
-        uprights = upright.sums(level.ends) / samples  # (lines, top, bottom)
-        levels = level.sums(upright.ends) / samples  # (lines, left, right)
+        value, uprights, levels = self._evidence(region, upright, level)
         several = np.ones(value.shape, bool)
         if clicks is not None:
+            rows, columns = self._area(region)
             each = [on / STEP - [columns.start, rows.start] for on in clicks.objects]
             count = np.sum([_counts(upright.ends, level.ends, on) > 0 for on in each], axis=0)
             several = count > 1
@@ -138,7 +142,12 @@ class Partitioner:
             for on in each:
                 uprights[_separates(upright.ends, level.ends, on)] = -np.inf
                 levels[_separates(level.ends, upright.ends, on[:, ::-1])] = -np.inf
-        return _best_cuts(value, uprights, levels, several)
+        return _best_cuts(value, uprights, levels, several)[0]
+
+    def _evidence(self, region: Cell, upright: LineSet, level: LineSet) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Log-likelihoods of rectangles, and of upright (line, top, bottom) and level (line, left, right) lines."""
+        samples = self._params.sample_m / self._cell_m
+        return self._worth(region, upright, level), upright.sums(level.ends) / samples, level.sums(upright.ends) / samples
 
     def _worth(self, region: Cell, upright: LineSet, level: LineSet) -> np.ndarray:
         """Log-likelihood of each rectangle between lines as one front, or as anything else if that is more."""
@@ -172,6 +181,12 @@ _NEVER = 1e-9
 _ODD_DENSITY = 1 / np.log(4.0 / 0.01)  # of the logarithm of a size between 1 cm and 4 m
 
 
+def _ends(front: np.ndarray, axis: int) -> np.ndarray:
+    """Log-odds that a front's end adds to an edge, from the odds of a front 1 cm before and behind it, along an axis."""
+    before, behind = np.roll(front, END_CELLS, axis), np.roll(front, -END_CELLS, axis)
+    return tuned(Params).end_weight * np.maximum(np.maximum(np.minimum(before, -behind), np.minimum(behind, -before)), 0)
+
+
 def _edge(lines: LineSet, end: int, low: float, high: float, start: int, border: float) -> float:
     """Grid position of an end of a rectangle: that of a line between two positions along it, or the region's border."""
     inner = 0 < end < len(lines.ends) - 1
@@ -197,8 +212,15 @@ def _separates(along: np.ndarray, across: np.ndarray, clicks: np.ndarray) -> np.
     return np.asarray(between[:, None, None] & ((across[:, None] <= first) & (across[None] > last))[None])
 
 
-def _best_cuts(value: np.ndarray, uprights: np.ndarray, levels: np.ndarray, several: np.ndarray) -> np.ndarray:
-    """First line of the best partition of every rectangle, from small to large; `value` is that of the uncut ones."""
+def _inside(ends: np.ndarray, inset: float) -> np.ndarray:
+    """Mask of the inner lines that are farther than `inset` from both borders."""
+    return np.asarray((ends > ends[0] + inset) & (ends < ends[-1] - inset))
+
+
+def _best_cuts(
+    value: np.ndarray, uprights: np.ndarray, levels: np.ndarray, several: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """First line and value of the best partition of every rectangle, from small to large; `value` is that of the uncut ones."""
     value = value.copy()
     cut = np.zeros(value.shape, np.int32)
     columns, rows = value.shape[0], value.shape[2]
@@ -217,4 +239,4 @@ def _best_cuts(value: np.ndarray, uprights: np.ndarray, levels: np.ndarray, seve
             allowed = several[left, right, top, bottom]
             value[left, right, top, bottom] = np.where(allowed, best, value[left, right, top, bottom])
             cut[left, right, top, bottom] = np.where(allowed, first, 0)
-    return cut
+    return cut, value
