@@ -183,7 +183,7 @@ _ODD_DENSITY = 1 / np.log(4.0 / 0.01)  # of the logarithm of a size between 1 cm
 
 def _ends(front: np.ndarray, axis: int) -> np.ndarray:
     """Log-odds that a front's end adds to an edge, from the odds of a front 1 cm before and behind it, along an axis."""
-    before, behind = np.roll(front, END_CELLS, axis), np.roll(front, -END_CELLS, axis)
+    before, behind = (front.take(np.arange(front.shape[axis]) + off, axis, mode="clip") for off in (-END_CELLS, END_CELLS))
     return tuned(Params).end_weight * np.maximum(np.maximum(np.minimum(before, -behind), np.minimum(behind, -before)), 0)
 
 

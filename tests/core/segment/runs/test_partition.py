@@ -131,6 +131,14 @@ def test_edges_outside_fronts_are_not_cut() -> None:
     assert len(divided(tiles, Cell(0, 0, 240, 288))) == 1
 
 
+@pytest.mark.parametrize("end", [176, 184])
+def test_of_equally_likely_lines_the_one_where_fronts_end_is_cut(end: int) -> None:
+    seen = odds(240, 288, [], [(row, 0, 240) for row in range(172, 190, 2)], sure=0.5)
+    seen.front[end // 2 :] = -4
+    (front,) = [cell for cell in divided(seen, Cell(0, 0, 240, 288)) if cell.top == 0]
+    assert front.bottom == pytest.approx(end, abs=STEP)
+
+
 def test_an_unlikely_line_is_found_only_when_requested() -> None:
     faint, whole = odds(240, 288, [(100, 0, 288)], [], sure=-1.0), Cell(0, 0, 240, 288)
     assert divided(faint, whole) == [whole]
